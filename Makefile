@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+# bergtow: `make help` lists what there is.
+
+CONFIG ?= release
+BUILD  := build/$(CONFIG)
+PYTHON ?= /usr/bin/python3
+PREFIX ?= /usr/local
+J      ?= $(shell nproc 2>/dev/null || echo 2)
+
+CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
+MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
+MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
+HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
+HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
+
+# -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler.
+BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -MMD -MP -ffp-contract=off -fno-math-errno \
+          -Wall -Wextra -Wpedantic -Wshadow $(MPI_CFLAGS) $(HDF5_CFLAGS)
+ifeq ($(CI),true)
+BASE   += -Werror
+endif
+OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
+OPT_debug   := -O1 -g3 -DBT_VALIDATE
+OPT_asan    := -O1 -g3 -DBT_VALIDATE -fsanitize=address,undefined -fno-sanitize-recover=undefined
+ifeq ($(filter $(CONFIG),release debug asan),)
+$(error CONFIG=$(CONFIG) is unknown: use release, debug or asan)
+endif
+CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lm
+
+REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
+
+LIB_SRC := $(filter-out src/main.c $(wildcard src/cmd_*.c),$(wildcard src/*.c partition/*.c))
+BIN_SRC := src/main.c $(wildcard src/cmd_*.c)
+LIB_OBJ := $(LIB_SRC:%.c=$(BUILD)/%.o)
+BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
+TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
+TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
+
+.PHONY: all help deps demo test test-long clean install tests lint asan
+.DEFAULT_GOAL := all
+
+all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug or asan for the others)
+
+help: ## this list
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+# The stamp changes when the flags do, so that a new flag rebuilds everything.
+STAMP := $(BUILD)/flags
+$(STAMP): FORCE
+	@mkdir -p $(BUILD)
+	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@
+FORCE:
+
+REV := $(BUILD)/revision.h
+$(REV): FORCE
+	@mkdir -p $(BUILD)
+	@printf '#define BT_REVISION "%s"\n#define BT_COMPILER "%s"\n#define BT_FLAGS "%s"\n' \
+	  '$(REVISION)' "$$($(CC) --version | head -1)" '$(OPT_$(CONFIG)) -ffp-contract=off' > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+
+$(BUILD)/%.o: %.c $(STAMP) | $(REV)
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS) -I$(BUILD) -c $< -o $@
+
+$(BUILD)/libbergtow.a: $(LIB_OBJ)
+	@rm -f $@
+	ar rcs $@ $^
+
+$(BUILD)/bergtow: $(BIN_OBJ) $(BUILD)/libbergtow.a
+	$(CC) $(CFLAGS) $^ $(LDLIBS) -o $@
+
+$(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
+	@mkdir -p $(@D)
+	$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
+
+tests: $(TEST_BIN) ## build the test programs
+
+clean: ## remove build/ and out/
+	rm -rf build out
+
+-include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d)

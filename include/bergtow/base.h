@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Identifiers, status codes and the list of messages that every fallible function appends to.
+#ifndef BERGTOW_BASE_H
+#define BERGTOW_BASE_H
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define BT_VERSION "0.1.0"
+
+typedef int64_t bt_gid; ///< global id of a body: the same in every decomposition, never reused
+typedef int32_t bt_idx; ///< position of a body (or pair, row) in this process's memory
+
+/// Status of a call and exit code of the program.
+typedef enum {
+    BT_OK = 0,
+    BT_ERR_USAGE = 2,   ///< command line
+    BT_ERR_CASE = 3,    ///< case or field file
+    BT_ERR_IO = 4,      ///< reading or writing a file
+    BT_ERR_NUMERIC = 5, ///< the computation itself failed
+    BT_ERR_SIGNAL = 6,  ///< stopped on a signal, with what was computed so far complete on disk
+} bt_status;
+
+/// Messages collected on the way, so that one call can report every error of a case file at once.
+typedef struct bt_errors {
+    char **text;
+    size_t n, cap;
+} bt_errors;
+
+/// Append a message (printf-style). Aborts only when out of memory.
+void bt_errors_add(bt_errors *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+/// Print every message on stderr, one a line, prefixed "bergtow: ".
+void bt_errors_print(const bt_errors *e);
+void bt_errors_free(bt_errors *e);
+
+/// malloc/realloc/calloc that end the program with a message and BT_ERR_NUMERIC when memory runs out.
+void *bt_alloc(size_t n, size_t size);             ///< zeroed
+void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size
+void *bt_alloc_aligned(size_t n, size_t size);     ///< zeroed, 64-byte aligned, release with free()
+
+/// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).
+double bt_clock(void);
+
+static inline double bt_min(double a, double b) { return a < b ? a : b; }
+static inline double bt_max(double a, double b) { return a > b ? a : b; }
+
+#define BT_PI 3.14159265358979323846
+
+#endif

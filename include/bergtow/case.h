@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+// A case: everything a run depends on, as read from the YAML file, in SI units and radians.
+//
+// The schema table in src/schema.c is the one place that names each key with its unit, default, range and one
+// sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
+// holds the values. Choices are indices into the name lists of the schema.
+#ifndef BERGTOW_CASE_H
+#define BERGTOW_CASE_H
+
+#include "bergtow/base.h"
+
+typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // basin, geographic
+typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN } bt_bound;   // wall, periodic, open
+typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
+typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
+typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
+typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
+typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE } bt_tow_mode;         // none, speed, line
+typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC } bt_tilt;   // none, slope, geostrophic
+
+/// Drag coefficients of a class of bodies (ice: floes; body: the towed body).
+typedef struct bt_drag_coefs {
+    double water_form; ///< C_w, on ½ρ draft×width
+    double water_skin; ///< C_ws, on ρ A
+    double air_form;   ///< C_a, on ½ρ sail×width
+    double air_skin;   ///< C_as, on ρ A
+} bt_drag_coefs;
+
+/// One floe or body given by hand (list `floes:`).
+typedef struct bt_floe_def {
+    bt_body_shape shape;
+    double length, width;      ///< m, of a named shape
+    double *vertices;          ///< [n_vertices][2] m, shape: polygon
+    int n_vertices;
+    double x, y, yaw;          ///< m, m, rad
+    double vx, vy, yaw_rate;   ///< m/s, m/s, rad/s
+    double thickness;          ///< m
+    bool fixed;                ///< infinite mass, at rest
+    int line;                  ///< where in the case file it stands, for messages
+} bt_floe_def;
+
+typedef struct bt_case {
+    char *path;       ///< file name as given, for messages
+    char *text;       ///< the file's text
+    struct {
+        char *title;
+        double dt;           ///< Δt, s
+        double duration;     ///< s
+        int64_t threads;     ///< OpenMP threads, 0 = as OMP_NUM_THREADS or all cores
+    } run;
+    struct {
+        bt_frame frame;
+        double x0, y0;         ///< low corner, m; defaults: basin (0, −width/2), geographic (−length/2, −width/2)
+        double length, width;  ///< along x, along y, m
+        bt_bound ends, sides;  ///< boundaries at the ends of x, and at the sides (ends of y)
+        double wall_friction;  ///< Coulomb coefficient ice–wall
+        double wall_restitution;
+        double ends_closing, sides_closing; ///< inward speed of each wall, m/s
+    } domain;
+    struct {
+        double concentration;           ///< area fraction in the ice region less the body's footprint, 0..0.95
+        double x_min, x_max, y_min, y_max; ///< ice region, m; default the whole domain
+        bt_ice_shape shape;
+        int64_t sides;                  ///< of shape: polygons
+        double aspect;                  ///< length / width of shape: rectangles
+        double size;                    ///< mean diameter of the circle of equal area, m
+        bt_size_law size_law;
+        double size_spread;             ///< standard deviation / mean of the diameter, laws single and lognormal
+        double size_min, size_max;      ///< m, truncation of law power (and of lognormal when given; 0 = none)
+        double size_exponent;           ///< a in N(>d) ~ d^−a
+        double thickness;               ///< mean, m
+        bt_thickness_law thickness_law;
+        double thickness_spread;        ///< standard deviation / mean
+        double density;                 ///< ρ_i, kg/m³
+        double friction;                ///< μ ice–ice
+        double restitution;             ///< e
+        double added_mass;              ///< C_m
+        double added_inertia;           ///< C_I
+        bt_drag_coefs drag;
+        int64_t seed;
+        double shake;                   ///< relaxation length of the generator, in mean free gaps (0 = none)
+        char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
+    } ice;
+    bt_floe_def *floes;   ///< [n_floes] given by hand
+    bt_idx n_floes;
+    struct {
+        bt_body_shape shape;
+        double length, width;    ///< m
+        double *vertices;        ///< [n_vertices][2] m, shape: polygon
+        int n_vertices;
+        double x, y, yaw;        ///< centroid at time zero, m, m, rad
+        double vx, vy, yaw_rate; ///< velocity at time zero (tow: none or line), m/s, rad/s
+        double draft, sail;      ///< m
+        double density;          ///< ρ of the body, kg/m³, used when mass is not given
+        double mass;             ///< kg; 0 = density × waterline area × (draft + sail)
+        double added_mass, added_inertia; ///< C_m, C_I
+        double friction;         ///< μ ice–body
+        double restitution;      ///< e ice–body
+        bt_drag_coefs drag;
+    } body;
+    struct {
+        bt_tow_mode mode;
+        double speed;            ///< of the body (speed) or of the carriage (line), m/s
+        double direction;        ///< heading of the tow from +x towards +y, rad
+        double ramp;             ///< time over which the speed rises linearly from 0, s
+        double line_length;      ///< L0 unstretched, m
+        double line_stiffness;   ///< EA, N
+        double line_damping;     ///< c, N s/m
+        double hull_x, hull_y;   ///< fastening point, body frame, m; default the foremost point of the waterline
+    } tow;
+    struct {
+        double density;          ///< ρ_w, kg/m³
+        double current_x, current_y; ///< U_w, m/s
+        double latitude;         ///< rad; Coriolis parameter f = 2Ω sin(latitude); 0 = off
+        bt_tilt tilt;
+        double slope_x, slope_y; ///< ∇η for tilt: slope
+    } water;
+    struct {
+        double density;          ///< ρ_a, kg/m³
+        double wind_x, wind_y;   ///< U_a, m/s
+    } air;
+    struct {
+        double tolerance;        ///< natural-map residual / reference speed at which a step has converged
+        double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
+        int64_t max_sweeps;
+        bool warm_start;
+        double slop;             ///< overlap left alone by the position projection / mean floe size
+        int64_t position_sweeps; ///< limit of the position projection
+        double rest_speed;       ///< approach below this speed has no restitution, m/s
+    } solver;
+    struct {
+        int64_t sample_every;    ///< steps per entry of the series
+        double frame_interval;   ///< s between frames, 0 = 200 frames a run
+        double window_start;     ///< s, start of the steady window; negative = found from the series
+        double progress;         ///< s of wall time between progress lines
+    } output;
+    struct {
+        double mean_force;       ///< measured mean ice resistance, N; NaN = none
+        char *source;            ///< where it was published
+    } reference;
+} bt_case;
+
+/// Read and check a case file; every error of the file is appended to err with file, line, key and remedy.
+/// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
+
+/// All defaults, for tests and programs that build a case in memory.
+void bt_case_defaults(bt_case *c);
+
+/// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
+bt_status bt_case_finish(bt_case *c, bt_errors *err);
+
+/// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
+char *bt_case_resolved(const bt_case *c);
+
+/// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0 without body.
+int bt_case_waterline(const bt_case *c, double *v);
+
+/// Mass of the towed body without added mass, kg.
+double bt_case_body_mass(const bt_case *c);
+
+/// Reference speed of the solver tolerance, m/s (> 0).
+double bt_case_reference_speed(const bt_case *c);
+
+void bt_case_free(bt_case *c);
+
+/// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream.
+void bt_case_list_keys(void *stream);
+
+#endif

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// What a run leaves behind: series, frames, summary. One table of fields drives result.h5 and its documentation.
+#ifndef BERGTOW_RECORD_H
+#define BERGTOW_RECORD_H
+
+#include "bergtow/base.h"
+#include "bergtow/case.h"
+
+/// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
+/// tow direction; resisting components are positive against it, so that tow = ice + drag + inertia.
+typedef struct bt_sample {
+    double time;            ///< s, end of the step
+    double tow_force;       ///< N along
+    double ice_resistance;  ///< N, contact force against the tow direction
+    double ice_force_x, ice_force_y; ///< N, contact force on the body
+    double ice_moment;      ///< N m, contact moment on the body about its centroid
+    double drag_force;      ///< N, all external forces (water, air, Coriolis, tilt) against the tow direction
+    double inertia_force;   ///< N, (M + added mass) × acceleration along the tow direction
+    double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
+    double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
+    double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
+    double line_tension, line_length, carriage_x, carriage_y; ///< N, m, m, m (NaN without a line)
+    double contacts;        ///< contact points in the solver
+    double contacts_body;   ///< of them on the towed body
+    double sweeps, position_sweeps;
+    double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
+    double unconverged;     ///< 1 if the sweep limit came before the tolerance
+    double overlap;         ///< deepest overlap found at the start of the step, m
+    double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
+    double kinetic_energy;  ///< of all dynamic bodies, J
+    double contact_work;    ///< work of the contact impulses in the step, J (<= 0 for e <= 1)
+    double moving;          ///< floes faster than 1 % of the reference speed
+} bt_sample;
+
+typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
+
+typedef struct bt_series_field {
+    const char *name, *units, *description;
+    size_t offset;  ///< of the double in bt_sample
+    bt_keep keep;
+} bt_series_field;
+
+extern const bt_series_field bt_series_fields[];
+extern const int bt_n_series_fields;
+
+/// Wall time by phase of the step, s.
+typedef struct bt_phases {
+    double detect, colour, forces, solve, advance, exchange, output;
+} bt_phases;
+
+/// Bodies as the recorder needs them; the arrays belong to the caller and hold floes first, then other bodies.
+typedef struct bt_record_bodies {
+    bt_idx n_floes, n_bodies;    ///< bodies = floes + hand-made fixed bodies + towed body + walls
+    const int64_t *offsets;      ///< [n_bodies+1]
+    const double *vertices;      ///< [offsets[n_bodies]][2] m, body frame
+    const double *thickness;     ///< [n_bodies] m (draft + sail of the towed body, 0 for walls)
+    const double *area;          ///< [n_bodies] m²
+    const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...
+    bt_idx towed;                ///< index of the towed body, −1 = none
+} bt_record_bodies;
+
+/// Numbers of the end of the run that the series do not hold.
+typedef struct bt_run_totals {
+    int64_t n_steps;
+    int ranks, threads;
+    double dt, wall_time;
+    double mean_size;            ///< mean equivalent diameter of the floes, m
+    double concentration;        ///< as made
+    double tolerance;            ///< absolute, m/s
+    int64_t floes_outside;       ///< left an open domain
+    uint64_t state_hash;
+    bt_phases phases;
+    const char *stopped;         ///< why the run ended early, or NULL
+} bt_run_totals;
+
+typedef struct bt_record bt_record;
+
+/// Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies.
+/// Errors: BT_ERR_IO with path and remedy.
+bt_status bt_record_open(bt_record **r, const char *dir, const bt_case *c, const bt_record_bodies *b,
+                         const char *command_line, bt_errors *err);
+
+/// Take one step's numbers. Buffered; flushed to the file in chunks.
+bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
+
+/// Take one frame: pose [n_bodies][3] and, for colour, floe contact force [n_floes] N (largest normal force on the
+/// floe in this step). Stored as /frames/pose [T][n_floes][3], /frames/contact_force [T][n_floes] and, for
+/// the rest, /frames/body_pose [T][n_bodies − n_floes][3].
+bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force, bt_errors *err);
+
+/// Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error).
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
+
+/// Print the end-of-run table (summary and phases) on stdout.
+void bt_record_print_summary(const bt_record *r, const bt_run_totals *t);
+
+#endif

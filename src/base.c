@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// Messages, memory and the clock.
+#include "bergtow/base.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static void out_of_memory(size_t n, size_t size)
+{
+    fprintf(stderr, "bergtow: out of memory: %zu items of %zu bytes; use fewer floes or a larger machine\n", n, size);
+    exit(BT_ERR_NUMERIC);
+}
+
+static size_t bytes_of(size_t n, size_t size)
+{
+    size_t total;
+    if (__builtin_mul_overflow(n, size, &total) || total > PTRDIFF_MAX - 64) out_of_memory(n, size);
+    return total ? total : 1;
+}
+
+void *bt_alloc(size_t n, size_t size)
+{
+    bytes_of(n, size);
+    void *p = calloc(n ? n : 1, size ? size : 1);
+    if (!p) out_of_memory(n, size);
+    return p;
+}
+
+void *bt_realloc(void *p, size_t n, size_t size)
+{
+    void *q = realloc(p, bytes_of(n, size));
+    if (!q) out_of_memory(n, size);
+    return q;
+}
+
+void *bt_alloc_aligned(size_t n, size_t size)
+{
+    size_t total = (bytes_of(n, size) + 63) & ~(size_t)63;
+    void *p = aligned_alloc(64, total);
+    if (!p) out_of_memory(n, size);
+    return memset(p, 0, total);
+}
+
+void bt_errors_add(bt_errors *e, const char *fmt, ...)
+{
+    if (e->n == e->cap) {
+        e->cap = e->cap ? 2 * e->cap : 8;
+        e->text = bt_realloc(e->text, e->cap, sizeof *e->text);
+    }
+    va_list ap;
+    va_start(ap, fmt);
+    char *text = NULL;
+    if (vasprintf(&text, fmt, ap) < 0) out_of_memory(1, strlen(fmt));
+    va_end(ap);
+    e->text[e->n++] = text;
+}
+
+void bt_errors_print(const bt_errors *e)
+{
+    for (size_t i = 0; i < e->n; i++) fprintf(stderr, "bergtow: %s\n", e->text[i]);
+}
+
+void bt_errors_free(bt_errors *e)
+{
+    for (size_t i = 0; i < e->n; i++) free(e->text[i]);
+    free(e->text);
+    *e = (bt_errors){0};
+}
+
+double bt_clock(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
