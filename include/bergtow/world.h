@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// The bodies and everything one time step works on.
+//
+// Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
+// 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
+// path), and a cold part (mass, drag, polygon in its own frame, names). Each part is an array of its own over the
+// bodies in storage order; every reference between bodies is a bt_idx into that order, and every order that the
+// result depends on follows from the global ids (gid), not from storage.
+//
+// Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
+// gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
+// wall's own coefficients prevail over the ice's).
+#ifndef BERGTOW_WORLD_H
+#define BERGTOW_WORLD_H
+
+#include "bergtow/base.h"
+#include "bergtow/shape.h"
+
+typedef enum {
+    BT_DYNAMIC,   ///< moved by forces and contacts
+    BT_KINEMATIC, ///< velocity prescribed, infinite mass in contacts
+    BT_STATIC,    ///< at rest for ever
+} bt_motion;
+
+typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
+typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/M, 1/I with added mass; 0 for infinite
+typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
+
+/// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
+typedef struct bt_drag {
+    double water_skin;  ///< ρ_w C_ws A, kg/m
+    double water_form;  ///< ½ ρ_w C_w draft, kg/m²; times the width across the flow
+    double air_skin;    ///< ρ_a C_as A, kg/m
+    double air_form;    ///< ½ ρ_a C_a sail, kg/m²
+    double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
+} bt_drag;
+
+/// What bt_world_add needs of a body.
+typedef struct bt_body_def {
+    bt_motion motion;
+    bool large;             ///< kept out of the grid and tested against all floes near its outline
+    int n_vertices;
+    const double *vertices; ///< [n_vertices][2] m, convex, anticlockwise, centroid at the origin
+    double x, y, yaw;       ///< m, m, rad
+    double vx, vy, yaw_rate;///< m/s, m/s, rad/s
+    double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
+    double friction, restitution;
+    bt_drag drag;
+} bt_body_def;
+
+typedef struct bt_bodies {
+    bt_idx n, cap;
+    bt_idx n_large;
+    // hot
+    bt_vel *vel;          ///< [n] U1 before the solve, U2 after
+    bt_inv *inv;          ///< [n]
+    // warm
+    bt_pose *pose;        ///< [n] X1 before advance, X2 after
+    double *outline;      ///< [offset[n]][2] vertices turned by yaw, relative to the centroid, m
+    double *path;         ///< [n] length of path travelled by the fastest point of the outline, m (grows only)
+    bt_vel *vel_start;    ///< [n] U1
+    bt_vel *vel_free;     ///< [n] U*
+    // cold
+    bt_gid *gid;          ///< [n]
+    int64_t *offset;      ///< [n+1] first vertex
+    double *vertices;     ///< [offset[n]][2] own frame, m
+    double *radius;       ///< [n] m
+    double *mass, *inertia; ///< [n] M kg, I kg m²
+    double *friction, *restitution; ///< [n]
+    bt_drag *drag;        ///< [n]
+    uint8_t *motion;      ///< [n] bt_motion
+    uint8_t *large;       ///< [n]
+    int64_t cap_vertices;
+} bt_bodies;
+
+/// Constants of the step.
+typedef struct bt_params {
+    double dt;             ///< Δt, s
+    double x0, y0;         ///< low corner of the domain, m
+    double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
+    double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
+    int64_t max_sweeps;
+    bool warm_start;
+    double slop;           ///< overlap left alone, m
+    int64_t position_sweeps;
+    double rest_speed;     ///< approach below this has no restitution, m/s
+    double size;           ///< mean floe diameter, sets cell and skin, m
+    // fluid and frame (see forces.h)
+    double water_u, water_v, air_u, air_v; ///< m/s
+    double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
+    double balance_u, balance_v; ///< velocity in geostrophic balance with the tilt (Coriolis acts on U minus this), m/s
+    double tilt_ax, tilt_ay;     ///< −g ∇η, m/s²
+} bt_params;
+
+struct bt_contacts;
+struct bt_solver;
+struct bt_tow;
+
+/// Numbers of the last step.
+typedef struct bt_step_stats {
+    int64_t n_points;        ///< contact points handed to the solver
+    int64_t sweeps, position_sweeps;
+    double residual;         ///< max-norm natural-map residual, m/s
+    bool converged;
+    double overlap;          ///< deepest overlap at the start of the step, m
+    double contact_work;     ///< J
+    double momentum_residual;///< relative to the momentum exchanged in the step
+    double kinetic_energy;   ///< at the end, J
+    double detect_s, colour_s, forces_s, solve_s, advance_s; ///< wall time, s
+} bt_step_stats;
+
+typedef struct bt_world {
+    bt_params par;
+    bt_bodies bodies;
+    struct bt_contacts *contacts;
+    struct bt_solver *solver;
+    struct bt_tow *tow;      ///< NULL without towed body
+    bt_idx towed;            ///< −1 = none
+    int64_t step;            ///< steps done
+    bt_step_stats stats;
+} bt_world;
+
+/// An empty world; release with bt_world_free.
+bt_world *bt_world_create(const bt_params *p);
+void bt_world_free(bt_world *w);
+
+/// Add a body; returns its index (= its gid). Bodies are added in the order of their gids: floes first. The definition is copied.
+bt_idx bt_world_add(bt_world *w, const bt_body_def *d);
+
+/// One step Δt: forces, contacts, solve, advance; see src/step.c.
+void bt_world_step(bt_world *w);
+
+/// Deepest overlap over all pairs at the present poses, m (0 = none). Collective in later versions.
+double bt_world_overlap(bt_world *w);
+
+/// 64-bit hash of all poses and velocities by gid: equal for equal states, however stored or distributed.
+uint64_t bt_world_hash(const bt_world *w);
+
+#endif
