@@ -331,9 +331,11 @@ static void check_path(const check *k, int n, const double *v)
     if (c->domain.ends == BT_BOUND_WALL && b.x_min < c->domain.x0 - slack) reach = bt_min(reach, (c->domain.x0 - start.x_min) / ux);
     if (c->domain.sides == BT_BOUND_WALL && b.y_max > c->domain.y0 + c->domain.width + slack) reach = bt_min(reach, (c->domain.y0 + c->domain.width - start.y_max) / uy);
     if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack) reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
-    if (reach < way)
-        fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, bt_max(reach, 0),
-              floor(reach / c->tow.speed + (reach > c->tow.speed * c->tow.ramp / 2 ? c->tow.ramp / 2 : 0)));
+    if (reach >= way) return;
+    reach = bt_max(reach, 0);
+    double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
+    double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
+    fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
 static void check_water(const check *k)

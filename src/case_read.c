@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Reading of a case: file and --set overrides onto the schema, with every error of the case in one go.
 #include "case_check.h"
+
+#include "bergtow/shape.h"
 #include "schema.h"
 #include "tree.h"
 #include "value.h"
