@@ -197,8 +197,9 @@ static void check_run(const check *k)
     if (!(c->run.dt > 0) || !(c->run.duration > 0)) return;
     if (c->run.dt > c->run.duration)
         fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run", c->run.dt, c->run.duration);
-    if (bt_case_steps(c) > largest_number_of_steps)
-        fault(k, "run.dt", "makes %.3g steps of run.duration, at most %g are run; lengthen the step or shorten the run", bt_case_steps(c), largest_number_of_steps);
+    double steps = (double)bt_case_steps(c);
+    if (steps > largest_number_of_steps)
+        fault(k, "run.dt", "makes %.3g steps of run.duration, at most %g are run; lengthen the step or shorten the run", steps, largest_number_of_steps);
     if (sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > largest_number_of_frames)
         fault(k, "output.frame_interval", "makes %.3g frames, at most %g are written; lengthen it", c->run.duration / c->output.frame_interval, largest_number_of_frames);
     if (sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
@@ -428,7 +429,11 @@ double bt_case_expected_floes(const bt_case *c)
     return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
 }
 
-double bt_case_steps(const bt_case *c) { return ceil(c->run.duration / c->run.dt - 1e-9); }
+int64_t bt_case_steps(const bt_case *c)
+{
+    double steps = ceil(c->run.duration / c->run.dt * (1 - 1e-12));
+    return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
+}
 
 double bt_case_tow_distance(const bt_case *c, double t)
 {

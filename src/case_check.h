@@ -21,9 +21,6 @@ void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char 
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 
-/// Steps of the whole run: duration / dt, rounded up, with a slack of 1e-9 steps so that 450 s / 0.1 s is 4500.
-double bt_case_steps(const bt_case *c);
-
 /// Distance of the tow end from its start along the tow direction after time t, with the ramp, m.
 double bt_case_tow_distance(const bt_case *c, double t);
 

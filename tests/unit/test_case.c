@@ -461,8 +461,12 @@ static void steps_do_not_gain_one_by_round_off(void **state)
     bt_case_defaults(&c);
     c.run.duration = 450, c.run.dt = 0.1;
     assert_true(bt_case_steps(&c) == 4500);
-    c.run.duration = 0.3, c.run.dt = 0.1; // 0.3/0.1 is 2.9999999999999996
+    c.run.duration = 0.3, c.run.dt = 0.1; // the quotient is 2.9999999999999996
     assert_true(bt_case_steps(&c) == 3);
+    c.run.duration = 1.1, c.run.dt = 0.1; // the quotient is 11.000000000000002
+    assert_true(bt_case_steps(&c) == 11);
+    c.run.duration = 1e7, c.run.dt = 0.01;
+    assert_true(bt_case_steps(&c) == 1000000000);
     c.run.duration = 1, c.run.dt = 0.3;
     assert_true(bt_case_steps(&c) == 4);
     bt_case_free(&c);
