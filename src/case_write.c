@@ -71,16 +71,17 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
                 snprintf(options + strlen(options), sizeof options - strlen(options), "%s%s", j ? " | " : "", k->choices[j]);
             range = options;
         }
-        fprintf(out, "%-24s %-8s %-14s %-24s %s\n", k->name, unit, k->preset ? k->preset : "required", range, k->doc);
+        const char *preset = k->preset ? k->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
+        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc, rule ? "; default: " : "", rule ? rule + 2 : "");
     }
 }
 
 void bt_case_list_keys(void *stream)
 {
     FILE *out = stream;
-    fprintf(out, "%-24s %-8s %-14s %-24s %s\n", "key", "unit", "default", "range", "meaning");
+    fprintf(out, "%-24s %-8s %-10s %-36s %s\n", "key", "unit", "default", "range", "meaning");
     list_keys(out, bt_case_keys, bt_n_case_keys);
-    fputs("\nUnit is that of a number written without one. A default that begins with = follows from other keys.\n"
+    fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the meaning.\n"
           "floes: is a list of floes given by hand, each a map with the keys\n\n", out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
 }

@@ -2,9 +2,9 @@
 // The table of keys of a case file.
 //
 // Sources named in the sentences:
-//   [Yulmetov & Loset 2017]  Cold Reg. Sci. Technol. 138: broken-ice towing tests and their numerical model
+//   [Yulmetov & Løset 2017]  Cold Reg. Sci. Technol. 138: broken-ice towing tests and their numerical model
 //   [Hunke & Comeau 2011]    J. Geophys. Res. 116, C05008: icebergs in sea ice, drag coefficients
-//   [Sukhorukov & Loset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
+//   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
 //   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
 // "assumed" is a choice of this program without a measurement behind it.
@@ -44,12 +44,12 @@ static const char *const tilts[] = {"none", "slope", "geostrophic", NULL};
 const bt_key bt_case_keys[] = {
     TEXT("run.title", run.title, "none", "one line for the reports"),
     REAL("run.dt", run.dt, TIME, NULL, "(0, 1000]",
-         "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at most 5 s at full scale [Yulmetov & Loset 2017]"),
+         "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at most 5 s at full scale [Yulmetov & Løset 2017]"),
     REAL("run.duration", run.duration, TIME, NULL, "(0, 1e9]", "simulated time"),
     INT("run.threads", run.threads, "0", "[0, 1024]", "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
 
     CHOICE("domain.frame", domain.frame, frames, "basin",
-           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east [Yulmetov & Loset 2017]"),
+           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
     REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "extent along x; the default is HSVA's large ice tank, from memory"),
     REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
@@ -67,10 +67,10 @@ const bt_key bt_case_keys[] = {
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
     REAL("ice.y_max", ice.y_max, LENGTH, "= domain.y0 + domain.width", ANYWHERE, "ice region, high end of y"),
     CHOICE("ice.shape", ice.shape, ice_shapes, "voronoi", "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
-    INT("ice.sides", ice.sides, "6", "[3, 64]", "corners of the floes of shape polygons"),
+    INT("ice.sides", ice.sides, "6", "[3, 32]", "corners of the floes of shape polygons"),
     REAL("ice.aspect", ice.aspect, RATIO, "1", "[1, 10]", "length / width of the floes of shape rectangles"),
     REAL("ice.size", ice.size, LENGTH, "1 m", "(0, 1e5]",
-         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale [Yulmetov & Loset 2017]"),
+         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale [Yulmetov & Løset 2017]"),
     CHOICE("ice.size_law", ice.size_law, size_laws, "single", "distribution of the diameter"),
     REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the diameter, laws single and lognormal, assumed"),
     REAL("ice.size_min", ice.size_min, LENGTH, "0 m", "[0, 1e5]", "smallest diameter, needed by law power; 0 = no limit"),
@@ -82,7 +82,7 @@ const bt_key bt_case_keys[] = {
     REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
     REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
     REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",
-         "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & Loset 2013]"),
+         "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & Løset 2013]"),
     REAL("ice.restitution", ice.restitution, RATIO, "0", "[0, 1]", "restitution of floe collisions, assumed"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
@@ -119,7 +119,7 @@ const bt_key bt_case_keys[] = {
     REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]", "skin drag of air over the body [Hunke & Comeau 2011]"),
 
     CHOICE("tow.mode", tow.mode, tow_modes, "speed", "none: free drift; speed: the body's velocity is prescribed; line: a carriage pulls it on a line"),
-    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed) or of the carriage (mode line) [Yulmetov & Loset 2017]"),
+    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed) or of the carriage (mode line) [Yulmetov & Løset 2017]"),
     REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow from the x axis towards y"),
     REAL("tow.ramp", tow.ramp, TIME, "5 s", "[0, 1e6]", "time in which the speed rises linearly from 0, assumed"),
     REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, mode line, assumed"),
@@ -163,7 +163,7 @@ const int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys;
 
 const bt_key bt_floe_keys[] = {
     CHOICE("shape", shape, floe_shapes, "disc", "outline of the floe"),
-    REAL("length", length, LENGTH, "= required unless the shape is polygon", "(0, 1e5]", "length of a named shape along its own x"),
+    REAL("length", length, LENGTH, "none", "(0, 1e5]", "length of a named shape along its own x, needed unless the shape is polygon"),
     REAL("width", width, LENGTH, "= length", "(0, 1e5]", "width of a named shape"),
     {.name = "vertices", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = "[-1e5, 1e5]", AT(vertices),
      .offset_count = offsetof(bt_floe_def, n_vertices), .doc = "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},

@@ -162,7 +162,7 @@ int bt_case_floe_outline(const bt_floe_def *f, double *v);
 /// Mass of the towed body without added mass, kg.
 double bt_case_body_mass(const bt_case *c);
 
-/// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 1.1 s / 0.1 s is 11.
+/// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *c);
 
 /// Reference speed of the solver tolerance, m/s (> 0).
