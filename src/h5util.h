@@ -13,6 +13,7 @@ typedef struct bt_h5 {
     hid_t file;
     char *path;
     bt_status status;
+    int *errnum;    ///< first error of the file system, see h5driver.h
     bt_errors *err; ///< where the next error goes; the caller of each public function sets it
 } bt_h5;
 
@@ -22,9 +23,6 @@ bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
 void bt_h5_flush(bt_h5 *h);
 /// Close; releases the path. Returns the status of the whole, this call included.
 bt_status bt_h5_close(bt_h5 *h);
-
-/// Report the pending HDF5 error as "path: cannot ACTION: reason; remedy" and mark the handle as failed.
-void bt_h5_fail(bt_h5 *h, const char *action);
 
 void bt_h5_group(bt_h5 *h, const char *name);
 /// Whole dataset [n] (width 0) or [n][width], contiguous. mem: H5T_NATIVE_...

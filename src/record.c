@@ -93,7 +93,8 @@ static void create_series(bt_record *r)
     static const char *const merge[] = {[BT_KEEP_LAST] = "last step", [BT_KEEP_MEAN] = "mean of the steps",
                                         [BT_KEEP_MAX] = "largest of the steps", [BT_KEEP_SUM] = "sum of the steps"};
     bt_h5_group(&r->h5, "/series");
-    bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", bt_max(1, (double)r->c->output.sample_every));
+    const int64_t every = r->c->output.sample_every;
+    bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
     for (int k = 0; k < bt_n_series_fields; k++) {
         const bt_series_field *f = &bt_series_fields[k];
         char *name = bt_file_join("/series", f->name);
@@ -268,7 +269,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
         case BT_KEEP_LAST: *m = x; break;
         case BT_KEEP_MEAN:
         case BT_KEEP_SUM: *m += x; break;
-        case BT_KEEP_MAX: *m = x <= *m ? *m : x; break; // a NaN stays in sight
+        case BT_KEEP_MAX: *m = bt_max_seen(*m, x); break;
         }
     }
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
