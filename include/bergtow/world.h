@@ -57,6 +57,7 @@ typedef struct bt_bodies {
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
     double *outline;      ///< [offset[n]][2] vertices turned by yaw, relative to the centroid, m
+    double *normal;       ///< [offset[n]][2] outward unit normal of the edge that starts at each vertex, turned
     double *path;         ///< [n] length of path travelled by the fastest point of the outline, m (grows only)
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
@@ -64,7 +65,9 @@ typedef struct bt_bodies {
     bt_gid *gid;          ///< [n]
     int64_t *offset;      ///< [n+1] first vertex
     double *vertices;     ///< [offset[n]][2] own frame, m
+    double *normals;      ///< [offset[n]][2] edge normals, own frame
     double *radius;       ///< [n] m
+    double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
     double *friction, *restitution; ///< [n]
     bt_drag *drag;        ///< [n]
