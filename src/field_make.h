@@ -56,18 +56,36 @@ bt_cells bt_cells_create(bt_idx n);
 void bt_cells_free(bt_cells *c);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
 bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, int64_t seed);
-/// Rectangles sawn from rows along x, drawn from the size law with areas grown by 1/concentration.
-bt_cells bt_cells_saw(const bt_yard *y, const bt_sizes *s, double concentration, double aspect, int64_t seed, bool boxed);
+/// Rectangles sawn from strips along x with areas target[n] × a common factor; boxed as in bt_cell_clear.
+bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, bool boxed);
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
 int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed);
 /// Remove short edges and vertices beyond BT_CELL_VERTICES inwards; returns the new count.
 int bt_cell_clean(int n, double *v, double shortest);
 
-/// For each floe the largest factor t[i] <= limit by which all floes could be scaled about their centroids before floe i
-/// touches another floe, an obstacle or the region's edge; t < 1: overlap. hand: keep t per floe: scaling every floe i by any
-/// factor <= t[i] leaves no overlap.
-void bt_field_room(const bt_yard *y, const bt_field *f, double limit, double *t);
+/// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
+typedef struct bt_apart {
+    double gap;       ///< max n·D − h_a(n) − h_b(−n): distance if > 0 along the best edge normal, depth of overlap if < 0, m
+    double both;      ///< factor by which both can be scaled about their centroids until they touch: max n·D/(h_a + h_b)
+    double first;     ///< the same when only the first is scaled: max (n·D − h_b)/h_a
+} bt_apart;
+
+/// a [na][2], b [nb][2] relative to their centroids, (dx, dy) from the centroid of a to that of b.
+bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx, double dy);
+
+/// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
+double *bt_field_outlines(const bt_field *f);
+
+/// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy) points
+/// from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair search.
+typedef void bt_pair_visit(void *context, bt_idx i, bt_idx j, double dx, double dy);
+void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
+                          void *context);
+
+/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time, without
+/// touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
+void bt_field_room(const bt_yard *y, const bt_field *f, double limit, double *room);
 
 /// Scale floe i about its centroid.
 void bt_field_scale(bt_field *f, bt_idx i, double s);

@@ -46,7 +46,9 @@ static void add_obstacle(bt_yard *y, int n, const double *v)
     for (int ix = -reach_x; ix <= reach_x; ix++)
         for (int iy = -reach_y; iy <= reach_y; iy++) {
             double cx = wx + ix * lx, cy = wy + iy * ly;
-            if (cx + r < y->x0 || cx - r > y->x1 || cy + r < y->y0 || cy - r > y->y1) continue;
+            // Floes at home reach over a periodic edge by less than half a period.
+            double over_x = y->periodic_x ? lx / 2 : 0, over_y = y->periodic_y ? ly / 2 : 0;
+            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y || cy - r > y->y1 + over_y) continue;
             y->obstacles = bt_realloc(y->obstacles, (size_t)y->n_obstacles + 1, sizeof *y->obstacles);
             bt_obstacle *o = &y->obstacles[y->n_obstacles++];
             *o = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
@@ -157,6 +159,7 @@ int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
     enum { CAP = 2 * BT_MAX_VERTICES };
     double trial[2 * CAP], best[2 * CAP];
     for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
+        if (n > 4 * BT_CELL_VERTICES) n = bt_cell_clean(n, v, 0); // many obstacles around one cell
         const bt_obstacle *o = &y->obstacles[k];
         double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
         for (int i = 0; i < n; i++) {

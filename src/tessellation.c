@@ -176,20 +176,40 @@ typedef struct discs {
     int32_t n, cap;
 } discs;
 
-// Visit bins of the square of half side r about (x, y): calls for every bin index, with the period's shift.
-#define FOR_BINS(dd, yd, x, y, r, bin, sx, sy, body)                                                                    \
-    do {                                                                                                                \
-        int ix0_ = (int)floor(((x) - (r) - (yd)->x0) / (dd)->bx), ix1_ = (int)floor(((x) + (r) - (yd)->x0) / (dd)->bx); \
-        int iy0_ = (int)floor(((y) - (r) - (yd)->y0) / (dd)->by), iy1_ = (int)floor(((y) + (r) - (yd)->y0) / (dd)->by); \
-        for (int iy_ = iy0_; iy_ <= iy1_; iy_++)                                                                        \
-            for (int ix_ = ix0_; ix_ <= ix1_; ix_++) {                                                                  \
-                int tx_ = (int)floor((double)ix_ / (dd)->nx), ty_ = (int)floor((double)iy_ / (dd)->ny);                 \
-                if ((tx_ && !(yd)->periodic_x) || (ty_ && !(yd)->periodic_y)) continue;                                 \
-                int bin = (iy_ - ty_ * (dd)->ny) * (dd)->nx + ix_ - tx_ * (dd)->nx;                                     \
-                double sx = tx_ * ((yd)->x1 - (yd)->x0), sy = ty_ * ((yd)->y1 - (yd)->y0);                              \
-                body                                                                                                    \
-            }                                                                                                           \
-    } while (0)
+// Walk over the bins of the square of half side r about (x, y); (sx, sy) is the period's shift of the bin.
+typedef struct bin_walk {
+    const bt_yard *yard;
+    const discs *dd;
+    int ix0, ix1, iy1, ix, iy;
+    size_t bin;
+    double sx, sy;
+} bin_walk;
+
+static bin_walk walk_bins(const bt_yard *yard, const discs *dd, double x, double y, double r)
+{
+    bin_walk w = {.yard = yard, .dd = dd};
+    w.ix0 = (int)floor((x - r - yard->x0) / dd->bx), w.ix1 = (int)floor((x + r - yard->x0) / dd->bx);
+    w.iy = (int)floor((y - r - yard->y0) / dd->by), w.iy1 = (int)floor((y + r - yard->y0) / dd->by);
+    w.ix = w.ix0 - 1;
+    return w;
+}
+
+static bool next_bin(bin_walk *w)
+{
+    for (;;) {
+        if (++w->ix > w->ix1) {
+            w->ix = w->ix0;
+            w->iy++;
+        }
+        if (w->iy > w->iy1) return false;
+        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny); // turns round the period
+        if ((tx && !w->yard->periodic_x) || (ty && !w->yard->periodic_y)) continue;
+        w->bin = (size_t)(w->iy - ty * w->dd->ny) * (size_t)w->dd->nx + (size_t)(w->ix - tx * w->dd->nx);
+        w->sx = tx * (w->yard->x1 - w->yard->x0);
+        w->sy = ty * (w->yard->y1 - w->yard->y0);
+        return true;
+    }
+}
 
 // How deep, relative to their size, a disc at (x, y) lies in others, in walls and in obstacles; <= 0: free.
 static double crowding(const bt_yard *yard, const discs *dd, const double *p, const double *radius, double x, double y,
@@ -209,14 +229,12 @@ static double crowding(const bt_yard *yard, const discs *dd, const double *p, co
         }
         worst = bt_max(worst, 1 - out / (SPACING * r));
     }
-    double rr = SPACING * r;
-    FOR_BINS(dd, yard, x, y, rr, bin, sx, sy, {
-        for (int32_t k = dd->head[bin]; k >= 0; k = dd->node[k].next) {
+    for (bin_walk w = walk_bins(yard, dd, x, y, SPACING * r); next_bin(&w);)
+        for (int32_t k = dd->head[w.bin]; k >= 0; k = dd->node[k].next) {
             bt_idx j = dd->node[k].i;
-            double d = hypot(p[2 * j] + sx - x, p[2 * j + 1] + sy - y);
+            double d = hypot(p[2 * j] + w.sx - x, p[2 * j + 1] + w.sy - y);
             worst = bt_max(worst, 1 - d / (SPACING * (r + radius[j])));
         }
-    });
     return worst;
 }
 
@@ -258,17 +276,15 @@ static void place_seeds(const bt_yard *y, bt_idx n, const double *radius, int64_
                 p[2 * i + 1] = z;
             }
         }
-        double r = SPACING * radius[i];
-        FOR_BINS(&dd, y, p[2 * i], p[2 * i + 1], r, bin, sx, sy, {
-            (void)sx, (void)sy;
+        for (bin_walk w = walk_bins(y, &dd, p[2 * i], p[2 * i + 1], SPACING * radius[i]); next_bin(&w);) {
             if (dd.n == dd.cap) {
                 dd.cap = dd.cap ? 2 * dd.cap : 1024;
                 dd.node = bt_realloc(dd.node, (size_t)dd.cap, sizeof *dd.node);
             }
             dd.node[dd.n].i = i;
-            dd.node[dd.n].next = dd.head[bin];
-            dd.head[bin] = dd.n++;
-        });
+            dd.node[dd.n].next = dd.head[w.bin];
+            dd.head[w.bin] = dd.n++;
+        }
     }
     free(order);
     free(dd.head);
