@@ -16,7 +16,10 @@
 static const double CLEARANCE = 2e-3; // water kept around obstacles / mean size
 static const double TOUCH = 1 - 1e-9; // part of the room that is used: round-off must not turn touching into overlap
 static const double STRIDE = 0.3;     // move of a floe in a step of the shake / mean gap
-enum { GROWTH_STAGES = 80, MAX_FLOES = 20000000 };
+static const double PUSH = 1.02;      // growth of a floe that has no room
+static const double GROWN = 1e-3;     // shortfall of area at which a growing floe counts as grown
+static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
+enum { GROWTH_STAGES = 120, MAX_FLOES = 20000000 };
 
 static const char *path_of(const bt_case *c) { return c->path ? c->path : "case"; }
 
@@ -153,26 +156,32 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
         bt_field_scale(f, k, bt_min(1, 0.999 * t));
     }
     bt_status status = BT_OK;
-    double best = 0;
+    double best_area = 0, best_least = 0;
     int idle = 0;
-    for (int stage = 1;; stage++) {
-        bool grown = true;
-        for (bt_idx i = 0; i < f->n; i++) grown = grown && f->area[i] > (1 - 1e-9) * goal[i];
-        if (grown || status != BT_OK) break;
+    for (int stage = 1; status == BT_OK; stage++) {
+        bt_field_room(y, f, 2, room);
+        double least = 1; // part of its goal that the smallest floe has
+        for (bt_idx i = 0; i < f->n; i++) {
+            if (room[i] < 1) bt_field_scale(f, i, TOUCH * room[i]);
+            least = bt_min(least, f->area[i] / goal[i]);
+        }
         double area = total_area(f);
-        idle = area > best * (1 + 2e-4) ? 0 : idle + 1;
-        best = bt_max(best, area);
+        // A shake leaves overlaps of about its slop, which have just cost that much of the area: settle makes it up.
+        if (least > 1 - GROWN) break;
+        idle = area > best_area * (1 + 2e-4) || least > best_least + 2e-3 ? 0 : idle + 1;
+        best_area = bt_max(best_area, area);
+        best_least = bt_max(best_least, least);
         if (stage > GROWTH_STAGES || idle > 8) {
-            status = cannot_pack(c, best / y->ice_area, err);
+            status = cannot_pack(c, best_area / y->ice_area, err);
             break;
         }
         double size, gap = mean_gap(y, f, &size);
-        status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, 0.15 * size), stage, err);
-        bt_field_room(y, f, 2, room);
         for (bt_idx i = 0; i < f->n; i++) {
-            double left = sqrt(goal[i] / f->area[i]);
-            bt_field_scale(f, i, bt_min(left, room[i] > 1 ? 1 + 0.8 * (room[i] - 1) : TOUCH * room[i]));
+            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so that
+            // grown floes do not trap it.
+            bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (room[i] - 1))));
         }
+        status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
     }
     free(goal);
     free(room);
@@ -230,7 +239,7 @@ static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes,
     if (status != BT_OK) return status;
     bt_field_sort(f, y);
     double size, gap = mean_gap(y, f, &size);
-    status = bt_field_shake(c, y, f, c->ice.shake * gap, bt_min(STRIDE * gap, 0.15 * size), 0, err);
+    status = bt_field_shake(c, y, f, c->ice.shake * gap, bt_min(STRIDE * gap, MOST * size), 0, err);
     if (status != BT_OK) return status;
     status = settle(c, y, f, wanted, err);
     if (status != BT_OK) return status;

@@ -15,7 +15,26 @@
 
 static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order of dealing
 
-static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double y0, double y1, double target, bool boxed)
+// In a rectangular cell, the largest rectangle with the proportions nearest to the aspect that the floe can have: a floe of
+// the area a becomes √(a aspect) long unless the cell is shorter, or narrower than a over that.
+static void shape_piece(double *v, double area, double aspect)
+{
+    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+    for (int i = 0; i < 4; i++) {
+        x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
+        y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
+    }
+    double l = x1 - x0, w = y1 - y0, cell = l * w;
+    double a = bt_min(1.03 * area, cell); // some room, for the common factor that makes up for floes that do not fit
+    double length = bt_min(bt_max(sqrt(a * aspect), a / w), l), width = a / length;
+    double s = bt_min(l / length, w / width) / 2, cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
+    length *= s, width *= s;
+    memcpy(v, (double[8]){cx - length, cy - width, cx + length, cy - width, cx + length, cy + width, cx - length, cy + width},
+           8 * sizeof *v);
+}
+
+static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double y0, double y1, double target, double aspect,
+                     bool boxed)
 {
     double v[2 * 8 * BT_CELL_VERTICES];
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
@@ -31,6 +50,8 @@ static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double
         c->v = bt_realloc(c->v, cap, sizeof *c->v);
         c->target = bt_realloc(c->target, cap, sizeof *c->target);
     }
+    double extent = bt_shape_width(n, v, 0, 1) * bt_shape_width(n, v, 1, 0);
+    if (m.area > (1 - 1e-9) * extent) shape_piece(v, target, aspect), n = 4;
     c->nv[c->n] = n;
     memcpy(c->v[c->n], v, 2 * (size_t)n * sizeof *v);
     c->target[c->n] = bt_min(target, target * m.area / ((x1 - x0) * (y1 - y0)));
@@ -49,6 +70,31 @@ static int by_key(const void *a, const void *b)
     return (p->id > q->id) - (p->id < q->id);
 }
 
+// Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips; *last: width
+// of the last strip over the width due to it.
+static bt_idx deal(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
+{
+    bt_idx n_strips = 0;
+    double width = 0;
+    *last = 1;
+    for (bt_idx i = 0; i < n; i++) {
+        width += p[i].target * share;
+        bt_idx m = i + 1 - first[n_strips];
+        if (m * aspect * width < lx && i + 1 < n) continue;
+        // A last strip less than half as wide as due joins the one before.
+        double part = sqrt(m * aspect * width / lx);
+        if (part >= 0.5 || n_strips == 0) {
+            n_strips++;
+            if (i + 1 == n) *last = bt_min(part, 1);
+        } else {
+            *last = 1 + part;
+        }
+        first[n_strips] = i + 1;
+        width = 0;
+    }
+    return n_strips;
+}
+
 bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, bool boxed)
 {
     bt_cells c = {0};
@@ -62,19 +108,17 @@ bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double a
     qsort(p, (size_t)n, sizeof *p, by_key);
     double share = lx * ly / wanted;
 
-    // Deal: strip k holds pieces [first[k], first[k+1]); its width is their area over lx.
-    bt_idx *first = bt_alloc((size_t)n + 1, sizeof *first), n_strips = 0;
-    double area = 0;
-    for (bt_idx i = 0; i < n; i++) {
-        area += target[p[i].id] * share;
-        bt_idx m = i + 1 - first[n_strips];
-        if (m * aspect * area / lx < lx && i + 1 < n) continue;
-        // A last strip less than half full joins the one before.
-        bool full = m * aspect * area / lx >= lx / 4;
-        if (full || n_strips == 0) n_strips++;
-        first[n_strips] = i + 1;
-        area = 0;
+    // Of thresholds near the aspect asked for, the one whose last strip comes out fullest.
+    bt_idx *first = bt_alloc((size_t)n + 1, sizeof *first);
+    double best = INFINITY, chosen = aspect;
+    for (int k = -20; k <= 20; k++) {
+        double trial = aspect * exp(0.01 * k), last;
+        deal(n, p, share / lx, trial, lx, first, &last);
+        double cost = fabs(0.01 * k) + fabs(log(last));
+        if (cost < best) best = cost, chosen = trial;
     }
+    double last;
+    bt_idx n_strips = deal(n, p, share / lx, chosen, lx, first, &last);
     for (bt_idx k = 0; k < n_strips; k++) {
         bt_rng r = bt_rng_start(seed, BT_RNG_CUT, (int64_t)n + k);
         strip[k] = (piece){bt_rng_uniform(&r), 0, k};
@@ -98,7 +142,7 @@ bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double a
             double x1 = i + 1 < to || y->periodic_x ? x + p[i].target / sum * lx : y->x1;
             // A piece whose middle is beyond a periodic edge is moved back whole.
             double shift = y->periodic_x && (x + x1) / 2 >= y->x1 ? -lx : 0;
-            add_cell(&c, y, x + shift, x1 + shift, y0, y1, p[i].target, boxed);
+            add_cell(&c, y, x + shift, x1 + shift, y0, y1, p[i].target, aspect, boxed);
             x = x1;
         }
         y0 = y1;
