@@ -6,18 +6,25 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "anderson.h"
 #include "bergtow/sum.h"
 #include "bergtow/tow.h"
 
 #define SEQUENTIAL BT_MAX_COLOURS ///< colour of the manifolds done one after the other
 #define MIN_PARALLEL_ROWS 3000    ///< fewer rows than this are swept faster by one thread (barriers)
 
-bt_solver *bt_solver_create(void) { return bt_alloc(1, sizeof(bt_solver)); }
+bt_solver *bt_solver_create(void)
+{
+    bt_solver *s = bt_alloc(1, sizeof *s);
+    s->anderson = bt_alloc(1, sizeof *s->anderson);
+    return s;
+}
 
 void bt_solver_free(bt_solver *s)
 {
     if (!s) return;
-    void *arrays[] = {s->rows, s->unit, s->row_of, s->used, s->colour, s->shift, s->push};
+    bt_anderson_free(s->anderson);
+    void *arrays[] = {s->rows, s->unit, s->row_of, s->used, s->colour, s->shift, s->push, s->step, s->scale, s->anderson};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     free(s);
 }
@@ -28,6 +35,8 @@ static void reserve(bt_solver *s, bt_idx n_rows, bt_idx n_man, bt_idx n_bodies)
         s->cap_rows = n_rows + n_rows / 4;
         free(s->rows);
         s->rows = bt_alloc_aligned((size_t)s->cap_rows, sizeof *s->rows);
+        s->step = bt_realloc(s->step, 2 * (size_t)s->cap_rows, sizeof *s->step);
+        s->scale = bt_realloc(s->scale, 2 * (size_t)s->cap_rows, sizeof *s->scale);
         s->push = bt_realloc(s->push, (size_t)s->cap_rows, sizeof *s->push);
     }
     if (n_man >= s->cap_man) { // also the first time, when there is none
@@ -89,10 +98,11 @@ static double bias_of(const bt_world *w, const bt_row *r, double restitution)
     const bt_bodies *b = &w->bodies;
     if (restitution > 0) {
         // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
-        // now: letting it close the gap first would lose the approach speed that the law refers to.
+        // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
+        // from the slop on, or rounding would decide which of two points of a square hit rebounds.
         double approach = normal_velocity(r, &b->vel_start[r->a], &b->vel_start[r->b]);
         double closing = normal_velocity(r, &b->vel_free[r->a], &b->vel_free[r->b]);
-        if (approach < -w->par.rest_speed && (r->gap <= 0 || r->gap + w->par.dt * closing < 0))
+        if (approach < -w->par.rest_speed && r->gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
             return restitution * approach;
     }
     return bt_max(r->gap, 0) / w->par.dt;
@@ -142,7 +152,11 @@ void bt_solver_prepare(bt_world *w)
     for (bt_idx u = 0; u < n_units; u++) {
         s->unit[u] = row;
         const bt_manifold *m = &c->man[unit_man[u]];
-        for (int i = 0; i < m->n_points; i++) fill_row(w, m, &m->p[i], &s->rows[row++]);
+        for (int i = 0; i < m->n_points; i++, row++) {
+            fill_row(w, m, &m->p[i], &s->rows[row]);
+            s->scale[2 * row] = 1 / sqrt(s->rows[row].mn);
+            s->scale[2 * row + 1] = 1 / sqrt(s->rows[row].mt);
+        }
     }
     s->unit[n_units] = row;
     memcpy(next, s->start, (size_t)s->n_colours * sizeof *next);
@@ -171,7 +185,7 @@ static inline void apply(const bt_row *r, double ln, double lt, bt_vel *v, const
 static inline double clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
 
 /// Gauss–Seidel update of one contact point, normal then tangent; returns the larger correction, m/s.
-static inline double update_row(bt_row *r, bt_vel *v, const bt_inv *inv)
+static inline double update_row(bt_row *r, bt_vel *v, const bt_inv *inv, double step[2])
 {
     double wn = normal_velocity(r, &v[r->a], &v[r->b]) + r->bias;
     double dn = bt_max(0, r->ln - wn * r->mn) - r->ln;
@@ -181,6 +195,8 @@ static inline double update_row(bt_row *r, bt_vel *v, const bt_inv *inv)
     double dt = clamp(r->lt - wt * r->mt, r->mu * r->ln) - r->lt;
     r->lt += dt;
     apply(r, 0, dt, v, inv);
+    step[0] = dn;
+    step[1] = dt;
     return bt_max(fabs(dn) / r->mn, fabs(dt) / r->mt);
 }
 
@@ -194,11 +210,11 @@ static double sweep(bt_world *w, bool parallel)
     for (int k = 0; k < s->n_colours; k++) {
 #pragma omp for schedule(static)
         for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++)
-            for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) change = bt_max(change, update_row(&s->rows[i], v, inv));
+            for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
     }
     const bt_idx last = s->start[s->n_colours + 1];
     for (bt_idx i = s->unit[s->start[s->n_colours]]; i < s->unit[last]; i++)
-        change = bt_max(change, update_row(&s->rows[i], v, inv));
+        change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
     if (w->tow && w->tow->mode == BT_TOW_LINE) change = bt_max(change, bt_tow_update(w->tow, &v[w->towed], inv[w->towed]));
     return change;
 }
@@ -234,6 +250,65 @@ static void warm_start(bt_world *w)
     if (w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
 }
 
+static void move_unit(bt_solver *s, bt_idx u, const double *move, bt_vel *v, const bt_inv *inv)
+{
+    for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) {
+        const double dn = move[2 * i] / s->scale[2 * i], dt = move[2 * i + 1] / s->scale[2 * i + 1];
+        if (dn == 0 && dt == 0) continue;
+        s->rows[i].ln += dn;
+        s->rows[i].lt += dt;
+        apply(&s->rows[i], dn, dt, v, inv);
+    }
+}
+
+/// U* + M⁻¹ Jᵀ λ from scratch: what increments have rounded away does not build up.
+static void velocities_from_impulses(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_bodies *b = &w->bodies;
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        if (b->inv[r->a].m > 0) b->vel[r->a] = b->vel_free[r->a];
+        if (b->inv[r->b].m > 0) b->vel[r->b] = b->vel_free[r->b];
+    }
+    bt_tow *t = w->tow && w->tow->mode == BT_TOW_LINE ? w->tow : NULL;
+    if (t) b->vel[w->towed] = b->vel_free[w->towed];
+    for (bt_idx i = 0; i < s->n_rows; i++)
+        if (s->rows[i].ln != 0) apply(&s->rows[i], s->rows[i].ln, s->rows[i].lt, b->vel, b->inv);
+    if (t) bt_tow_apply(t, t->lambda, &b->vel[w->towed], b->inv[w->towed]);
+}
+
+/// One step of Anderson acceleration after a sweep. Unknowns are scaled by √W to the common unit √(N s m/s).
+static void accelerate(bt_world *w, bool parallel)
+{
+    bt_solver *s = w->solver;
+    bt_anderson *a = s->anderson;
+    bt_tow *t = w->tow && w->tow->mode == BT_TOW_LINE && w->tow->taut ? w->tow : NULL;
+    const double line = t ? sqrt(t->w) : 0;
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        const double *scale = s->scale + 2 * i;
+        a->g[2 * i] = r->ln * scale[0];
+        a->g[2 * i + 1] = r->lt * scale[1];
+        a->f[2 * i] = s->step[2 * i] * scale[0];
+        a->f[2 * i + 1] = s->step[2 * i + 1] * scale[1];
+    }
+    a->g[2 * s->n_rows] = t ? t->lambda * line : 0;
+    a->f[2 * s->n_rows] = t ? t->step * line : 0;
+    if (!bt_anderson_advance(a)) return;
+
+    bt_vel *v = w->bodies.vel;
+    const bt_inv *inv = w->bodies.inv;
+#pragma omp parallel if (parallel)
+    for (int k = 0; k < s->n_colours; k++) {
+#pragma omp for schedule(static)
+        for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++) move_unit(s, u, a->move, v, inv);
+    }
+    for (bt_idx u = s->start[s->n_colours]; u < s->start[s->n_colours + 1]; u++) move_unit(s, u, a->move, v, inv);
+    if (t) bt_tow_apply(t, a->move[2 * s->n_rows] / line, &v[w->towed], inv[w->towed]);
+    if (t) t->lambda += a->move[2 * s->n_rows] / line;
+}
+
 void bt_solver_solve(bt_world *w)
 {
     bt_solver *s = w->solver;
@@ -244,10 +319,16 @@ void bt_solver_solve(bt_world *w)
     bt_step_stats *st = &w->stats;
     st->sweeps = 0;
     st->residual = bt_solver_residual(w);
+    if (st->residual > tolerance) bt_anderson_start(s->anderson, 2 * (size_t)s->n_rows + 1);
     while (st->residual > tolerance && st->sweeps < w->par.max_sweeps) {
         double change = sweep(w, parallel);
         st->sweeps++;
-        if (change <= tolerance || st->sweeps == w->par.max_sweeps) st->residual = bt_solver_residual(w);
+        if (change <= tolerance || st->sweeps == w->par.max_sweeps) {
+            velocities_from_impulses(w);
+            st->residual = bt_solver_residual(w);
+            if (st->residual <= tolerance) break;
+        }
+        if (!w->par.plain_sweeps && st->sweeps < w->par.max_sweeps) accelerate(w, parallel);
     }
     st->converged = st->residual <= tolerance;
     for (bt_idx k = 0; k < c->n_man; k++) {

@@ -64,7 +64,7 @@ static double solved(const bt_tow *t, const bt_vel *v)
     return bt_max(0, t->lambda + (t->a + t->b * rate_of(t, v) - t->lambda) / (1 + t->b * t->w));
 }
 
-static void apply(const bt_tow *t, bt_vel *v, bt_inv inv, double d)
+void bt_tow_apply(const bt_tow *t, double d, bt_vel *v, bt_inv inv)
 {
     v->x += d * inv.m * t->lx;
     v->y += d * inv.m * t->ly;
@@ -73,10 +73,12 @@ static void apply(const bt_tow *t, bt_vel *v, bt_inv inv, double d)
 
 double bt_tow_update(bt_tow *t, bt_vel *v, bt_inv inv)
 {
+    t->step = 0;
     if (!t->taut) return 0;
     double l = solved(t, v), d = l - t->lambda;
     t->lambda = l;
-    apply(t, v, inv, d);
+    t->step = d;
+    bt_tow_apply(t, d, v, inv);
     return fabs(d) * t->w;
 }
 
@@ -88,7 +90,7 @@ double bt_tow_residual(const bt_tow *t, const bt_vel *v)
 void bt_tow_warm_start(bt_tow *t, bt_vel *v, bt_inv inv, bool keep)
 {
     if (!keep || !t->taut) t->lambda = 0;
-    apply(t, v, inv, t->lambda);
+    bt_tow_apply(t, t->lambda, v, inv);
 }
 
 uint64_t bt_tow_hash(const bt_tow *t)

@@ -10,6 +10,11 @@
 // berg on a line has hundreds) would each need a colour: they stand in one last group that is done in
 // sequence, as is the tow line after it.
 //
+// Acceleration: Anderson's, around the sweep taken as a fixed-point map of the impulses (src/anderson.c). Why: a plain
+// sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and ~m_berg/m_floe where a heavy
+// berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration as the reference; both end
+// on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
+//
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
 // which is zero exactly at a solution. The sweep's own largest update is the same quantity seen while velocities
@@ -43,6 +48,9 @@ typedef struct bt_solver {
     uint64_t *used;              ///< [n bodies] colours already at each body
     uint8_t *colour;             ///< [n_man]
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
+    double *step;                ///< [n_rows][2] what the last sweep added to (ln, lt), N s
+    double *scale;               ///< [n_rows][2] √W_nn, √W_tt
+    struct bt_anderson *anderson;
     double *push;                ///< [n_rows] its multipliers, kg m
     bt_idx cap_bodies;
     bool shifted;                ///< the projection did something this step

@@ -36,6 +36,7 @@ typedef struct bt_tow {
     double carriage_speed;    ///< ċ·u, m/s
     double w;                 ///< W, 1/kg
     double a, b;              ///< λ = max(0, a + b l̇2)
+    double step;              ///< what the last update added to λ, N s
 } bt_tow;
 
 /// Speed of the prescribed programme at time t: linear from 0 over the ramp, then constant. m/s
@@ -46,6 +47,9 @@ void bt_tow_begin(bt_world *w);
 
 /// One Gauss–Seidel update of the line row; returns its natural-map residual before the update, m/s.
 double bt_tow_update(bt_tow *t, bt_vel *v, bt_inv inv);
+
+/// Velocity of the body changed by line impulse d, N s.
+void bt_tow_apply(const bt_tow *t, double d, bt_vel *v, bt_inv inv);
 
 /// Natural-map residual of the line row at velocity v, m/s.
 double bt_tow_residual(const bt_tow *t, const bt_vel *v);

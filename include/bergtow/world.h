@@ -84,6 +84,7 @@ typedef struct bt_params {
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
     int64_t max_sweeps;
     bool warm_start;
+    bool plain_sweeps;     ///< no acceleration between the sweeps (reference)
     double slop;           ///< overlap left alone, m
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s
