@@ -11,8 +11,6 @@
 Lengths are in m, times in s, forces in N, angles in rad. Everything is read on first use and kept, but for
 frames, which are read one at a time. A folder that cannot be used raises RunError, whose text names the path,
 the reason and the remedy.
-
-As a program: `bergtow_read.py RUN` lists what a run holds.
 """
 import json
 import re
@@ -62,29 +60,25 @@ def place(vertices, pose):
 
 
 def parse_case(text):
-    """The scalars of a case file as {"section.key": text}.
+    """The scalars of a case as {"section.key": text}, quotes taken off.
 
-    This reads the block mappings that bergtow itself writes into case.resolved.yml (two levels, one key a line); it is
-    no YAML parser. Sequences (floes by hand, vertex lists) are left out.
+    This reads what bergtow itself writes (case.resolved.yml, /case): block mappings, one key a line. It is no YAML
+    parser; the sequence `floes:` is left out.
     """
-    out, section = {}, ""
+    out, path = {}, []
     for line in text.splitlines():
-        match = re.match(r"^( *)([A-Za-z_][\w]*):(?:\s+(.*))?$", line.rstrip())
-        if not match:
+        match = re.match(r"^( *)(\w+):(?: +(.*))?$", line.rstrip())
+        if not match or len(match[1]) > 2 * len(path):
             continue
-        indent, key, value = match.groups()
-        value = (value or "").strip()
-        if value[:1] in ("'", '"'):
-            end = value.find(value[0], 1)
-            value = value[1:end] if end > 0 else value[1:]
+        path = path[:len(match[1]) // 2] + [match[2]]
+        value = (match[3] or "").strip()
+        quoted = re.match(r'"((?:[^"\\]|\\.)*)"', value)
+        if quoted:
+            value = json.loads('"' + re.sub(r"\\x(..)", r"\\u00\1", quoted[1]) + '"')
         else:
             value = re.split(r"\s+#|^#", value)[0].strip()
-        if not indent:
-            section = key
-            if value:
-                out[key] = value
-        elif section and value:
-            out.setdefault(f"{section}.{key}", value)
+        if value:
+            out[".".join(path)] = value
     return out
 
 
@@ -208,35 +202,30 @@ class Run:
     @property
     def window(self):
         """(start s, end s) of the steady window that the means of the summary refer to, or None."""
-        start = self.number("window_start_s", None)
-        if start is None or not len(self["time"]):
-            return None
-        return start, self.number("window_end_s", self["time"][-1])
+        window = self.number("window.start_s"), self.number("window.end_s")
+        return window if np.isfinite(window).all() else None
 
     def number(self, key, default=np.nan):
-        """A number of summary.json; default where it is missing or null."""
-        value = self.summary.get(key)
+        """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""
+        value = self.summary
+        for part in key.split("."):
+            value = value.get(part) if isinstance(value, dict) else None
         return float(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else default
 
     # ---- case
 
+    def _text(self, name):
+        return self._once(name, lambda: str(_plain(self._read(name)[()])))
+
     @property
     def case_text(self):
-        """Text of the case file as it was run."""
-        return self._once("case", lambda: str(_plain(self._read("case")[()])))
+        """Text of the case file as it was given."""
+        return self._text("case_as_given" if "case_as_given" in self._file else "case")
 
     @property
     def case(self):
-        """{"section.key": text} of case.resolved.yml, or of the case text where that file is missing."""
-        def read():
-            resolved = self.path / "case.resolved.yml"
-            try:
-                return parse_case(resolved.read_text(encoding="utf-8"))
-            except FileNotFoundError:
-                return parse_case(self.case_text)
-            except (OSError, UnicodeDecodeError) as error:
-                raise RunError(resolved, f"cannot be read ({error})", "check the file and its permissions") from None
-        return self._once("resolved", read)
+        """{"section.key": text} of the resolved case: every key, numbers with their units."""
+        return self._once("resolved", lambda: parse_case(self._text("case")))
 
     def value(self, key, default=np.nan):
         """Number of a case key in SI units and radians; default where it is missing or no number."""
@@ -322,11 +311,11 @@ class Run:
             vertices, offsets = self._outlines("bodies")
             n = len(offsets) - 1
             names = [str(_plain(name)) for name in np.atleast_1d(self._read("bodies/names"))]
-            towed = np.atleast_1d(self._read("bodies/towed"))
-            if len(names) != n or len(towed) != n:
+            towed = int(np.ravel(self._read("bodies/towed"))[0])
+            if len(names) != n or not -1 <= towed < n:
                 raise RunError(self.result, "/bodies/names and /bodies/towed do not fit /bodies/offsets",
                                "the file is damaged: run the case again")
-            return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], bool(towed[i])) for i in range(n)]
+            return [Body(names[i], vertices[offsets[i]:offsets[i + 1]], i == towed) for i in range(n)]
         return self._once("bodies", read)
 
     @property
@@ -460,22 +449,3 @@ def _first_line(error):
 
 def _extent(x):
     return float(np.min(x)), float(np.max(x))
-
-
-def main(argv=None):
-    import argparse
-    parser = argparse.ArgumentParser(description="List what the output folder of a run holds.")
-    parser.add_argument("run", help="output folder of a run")
-    with Run(parser.parse_args(argv).run) as run:
-        print(f"{run.path}: {run.n_floes} floes, {len(run.bodies)} bodies, {len(run['time'])} samples, "
-              f"{run.n_frames} frames")
-        for key, value in run.summary.items():
-            print(f"  {key:30} {value}")
-        print("series:")
-        for name in run.series_names:
-            print(f"  {name:24} {run.units(name):8} {run.description(name)}")
-
-
-if __name__ == "__main__":
-    from command import guarded
-    guarded(main)

@@ -3,7 +3,7 @@
 import command
 import style
 from bergtow_read import Run, RunError
-from scene import COLOURS, Colouring, Scene, frame_edge, needs_window, view_body, view_whole
+from scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -69,8 +69,6 @@ def draw(run, kind="speed", times=(), window="auto"):
         axes = figure.add_axes(inches(rect))
         scene = Scene(axes, run, colouring, view, follow)
         scene.show(frame)
-        if not follow:
-            frame_edge(axes, run)
         words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
         if label:
             words.insert(0, label)

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Forces of a run against time, with the mean over the steady window; on request, how the solver fared."""
+import textwrap
+
 import command
 import style
 from bergtow_read import Run, RunError
@@ -10,15 +12,16 @@ from matplotlib.ticker import MaxNLocator
 
 
 def running_mean(x, width):
-    """Mean of x [n] over width samples about each one; near the ends over as many as both sides have."""
-    n = len(x)
-    reach = np.minimum(np.minimum(np.arange(n), np.arange(n)[::-1]), max(width, 1) // 2)
+    """Mean of x [n] over the width samples about each one; NaN near the ends, where the window does not fit."""
+    n, reach = len(x), max(width, 1) // 2
     total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(x))])
     count = np.concatenate([[0], np.cumsum(np.isfinite(x))])
-    i = np.arange(n)
-    upper, lower = i + reach + 1, i - reach
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return (total[upper] - total[lower]) / (count[upper] - count[lower])
+    out = np.full(n, np.nan)
+    if n > 2 * reach:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            out[reach:n - reach] = ((total[2 * reach + 1:] - total[:n - 2 * reach])
+                                    / (count[2 * reach + 1:] - count[:n - 2 * reach]))
+    return out
 
 
 def smoothing(run):
@@ -34,18 +37,19 @@ def smoothing(run):
     return samples, samples * step
 
 
-def _clip_peaks(axes, raw, smooth, reference, factor, unit):
+def _clip_peaks(axes, raw, smooth, reference, factor):
     """Limit the axis to where the curve is; single collisions far above it are named, not drawn."""
     finite = raw[np.isfinite(raw)]
     if not len(finite):
         return
     low = min(0.0, float(np.percentile(finite, 0.5)))
-    high = max(float(np.percentile(finite, 99)), 1.25 * float(np.nanmax(smooth)), 1.15 * reference)
+    high = max(2.5 * np.max(smooth, where=np.isfinite(smooth), initial=0.0), 1.5 * reference)
+    high = min(high, max(finite.max(), 1.1 * reference)) or finite.max()
     if high <= low:
         high = low + 1.0
     axes.set_ylim(low / factor, 1.04 * high / factor)
     if finite.max() > 1.04 * high:
-        axes.annotate(f"single samples up to {style.short(finite.max() / factor)} {unit}", (0.995, 0.97),
+        axes.annotate(f"single samples up to {style.quantity(finite.max(), 'N')}", (0.995, 0.97),
                       xycoords="axes fraction", ha="right", va="top", fontsize=9, color=style.FAINT,
                       bbox=dict(facecolor=style.PAPER, edgecolor="none", alpha=0.8, pad=1.5))
 
@@ -55,10 +59,10 @@ def draw_ice(axes, run, factor, unit, legend=True):
     time, ice = run["time"], run["ice_resistance"]
     samples, seconds = smoothing(run)
     smooth = running_mean(ice, samples)
-    reference = run.value("reference.mean_force")
+    reference = run.number("reference.mean_force_n")
     mean, se = run.number("mean_ice_resistance_n"), run.number("mean_ice_resistance_se_n")
     mark_window(axes, run)
-    axes.plot(time, ice / factor, color=style.ICE, alpha=0.25, linewidth=0.6, label="each sample", rasterized=True)
+    axes.plot(time, ice / factor, color=style.ICE, alpha=0.22, linewidth=0.6, label="each sample", rasterized=True)
     axes.plot(time, smooth / factor, color=style.ICE, label=f"running mean over {style.short(seconds, 2)} s")
     if np.isfinite(mean) and run.window:
         start, end = run.window
@@ -69,10 +73,10 @@ def draw_ice(axes, run, factor, unit, legend=True):
                   label="mean, 95 % confidence" if np.isfinite(se) else "mean")
     if np.isfinite(reference):
         axes.axhline(reference / factor, color=style.REFERENCE, linewidth=1.3, dashes=(5, 3), zorder=4, label="reference")
-    _clip_peaks(axes, ice, smooth, reference if np.isfinite(reference) else 0.0, factor, unit)
+    _clip_peaks(axes, ice, smooth, reference if np.isfinite(reference) else 0.0, factor)
     axes.set_ylabel(f"ice resistance ({unit})")
     axes.grid(axis="y")
-    axes.margins(x=0)
+    axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
     if legend:
         axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2, handlelength=1.8,
                     columnspacing=1.6)
@@ -98,7 +102,7 @@ def draw_balance(axes, run, factor, unit):
                 line.set_dashes(dashes)
     axes.set_ylabel(f"running mean ({unit})")
     axes.grid(axis="y")
-    axes.margins(x=0)
+    axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2, handlelength=2.2,
                 columnspacing=1.6)
 
@@ -110,13 +114,13 @@ def findings(run):
     if np.isfinite(mean):
         factor, unit = style.scale([mean], "N")
         band = f" ± {style.short(1.96 * se / factor, 2)}" if np.isfinite(se) else ""
-        words.append(f"mean ice resistance {style.short(mean / factor)}{band} {unit}")
+        words.append(f"mean ice resistance {style.short(mean / factor)}{band} {unit}" + (" (95 %)" if band else ""))
     tow = run.number("mean_tow_force_n")
     if np.isfinite(tow):
         words.append(f"mean tow force {style.quantity(tow, 'N')}")
-    reference = run.value("reference.mean_force")
+    reference = run.number("reference.mean_force_n")
     if np.isfinite(reference):
-        source = run.case.get("reference.source", "")
+        source = run.summary["reference"].get("source") or ""
         words.append(f"reference {style.quantity(reference, 'N')}" + (f" ({source})" if source else "")
                      + (f", ratio {mean / reference:.2f}" if reference and np.isfinite(mean) else ""))
     return "; ".join(words)
@@ -124,14 +128,16 @@ def findings(run):
 
 def draw(run):
     """The figure of the forces."""
+    if run.towed is None:
+        raise RunError(run.result, "has no towed body, so there is no force to draw", "look at the field instead")
     if not len(run["time"]):
         raise RunError(run.result, "holds no samples", "the run ended before its first sample: run the case for longer")
     figure = plt.figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.815, bottom=0.115)
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.80, bottom=0.115)
     upper = figure.add_subplot(grid[0])
     lower = figure.add_subplot(grid[1], sharex=upper)
     smooth = running_mean(run["ice_resistance"], smoothing(run)[0])
-    factor, unit = style.scale(np.append(smooth, run.value("reference.mean_force")), "N")
+    factor, unit = style.scale(np.append(smooth, run.number("reference.mean_force_n")), "N")
     draw_ice(upper, run, factor, unit)
     draw_balance(lower, run, factor, unit)
     upper.tick_params(labelbottom=False)
@@ -139,6 +145,11 @@ def draw(run):
     style.headline(figure, run, "force on the towed body")
     height = figure.get_size_inches()[1]
     figure.text(0.02, 1 - 0.68 / height, findings(run), va="top", fontsize=10.5)
+    window = run.summary.get("window")
+    warning = window.get("warning") if isinstance(window, dict) else None
+    if warning:
+        figure.text(0.02, 1 - 0.92 / height, "\n".join(textwrap.wrap(f"warning: {warning}", 160)[:2]), va="top",
+                    fontsize=9, color=style.TOW)
     notes = "assumed parameters: see case.resolved.yml"
     if run.window:
         notes = f"shaded: steady window {style.short(run.window[0])} to {style.short(run.window[1])} s; " + notes
@@ -158,7 +169,7 @@ def draw_diagnostics(run):
     figure.subplots_adjust(left=0.1, right=0.975, top=1 - 0.95 / height, bottom=0.62 / height, hspace=0.18)
     for axes, (name, label, colour) in zip(all_axes[:, 0], rows):
         values, unit = run[name], run.units(name)
-        axes.plot(run["time"], values, color=colour, linewidth=0.8, rasterized=True)
+        axes.plot(run["time"], values, color=colour, linewidth=0.6, rasterized=True)
         axes.set_ylabel(label + (f" ({unit})" if unit not in ("", "1") else ""))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
@@ -172,7 +183,7 @@ def draw_diagnostics(run):
             axes.annotate("tolerance", (1, tolerance), xycoords=("axes fraction", "data"), ha="right", va="bottom",
                           fontsize=9)
         axes.grid(axis="y")
-        axes.margins(x=0)
+        axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
     figure.align_ylabels(all_axes[:, 0])
     all_axes[-1, 0].set_xlabel("time (s)")
     style.headline(figure, run, "contact solver")

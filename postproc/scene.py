@@ -61,7 +61,7 @@ class Colouring:
         """The colour bar on the axes cax."""
         bar = figure.colorbar(mappable, cax=cax, orientation=orientation, extend=self.extend,
                               extendfrac=0.03, label=self.label)
-        bar.outline.set_visible(False)
+        bar.outline.set(linewidth=0.6, edgecolor=style.FAINT)
         bar.ax.tick_params(length=3)
         if self.kind == "force":
             top = self.norm.vmax
@@ -146,8 +146,9 @@ class Scene:
         relative = " from the body" if follow else ""
         names = (f"y east{relative} (m)", f"x north{relative} (m)") if self._turn else \
             (f"x{relative} (m)", f"y{relative} (m)")
-        axes.xaxis.set_major_locator(MaxNLocator(9 if view[1, 0] - view[0, 0] > 2 * (view[1, 1] - view[0, 1]) else 5))
-        axes.yaxis.set_major_locator(MaxNLocator(9 if view[1, 1] - view[0, 1] > 2 * (view[1, 0] - view[0, 0]) else 5))
+        wide, high = view[1] - view[0]
+        axes.xaxis.set_major_locator(MaxNLocator(9 if wide > 2 * high else 5, steps=(1, 2, 5, 10)))
+        axes.yaxis.set_major_locator(MaxNLocator(9 if high > 2 * wide else 5, steps=(1, 2, 5, 10)))
         axes.set_xlabel(names[0])
         axes.set_ylabel(names[1])
 
@@ -158,9 +159,8 @@ class Scene:
         self._corners = corners
         kept = dict(animated=animated)
         self._water = Polygon(self._flat(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0, **kept)
-        points = max(view[1, 0] - view[0, 0], 1e-9)  # m across the picture
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
-        floe_pt = np.sqrt(run.area.mean()) / points * width_pt if run.n_floes else 10
+        floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
                                      linewidths=float(np.clip(0.035 * floe_pt, 0.1, 0.6)), zorder=2, **kept)
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
@@ -174,14 +174,18 @@ class Scene:
                               linewidth=0.9, zorder=7, visible=False, **kept)
         self._heading = tow_heading(run)
         self._arrow.set_visible(self._heading is not None)
-        self._arrow_length = max(0.75 * body_size(run), 0.035 * points)
-        self.artists = [self._water, self._floes, self._track, self._solid, self._body, self._arrow]
+        self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
+        edges = [] if follow else self._edges(**kept)
+        #: in the order of drawing
+        self.artists = [self._water, self._floes, self._track, self._solid, *edges, self._body, self._arrow]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
         axes.add_line(self._track)
         axes.add_collection(self._solid, autolim=False)
         axes.add_patch(self._body)
         axes.add_patch(self._arrow)
+        for edge in edges:
+            axes.add_line(edge)
 
     @property
     def mappable(self):
@@ -216,6 +220,17 @@ class Scene:
         if self._heading is not None:
             self._show_arrow(position - origin, bodies[run.towed] - origin)
 
+    def _edges(self, **kept):
+        """Dashed lines along the edges of the domain that are open or periodic."""
+        a, b, c, d = self._corners
+        lines = []
+        if self.run.case.get("domain.ends") in ("open", "periodic"):
+            lines += [(a, d), (b, c)]
+        if self.run.case.get("domain.sides") in ("open", "periodic"):
+            lines += [(a, b), (d, c)]
+        return [Line2D(*self._flat(np.array(line)).T, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5,
+                       clip_on=False, **kept) for line in lines]
+
     def _unbounded(self, corners):
         """The water, without end along periodic directions."""
         grow = np.where(np.array(self.run.period) > 0, 1e3, 1.0)
@@ -249,16 +264,3 @@ class Scene:
         shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]]) * size
         self._arrow.set_xy(self._flat(ahead + shape[:, :1] * u + shape[:, 1:] * n))
 
-
-def frame_edge(axes, run):
-    """Dashed lines along the edges of the domain that are open or periodic."""
-    x0, x1, y0, y1 = run.box
-    edges = []
-    if run.case.get("domain.ends") in ("open", "periodic"):
-        edges += [((x0, x0), (y0, y1)), ((x1, x1), (y0, y1))]
-    if run.case.get("domain.sides") in ("open", "periodic"):
-        edges += [((x0, x1), (y0, y0)), ((x0, x1), (y1, y1))]
-    for x, y in edges:
-        if run.geographic:
-            x, y = y, x
-        axes.add_line(Line2D(x, y, color=style.FAINT, linewidth=1.0, linestyle=(0, (4, 3)), zorder=5, clip_on=False))

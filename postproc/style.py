@@ -90,12 +90,14 @@ def conditions(run):
     mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
     if run.towed is not None and mode != "none" and np.isfinite(speed):
         words.append(f"towed at {speed:g} m/s" + (" on a line" if mode == "line" else ""))
+    if run.summary.get("stopped"):
+        words.append("stopped early")
     return ", ".join(words)
 
 
 def title(run):
     """Title of the case, or the name of the run's folder."""
-    return run.case.get("run.title") or run.path.resolve().name
+    return run.summary.get("title") or run.path.resolve().name
 
 
 def headline(figure, run, subject, left=0.02):
