@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import h5py
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,6 +14,8 @@ from PIL import Image
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
 
+import bergtow_read  # noqa: E402
+import plot_field  # noqa: E402
 import plot_force  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
@@ -124,6 +127,11 @@ def test_vertices_turn_anticlockwise_about_the_centroid(tmp_path):
         assert np.abs(square - [[-9, -13], [-9, -11], [-11, -11], [-11, -13]]).max() < 1e-12
         assert np.array_equal(triangle, TRIANGLE + [19.5, 15.0])
         assert np.array_equal(run.body_polygons(2)[0], HULL + [2.0, 0.0])
+
+
+def test_bodies_turn_as_floes_do():
+    corner = bergtow_read.place(HULL, (5.0, 7.0, np.pi / 6))[2]
+    assert np.abs(corner - [5 + np.sqrt(3) - 0.5, 7 + 1 + np.sqrt(3) / 2]).max() < 1e-12
 
 
 def test_outlines_for_drawing_are_the_polygons_filled_up(tmp_path):
@@ -331,6 +339,23 @@ def test_field_picture_shows_water_ice_and_body(tmp_path, colour):
     assert out.stat().st_size > 10_000
     picture = pixels(out)
     assert len(where(picture, style.WATER)[0]) > 50_000 and len(where(picture, style.BODY)[0]) > 500
+
+
+def test_floes_take_the_colour_of_their_value(tmp_path):
+    run = make_run(tmp_path / "run")
+    done(script("plot_field.py", run), run / "field.png")
+    picture = pixels(run / "field.png")
+    for share in (0.5, 0.0):  # the square moves at half the tow speed, the triangle rests
+        assert len(where(picture, matplotlib.colors.to_hex(style.SPEED_MAP(share)), 3)[0]) > 400
+
+
+def test_field_panels_show_first_middle_and_last_frame(tmp_path):
+    with Run(make_run(tmp_path / "run", path=[(float(i * i), 0.0) for i in range(5)])) as run:
+        axes = plot_field.draw(run).axes[:3]
+        assert [a.get_title(loc="left") for a in axes] == ["before, t = 0", "during, t = 5.00 s", "after, t = 10.0 s"]
+        for a, x in zip(axes, (0.0, 4.0, 16.0)):
+            bodies = [p for p in a.patches if p.get_facecolor() == matplotlib.colors.to_rgba(style.BODY)]
+            assert len(bodies) == 1 and np.allclose(bodies[0].get_xy()[:4], HULL + [x, 0.0], rtol=0, atol=1e-12)
 
 
 def _body_centre(tmp_path, frame, position):
