@@ -120,7 +120,7 @@ def findings(run):
         words.append(f"mean tow force {style.quantity(tow, 'N')}")
     reference = run.number("reference.mean_force_n")
     if np.isfinite(reference):
-        source = run.summary["reference"].get("source") or ""
+        source = style.plain(textwrap.shorten(run.summary["reference"].get("source") or "", 60, placeholder=" ..."))
         words.append(f"reference {style.quantity(reference, 'N')}" + (f" ({source})" if source else "")
                      + (f", ratio {mean / reference:.2f}" if reference and np.isfinite(mean) else ""))
     return "; ".join(words)
@@ -148,7 +148,7 @@ def draw(run):
     window = run.summary.get("window")
     warning = window.get("warning") if isinstance(window, dict) else None
     if warning:
-        figure.text(0.02, 1 - 0.92 / height, "\n".join(textwrap.wrap(f"warning: {warning}", 160)[:2]), va="top",
+        figure.text(0.02, 1 - 0.92 / height, "\n".join(textwrap.wrap(style.plain(f"warning: {warning}"), 160)[:2]), va="top",
                     fontsize=9, color=style.TOW)
     notes = "assumed parameters: see case.resolved.yml"
     if run.window:

@@ -7,6 +7,7 @@ as a map: the horizontal axis is y, the vertical axis is x.
 A view is (x0, x1, y0, y1) in m of the world frame, or relative to the towed body when the scene follows it.
 """
 import numpy as np
+from matplotlib import patheffects
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.lines import Line2D
@@ -14,7 +15,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
 import style
-from bergtow_read import RunError
+from bergtow_read import RunError, place
 
 COLOURS = ("speed", "force", "thickness")
 
@@ -79,7 +80,7 @@ def _round_steps(top):
 
 
 def tow_heading(run):
-    """Unit vector of the tow direction (x, y), or None for a body that is not towed."""
+    """Unit vector of the tow direction (x, y), or None for a body that drifts."""
     if run.towed is None or run.case.get("tow.mode") == "none":
         return None
     angle = run.value("tow.direction", 0.0)
@@ -168,20 +169,25 @@ class Scene:
                                    * len(self._images))
         self._track = Line2D([], [], color=style.TRACK, linewidth=1.1, dashes=(1, 2.2), dash_capstyle="round",
                              alpha=0.9, zorder=3, **kept)
+        self._line = Line2D([], [], color=style.BODY_EDGE, linewidth=1.3, marker="s", markersize=4.5, markevery=[1],
+                            path_effects=[patheffects.withStroke(linewidth=3, foreground="white")], zorder=5.5, **kept)
         self._body = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY, edgecolor=style.BODY_EDGE,
                              linewidth=1.2, zorder=6, visible=run.towed is not None, **kept)
         self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY_EDGE, edgecolor="white",
                               linewidth=0.9, zorder=7, visible=False, **kept)
         self._heading = tow_heading(run)
+        if run.case.get("tow.mode") == "line":
+            self._heading = None  # the line itself shows it
         self._arrow.set_visible(self._heading is not None)
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
-        self.artists = [self._water, self._floes, self._track, self._solid, *edges, self._body, self._arrow]
+        self.artists = [self._water, self._floes, self._track, self._solid, *edges, self._line, self._body, self._arrow]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
         axes.add_line(self._track)
         axes.add_collection(self._solid, autolim=False)
+        axes.add_line(self._line)
         axes.add_patch(self._body)
         axes.add_patch(self._arrow)
         for edge in edges:
@@ -216,7 +222,8 @@ class Scene:
         if run.towed is None:
             return
         self._body.set_xy(self._flat(bodies[run.towed] - origin))
-        self._show_track(frame, origin, centre)
+        self._show_track(frame, origin)
+        self._show_line(frame, position - origin)
         if self._heading is not None:
             self._show_arrow(position - origin, bodies[run.towed] - origin)
 
@@ -237,7 +244,7 @@ class Scene:
         middle = corners.mean(axis=0)
         return middle + (corners - middle) * grow
 
-    def _show_track(self, frame, origin, centre):
+    def _show_track(self, frame, origin):
         """The way the body has come, broken where it left one end of a periodic domain for the other."""
         run = self.run
         if "body_x" not in run or "body_y" not in run:
@@ -254,6 +261,18 @@ class Scene:
                                   .any(axis=1)) + 1
             way = np.insert(wrapped, jump, np.nan, axis=0)
         self._track.set_data(*self._flat(way - origin).T)
+
+    def _show_line(self, frame, position):
+        """The tow line from the hull to its towing end, a square; nothing without a line."""
+        run, at = self.run, self.run.frame_times[frame]
+        if run.case.get("tow.mode") != "line" or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+            return
+        sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
+        if sample >= len(run["time"]):
+            return
+        ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
+        hull = place([[run.value("tow.hull_x", 0.0), run.value("tow.hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
+        self._line.set_data(*self._flat(np.vstack([hull, position + ahead])).T)
 
     def _show_arrow(self, position, outline):
         """An arrow ahead of the body, along the tow."""

@@ -4,6 +4,8 @@
 Line colours are those of Okabe & Ito (2008), told apart with any colour vision. Maps of floes rise in lightness
 contrast against the water, so that they also read in grey.
 """
+import textwrap
+
 import matplotlib
 
 matplotlib.use("Agg")
@@ -95,9 +97,14 @@ def conditions(run):
     return ", ".join(words)
 
 
+def plain(text):
+    """Text of a case as one line that matplotlib draws as it is."""
+    return " ".join(str(text).split()).replace("$", r"\$")
+
+
 def title(run):
-    """Title of the case, or the name of the run's folder."""
-    return run.summary.get("title") or run.path.resolve().name
+    """Title of the case, or the name of the run's folder; at most 80 characters."""
+    return plain(textwrap.shorten(run.summary.get("title") or run.path.resolve().name, 80, placeholder=" ..."))
 
 
 def headline(figure, run, subject, left=0.02):

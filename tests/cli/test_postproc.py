@@ -41,7 +41,8 @@ domain:
 ice:
   thickness: 0.5 m
 tow:
-  mode: speed
+  mode: {mode}
+  hull_x: 2 m
   speed: 1.8 km/h
   direction: 90 deg
 body:
@@ -54,7 +55,7 @@ floes:
 """
 
 
-def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (2.0, 0.0)), towed=0):
+def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (2.0, 0.0)), towed=0, mode="speed"):
     """A run of a square and a triangle, a towed hull that takes the positions of path, and a wall; known numbers throughout."""
     folder.mkdir(parents=True, exist_ok=True)
     n, frames = 100, len(path)
@@ -64,6 +65,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
               "tow_force": ("N", ice + 2.0), "inertia_force": ("N", np.zeros(n)),
               "body_x": ("m", np.linspace(path[0][0], path[-1][0], n)),
               "body_y": ("m", np.linspace(path[0][1], path[-1][1], n)), "contacts": ("1", np.arange(n) % 7.0),
+              "carriage_x": ("m", np.full(n, 15.0)), "carriage_y": ("m", np.full(n, 3.0)),
               "sweeps": ("1", np.arange(n) % 5.0), "residual": ("m/s", np.full(n, 1e-7)),
               "overlap": ("m", np.zeros(n)), "kinetic_energy": ("J", time)}
     pose = np.zeros((frames, 2, 3))
@@ -76,7 +78,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
     with h5py.File(folder / "result.h5", "w") as f:
         f.attrs["program"] = "bergtow"
         f.attrs["complete"] = 1
-        f["case"] = CASE.format(frame=frame, ends=ends)
+        f["case"] = CASE.format(frame=frame, ends=ends, mode=mode)
         f["case_as_given"] = "tow: {speed: 1.8 km/h}\n"
         for name, (units, values) in series.items():
             data = f.create_dataset(f"series/{name}", data=values)
@@ -356,6 +358,14 @@ def test_field_panels_show_first_middle_and_last_frame(tmp_path):
         for a, x in zip(axes, (0.0, 4.0, 16.0)):
             bodies = [p for p in a.patches if p.get_facecolor() == matplotlib.colors.to_rgba(style.BODY)]
             assert len(bodies) == 1 and np.allclose(bodies[0].get_xy()[:4], HULL + [x, 0.0], rtol=0, atol=1e-12)
+
+
+def test_tow_line_goes_from_the_hull_to_the_carriage(tmp_path):
+    for mode, expected in (("line", [[[10.0, 5.0], [15.0, 3.0]]]), ("speed", [])):
+        with Run(make_run(tmp_path / mode, path=((8.0, 5.0),) * 3, mode=mode)) as run:
+            axes = plot_field.draw(run).axes[0]
+            lines = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "s" and len(line.get_xydata())]
+            assert lines == expected
 
 
 def _body_centre(tmp_path, frame, position):
