@@ -54,9 +54,10 @@ class Film:
         field = self.figure.add_axes(box(left + (panel_w - field_w) / 2, base, field_w, field_h))
         colouring = Colouring(run, kind, frames[::max(1, len(frames) // 20)])
         self.scene = Scene(field, run, colouring, view, follow, animated=True)
-        bar_h = min(field_h, 3.2)
-        cax = self.figure.add_axes(box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h))
-        colouring.bar(self.figure, self.scene.mappable, cax)
+        if run.n_floes:
+            bar_h = min(field_h, 3.2)
+            cax = self.figure.add_axes(box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h))
+            colouring.bar(self.figure, self.scene.mappable, cax)
         style.headline(self.figure, run, "ice field and ice resistance" if run.towed is not None else "ice field",
                        0.2 / size[0])
         self.clock = self.figure.text(1 - 0.25 / size[0], 1 - 0.14 / size[1], "", va="top", ha="right", fontsize=13.5,

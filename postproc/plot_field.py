@@ -82,7 +82,8 @@ def draw(run, kind="speed", times=(), window="auto"):
         if not stacked and i > 0:
             axes.set_ylabel("")
             axes.tick_params(labelleft=False)
-    colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
+    if run.n_floes:
+        colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
     style.headline(figure, run, "ice field", 0.2 / size[0])
     return figure
 

@@ -37,24 +37,24 @@ def smoothing(run):
     return samples, samples * step
 
 
-def _clip_peaks(axes, raw, smooth, reference, factor):
-    """Limit the axis to where the curve is; single collisions far above it are named, not drawn."""
+def _clip_peaks(axes, raw, smooth, marks, factor, top):
+    """Limit the axis to where the running mean and the marks are; samples above it are named, not drawn."""
     finite = raw[np.isfinite(raw)]
     if not len(finite):
         return
-    low = min(0.0, float(np.percentile(finite, 0.5)))
-    high = max(2.5 * np.max(smooth, where=np.isfinite(smooth), initial=0.0), 1.5 * reference)
-    high = min(high, max(finite.max(), 1.1 * reference)) or finite.max()
+    low = min([0.0, float(np.percentile(finite, 0.5)), *([] if top else marks)])
+    high = max([2.5 * np.max(smooth, where=np.isfinite(smooth), initial=0.0), *(1.5 * m for m in marks)])
+    high = top or min(high, max([finite.max(), *(1.1 * m for m in marks)])) or finite.max()
     if high <= low:
         high = low + 1.0
-    axes.set_ylim(low / factor, 1.04 * high / factor)
+    axes.set_ylim(low / factor, (high if top else 1.04 * high) / factor)
     if finite.max() > 1.04 * high:
         axes.annotate(f"single samples up to {style.quantity(finite.max(), 'N')}", (0.995, 0.97),
                       xycoords="axes fraction", ha="right", va="top", fontsize=9, color=style.FAINT,
                       bbox=dict(facecolor=style.PAPER, edgecolor="none", alpha=0.8, pad=1.5))
 
 
-def draw_ice(axes, run, factor, unit, legend=True):
+def draw_ice(axes, run, factor, unit, top=None):
     """Ice resistance: samples, running mean, mean with its band, reference."""
     time, ice = run["time"], run["ice_resistance"]
     samples, seconds = smoothing(run)
@@ -62,24 +62,26 @@ def draw_ice(axes, run, factor, unit, legend=True):
     reference = run.number("reference.mean_force_n")
     mean, se = run.number("mean_ice_resistance_n"), run.number("mean_ice_resistance_se_n")
     mark_window(axes, run)
-    axes.plot(time, ice / factor, color=style.ICE, alpha=0.22, linewidth=0.6, label="each sample", rasterized=True)
+    many = len(time) > 2000
+    axes.plot(time, ice / factor, color=style.ICE, alpha=0.22 if many else 0.45, linewidth=0.6 if many else 0.8,
+              label="each sample", rasterized=True)
     axes.plot(time, smooth / factor, color=style.ICE, label=f"running mean over {style.short(seconds, 2)} s")
     if np.isfinite(mean) and run.window:
         start, end = run.window
         if np.isfinite(se):
             axes.fill_between([start, end], (mean - 1.96 * se) / factor, (mean + 1.96 * se) / factor,
-                              color=style.TOW, alpha=0.28, linewidth=0, zorder=3)
+                              color=style.TOW, alpha=0.28, linewidth=0, zorder=1.5)
         axes.plot([start, end], [mean / factor] * 2, color=style.TOW, linewidth=1.8, zorder=4,
                   label="mean, 95 % confidence" if np.isfinite(se) else "mean")
     if np.isfinite(reference):
         axes.axhline(reference / factor, color=style.REFERENCE, linewidth=1.3, dashes=(5, 3), zorder=4, label="reference")
-    _clip_peaks(axes, ice, smooth, reference if np.isfinite(reference) else 0.0, factor)
+    marks = [m for m in (reference, mean - 1.96 * se, mean + 1.96 * se) if np.isfinite(m)]
+    _clip_peaks(axes, ice, smooth, marks, factor, top)
     axes.set_ylabel(f"ice resistance ({unit})")
     axes.grid(axis="y")
     axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
-    if legend:
-        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2, handlelength=1.8,
-                    columnspacing=1.6)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2, handlelength=1.8,
+                columnspacing=1.6)
 
 
 def mark_window(axes, run):
@@ -92,12 +94,14 @@ def draw_balance(axes, run, factor, unit):
     """Running means of the forces on the towed body along the tow: tow = ice + drag + inertia."""
     samples, _ = smoothing(run)
     mark_window(axes, run)
-    for name, label, colour, dashes in (("tow_force", "tow force", style.TOW, None),
-                                        ("ice_resistance", "ice resistance", style.ICE, None),
-                                        ("drag_force", "drag", style.DRAG, (6, 2)),
-                                        ("inertia_force", "inertia", style.INERTIA, (2, 1.5))):
+    # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
+    for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 3.4, None),
+                                               ("ice_resistance", "ice resistance", style.ICE, 1.4, None),
+                                               ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
+                                               ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))):
         if name in run:
-            line, = axes.plot(run["time"], running_mean(run[name], samples) / factor, color=colour, label=label)
+            line, = axes.plot(run["time"], running_mean(run[name], samples) / factor, color=colour, linewidth=width,
+                              label=label)
             if dashes:
                 line.set_dashes(dashes)
     axes.set_ylabel(f"running mean ({unit})")
@@ -113,8 +117,12 @@ def findings(run):
     words = []
     if np.isfinite(mean):
         factor, unit = style.scale([mean], "N")
-        band = f" ± {style.short(1.96 * se / factor, 2)}" if np.isfinite(se) else ""
-        words.append(f"mean ice resistance {style.short(mean / factor)}{band} {unit}" + (" (95 %)" if band else ""))
+        if np.isfinite(se) and se > 0:  # both with the two digits that the error leaves
+            band = style.short(1.96 * se / factor, 2)
+            decimals = len(band.partition(".")[2])
+            words.append(f"mean ice resistance {mean / factor:.{decimals}f} ± {band} {unit} (95 %)")
+        else:
+            words.append(f"mean ice resistance {style.short(mean / factor)} {unit}")
     tow = run.number("mean_tow_force_n")
     if np.isfinite(tow):
         words.append(f"mean tow force {style.quantity(tow, 'N')}")
@@ -126,30 +134,39 @@ def findings(run):
     return "; ".join(words)
 
 
-def draw(run):
-    """The figure of the forces."""
+def doubts(run):
+    """The first two warnings of the summary, each in one line."""
+    warnings = run.summary.get("warnings")
+    warnings = [str(w) for w in warnings] if isinstance(warnings, list) else []
+    lines = [style.plain(textwrap.shorten(f"warning: {w}", 145, placeholder=" ...")) for w in warnings[:2]]
+    if len(warnings) > 2:
+        lines[1] = (lines[1][:110].rsplit(" ", 1)[0] + " ..." if len(lines[1]) > 115 else lines[1]) \
+            + f" ({len(warnings) - 2} more in summary.json)"
+    return lines
+
+
+def draw(run, top=None):
+    """The figure of the forces; top: upper end of the axes, N (default: from the data)."""
     if run.towed is None:
         raise RunError(run.result, "has no towed body, so there is no force to draw", "look at the field instead")
     if not len(run["time"]):
         raise RunError(run.result, "holds no samples", "the run ended before its first sample: run the case for longer")
     figure = plt.figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.80, bottom=0.115)
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.79, bottom=0.115)
     upper = figure.add_subplot(grid[0])
     lower = figure.add_subplot(grid[1], sharex=upper)
     smooth = running_mean(run["ice_resistance"], smoothing(run)[0])
-    factor, unit = style.scale(np.append(smooth, run.number("reference.mean_force_n")), "N")
-    draw_ice(upper, run, factor, unit)
+    factor, unit = style.scale([top] if top else np.append(smooth, run.number("reference.mean_force_n")), "N")
+    draw_ice(upper, run, factor, unit, top)
     draw_balance(lower, run, factor, unit)
+    if top:
+        lower.set_ylim(top=min(lower.get_ylim()[1], top / factor))
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time (s)")
     style.headline(figure, run, "force on the towed body")
     height = figure.get_size_inches()[1]
     figure.text(0.02, 1 - 0.68 / height, findings(run), va="top", fontsize=10.5)
-    window = run.summary.get("window")
-    warning = window.get("warning") if isinstance(window, dict) else None
-    if warning:
-        figure.text(0.02, 1 - 0.92 / height, "\n".join(textwrap.wrap(style.plain(f"warning: {warning}"), 160)[:2]), va="top",
-                    fontsize=9, color=style.TOW)
+    figure.text(0.02, 1 - 0.92 / height, "\n".join(doubts(run)), va="top", fontsize=9, color=style.TOW)
     notes = "assumed parameters: see case.resolved.yml"
     if run.window:
         notes = f"shaded: steady window {style.short(run.window[0])} to {style.short(run.window[1])} s; " + notes
@@ -175,13 +192,14 @@ def draw_diagnostics(run):
         positive = values[values > 0]
         if name in ("residual", "overlap") and len(positive):
             axes.set_yscale("log")
+            axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)
         else:
             axes.set_ylim(bottom=0)
         tolerance = run.number("tolerance_m_s")
         if name == "residual" and np.isfinite(tolerance):
             axes.axhline(tolerance, color=style.REFERENCE, linewidth=1.1, dashes=(5, 3))
             axes.annotate("tolerance", (1, tolerance), xycoords=("axes fraction", "data"), ha="right", va="bottom",
-                          fontsize=9)
+                          fontsize=9, bbox=dict(facecolor=style.PAPER, edgecolor="none", alpha=0.85, pad=1))
         axes.grid(axis="y")
         axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
     figure.align_ylabels(all_axes[:, 0])
@@ -198,10 +216,13 @@ def main(argv=None):
     p = command.parser("Draw the forces of a run against time.", "force.png")
     p.add_argument("--diagnostics", action="store_true",
                    help="also draw contacts, sweeps, residual and overlap, in a second file (NAME-diagnostics)")
+    p.add_argument("--max", metavar="N", type=float, help="upper end of the force axes, N")
     a = p.parse_args(argv)
+    if a.max is not None and not 0 < a.max < np.inf:
+        p.error("--max: choose a force above 0")
     path = command.output(p, a, "force.png", command.PICTURES)
     with Run(a.run) as run:
-        command.save(draw(run), path)
+        command.save(draw(run, a.max), path)
         if a.diagnostics:
             command.save(draw_diagnostics(run), path.with_name(f"{path.stem}-diagnostics{path.suffix}"))
 

@@ -95,7 +95,8 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
     summary = {"title": "Square", "n_floes": 2, "n_steps": n, "concentration": 0.8, "mean_ice_resistance_n": 10.0,
                "mean_ice_resistance_se_n": 0.5, "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
                "window": {"start_s": 3.0, "end_s": 10.0, "warning": None},
-               "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None}
+               "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None,
+               "warnings": ["first doubt", "second doubt", "third doubt"]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return folder
 
@@ -292,7 +293,8 @@ def test_a_picture_that_cannot_be_written_is_named(tmp_path):
 @pytest.mark.parametrize("name, arguments", [
     ("plot_force.py", []), ("plot_field.py", ["--colour", "taste"]), ("plot_field.py", ["-o", "a.doc"]),
     ("plot_field.py", ["--times", "nan"]), ("animate.py", ["-o", "a.avi"]), ("animate.py", ["--frames", "0"]),
-    ("animate.py", ["--fps", "0"]), ("plot_force.py", ["--nonsense"])])
+    ("animate.py", ["--fps", "0"]), ("plot_force.py", ["--nonsense"]),
+    ("plot_force.py", ["--max", "-1"])])
 def test_scripts_leave_with_2_on_wrong_usage(tmp_path, name, arguments):
     run = [make_run(tmp_path / "run")] if arguments else []
     result = script(name, *run, *arguments)
@@ -320,7 +322,9 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
         assert np.array_equal(lines["each sample"].get_ydata(), run["ice_resistance"])
         band = axes.collections[0].get_paths()[0].vertices
         assert np.isclose(band[:, 1].min(), 10 - 0.98) and np.isclose(band[:, 1].max(), 10 + 0.98)
-        assert plot_force.findings(run) == ("mean ice resistance 10.0 ± 0.98 N (95 %); mean tow force 12.0 N; "
+        assert plot_force.doubts(run) == ["warning: first doubt", "warning: second doubt (1 more in summary.json)"]
+        assert plot_force.draw(run, top=14.0).axes[0].get_ylim()[1] == 14.0
+        assert plot_force.findings(run) == ("mean ice resistance 10.00 ± 0.98 N (95 %); mean tow force 12.0 N; "
                                             "reference 9.00 N (a test), ratio 1.11")
 
 
