@@ -95,8 +95,8 @@ def draw_balance(axes, run, factor, unit):
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 3.4, None),
-                                               ("ice_resistance", "ice resistance", style.ICE, 1.4, None),
+    for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 2.8, None),
+                                               ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
                                                ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
                                                ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))):
         if name in run:
@@ -152,7 +152,7 @@ def draw(run, top=None):
     if not len(run["time"]):
         raise RunError(run.result, "holds no samples", "the run ended before its first sample: run the case for longer")
     figure = plt.figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.79, bottom=0.115)
+    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.79 if doubts(run) else 0.825, bottom=0.115)
     upper = figure.add_subplot(grid[0])
     lower = figure.add_subplot(grid[1], sharex=upper)
     smooth = running_mean(run["ice_resistance"], smoothing(run)[0])
@@ -160,7 +160,8 @@ def draw(run, top=None):
     draw_ice(upper, run, factor, unit, top)
     draw_balance(lower, run, factor, unit)
     if top:
-        lower.set_ylim(top=min(lower.get_ylim()[1], top / factor))
+        low, high = lower.get_ylim()
+        lower.set_ylim(max(low, -0.1 * top / factor), min(high, top / factor))
     upper.tick_params(labelbottom=False)
     lower.set_xlabel("time (s)")
     style.headline(figure, run, "force on the towed body")

@@ -66,7 +66,8 @@ class Colouring:
         bar.ax.tick_params(length=3)
         if self.kind == "force":
             top = self.norm.vmax
-            bar.set_ticks(_round_steps(top))
+            ticks = _round_steps(top)
+            bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
         return bar
 
 
@@ -173,8 +174,8 @@ class Scene:
                             path_effects=[patheffects.withStroke(linewidth=3, foreground="white")], zorder=5.5, **kept)
         self._body = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY, edgecolor=style.BODY_EDGE,
                              linewidth=1.2, zorder=6, visible=run.towed is not None, **kept)
-        self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY_EDGE, edgecolor="white",
-                              linewidth=0.9, zorder=7, visible=False, **kept)
+        self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,
+                              linewidth=1.0, zorder=7, visible=False, **kept)
         self._heading = tow_heading(run)
         if run.case.get("tow.mode") == "line":
             self._heading = None  # the line itself shows it
