@@ -130,7 +130,7 @@ typedef struct bt_case {
     } solver;
     struct {
         int64_t sample_every;    ///< steps per entry of the series
-        double frame_interval;   ///< s between frames, 0 = 200 frames a run
+        double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
     } output;
@@ -156,8 +156,14 @@ char *bt_case_resolved(const bt_case *c);
 /// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0 without body.
 int bt_case_waterline(const bt_case *c, double *v);
 
+/// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count.
+int bt_case_floe_outline(const bt_floe_def *f, double *v);
+
 /// Mass of the towed body without added mass, kg.
 double bt_case_body_mass(const bt_case *c);
+
+/// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
+int64_t bt_case_steps(const bt_case *c);
 
 /// Reference speed of the solver tolerance, m/s (> 0).
 double bt_case_reference_speed(const bt_case *c);

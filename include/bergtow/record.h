@@ -75,23 +75,30 @@ typedef struct bt_run_totals {
 
 typedef struct bt_record bt_record;
 
-/// Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies.
+/// Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies; the summary and
+/// frames.xdmf of an earlier run in dir are removed. c must stay valid until the record is closed; b is copied.
 /// Errors: BT_ERR_IO with path and remedy.
 bt_status bt_record_open(bt_record **r, const char *dir, const bt_case *c, const bt_record_bodies *b,
                          const char *command_line, bt_errors *err);
 
-/// Take one step's numbers. Buffered; flushed to the file in chunks.
+/// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
+/// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, so that a
+/// running or interrupted result.h5 can be read. After a failure the record takes nothing more, and every call
+/// returns BT_ERR_IO; only the first adds a message.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
 
-/// Take one frame: pose [n_bodies][3] and, for colour, floe contact force [n_floes] N (largest normal force on the
-/// floe in this step). Stored as /frames/pose [T][n_floes][3], /frames/contact_force [T][n_floes] and, for
-/// the rest, /frames/body_pose [T][n_bodies − n_floes][3].
-bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force, bt_errors *err);
+/// Take one frame: pose [n_bodies][3] m, m, rad; floe contact force [n_floes] N (largest normal force on the floe in this
+/// step); speed of the centroid [n_bodies] m/s. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
+/// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies] and, for
+/// ParaView, all vertices in the world frame /frames/points [T][V][2] (single precision).
+bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force,
+                          const double *speed, bt_errors *err);
 
-/// Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error).
+/// Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t = NULL closes a run
+/// that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no summary.
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
-/// Print the end-of-run table (summary and phases) on stdout.
+/// Print the end-of-run table (summary and phases) on stdout. Call it before the record is closed.
 void bt_record_print_summary(const bt_record *r, const bt_run_totals *t);
 
 #endif

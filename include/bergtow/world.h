@@ -23,7 +23,7 @@ typedef enum {
 } bt_motion;
 
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
-typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/M, 1/I with added mass; 0 for infinite
+typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
@@ -57,6 +57,7 @@ typedef struct bt_bodies {
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
     double *outline;      ///< [offset[n]][2] vertices turned by yaw, relative to the centroid, m
+    double *normal;       ///< [offset[n]][2] outward unit normal of the edge that starts at each vertex, turned
     double *path;         ///< [n] length of path travelled by the fastest point of the outline, m (grows only)
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
@@ -64,7 +65,9 @@ typedef struct bt_bodies {
     bt_gid *gid;          ///< [n]
     int64_t *offset;      ///< [n+1] first vertex
     double *vertices;     ///< [offset[n]][2] own frame, m
+    double *normals;      ///< [offset[n]][2] edge normals, own frame
     double *radius;       ///< [n] m
+    double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
     double *friction, *restitution; ///< [n]
     bt_drag *drag;        ///< [n]
@@ -81,6 +84,7 @@ typedef struct bt_params {
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
     int64_t max_sweeps;
     bool warm_start;
+    bool plain_sweeps;     ///< no acceleration between the sweeps (reference)
     double slop;           ///< overlap left alone, m
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s

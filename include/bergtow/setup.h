@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// From a case and its ice field to a world.
+#ifndef BERGTOW_SETUP_H
+#define BERGTOW_SETUP_H
+
+#include "bergtow/case.h"
+#include "bergtow/field.h"
+#include "bergtow/world.h"
+
+/// What the recorder wants to know of the bodies beside their outlines.
+typedef struct bt_roster {
+    bt_idx n_floes;         ///< generated or read, then given by hand
+    double *thickness;      ///< [n bodies] m; draft + sail of the towed body, 0 for walls
+    const char **names;     ///< [n bodies − n_floes]
+    double mean_size;       ///< mean equivalent diameter of the floes, m
+} bt_roster;
+
+/// Build the world of a case: floes of the field, floes given by hand, towed body, walls, in this order. Errors:
+/// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
+bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_roster *r, bt_errors *err);
+
+void bt_roster_free(bt_roster *r);
+
+/// Constants of the step from the case. size: mean floe size, m.
+bt_params bt_setup_params(const bt_case *c, double size);
+
+#endif

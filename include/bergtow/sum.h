@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// Sums whose result does not depend on the order of the terms.
+//
+// Each term is cut to a multiple of 2⁻⁶⁴ and added in 128-bit integer arithmetic, which is associative; so the
+// same terms give the same bits on any number of threads and ranks. A double-precision reduction does not, and a
+// superaccumulator (Collange et al. 2015) keeps bits that no quantity here needs. Terms must stay below
+// 2⁶² ≈ 4.6e18 in magnitude; a larger one, or a NaN, makes the sum NaN instead of wrong.
+#ifndef BERGTOW_SUM_H
+#define BERGTOW_SUM_H
+
+#include <math.h>
+#include <stdbool.h>
+
+__extension__ typedef __int128 bt_int128;
+
+typedef struct bt_sum {
+    bt_int128 v; ///< in units of 2⁻⁶⁴
+    bool bad;
+} bt_sum;
+
+static inline void bt_sum_add(bt_sum *s, double x)
+{
+    if (!(fabs(x) < 0x1p62)) {
+        s->bad = true;
+        return;
+    }
+    s->v += (bt_int128)(x * 0x1p64);
+}
+
+static inline void bt_sum_join(bt_sum *s, const bt_sum *o)
+{
+    s->v += o->v;
+    s->bad |= o->bad;
+}
+
+static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
+
+#endif

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Checks across the keys of a case, and the numbers that follow from them.
+#ifndef BERGTOW_CASE_CHECK_H
+#define BERGTOW_CASE_CHECK_H
+
+#include "bergtow/case.h"
+
+/// Where the value of a key comes from, for messages and to leave out checks on values that were refused already.
+typedef struct bt_origin {
+    int line;        ///< in the case file; 0 = default or override
+    const char *set; ///< the override "key=value", or NULL
+    bool faulty;     ///< refused; the member holds the default
+} bt_origin;
+
+/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err.
+bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
+
+/// "FILE:LINE: KEY", "FILE: KEY" or "--set KEY=VALUE": how a message about a key begins. Truncated to the buffer.
+void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
+
+/// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
+double bt_case_expected_floes(const bt_case *c);
+
+/// Distance of the tow end from its start along the tow direction after time t, with the ramp, m.
+double bt_case_tow_distance(const bt_case *c, double t);
+
+#endif

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// The commands of the program, and what they share.
+#ifndef BERGTOW_CMD_H
+#define BERGTOW_CMD_H
+
+#include "bergtow/case.h"
+
+#include <argp.h>
+
+/// A command: argv[0] is its name. Returns the exit code.
+int bt_cmd_run(int argc, char **argv);
+int bt_cmd_check(int argc, char **argv);
+int bt_cmd_field(int argc, char **argv);
+
+/// The case file and the overrides that every command takes.
+typedef struct bt_cmd_case {
+    const char *path;
+    const char **set; ///< [n_set]
+    int n_set;
+} bt_cmd_case;
+
+/// Parse the arguments of a command: unknown options end the program with code 2 and a suggestion.
+void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input);
+
+/// The argp parser of CASE.yml and --set; put it first among the children. Its input is a bt_cmd_case.
+extern const struct argp bt_cmd_case_argp;
+
+/// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
+int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
+
+/// Print the messages, release them, and return the status as exit code.
+int bt_cmd_end(bt_status status, bt_errors *err);
+
+#endif

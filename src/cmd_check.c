@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// bergtow check: validates a case and prints the numbers that follow from it.
+//
+// Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full scale) and
+// much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
+#include "bergtow/field.h"
+#include "bergtow/shape.h"
+#include "case_check.h"
+#include "cmd.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static const double bytes_per_floe = 2048;     // body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice
+static const double seconds_per_floe_step = 1e-6; // one core in dense ice; the order of magnitude, no more
+static const double gravity = 9.81;
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    (void)arg;
+    if (key != ARGP_KEY_INIT) return ARGP_ERR_UNKNOWN;
+    state->child_inputs[0] = state->input;
+    return 0;
+}
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp check_argp = {.parser = parse, .args_doc = "CASE.yml", .children = children,
+                                       .doc = "Validate a case and print the numbers that follow from it. Nothing is computed or written."};
+
+static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
+
+typedef struct {
+    double count, size, thickness, concentration; // number, mean diameter m, mean thickness m, area fraction
+} ice_numbers;
+
+static ice_numbers ice_of_case(const bt_case *c)
+{
+    ice_numbers n = {.count = bt_case_expected_floes(c) + c->n_floes, .size = c->ice.size, .thickness = c->ice.thickness, .concentration = c->ice.concentration};
+    if (c->ice.size_law == BT_SIZE_POWER) {
+        double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
+        n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) / ((pow(lo, -a) - pow(hi, -a)) / a);
+    }
+    return n;
+}
+
+static ice_numbers ice_of_field(const bt_case *c, const bt_field *f)
+{
+    ice_numbers n = {.count = f->n + c->n_floes, .concentration = f->concentration};
+    for (bt_idx i = 0; i < f->n; i++) {
+        n.size += sqrt(4 * f->area[i] / BT_PI) / f->n;
+        n.thickness += f->thickness[i] / f->n;
+    }
+    return n;
+}
+
+static void print_ice(const bt_case *c, const ice_numbers *n)
+{
+    printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
+    printf("concentration        %.4g\n", n->concentration);
+    printf("floes                %s%.0f%s\n", c->ice.field ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : "");
+    if (n->count < 1) return;
+    printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
+}
+
+static void print_body(const bt_case *c)
+{
+    double v[2 * BT_MAX_VERTICES];
+    int n = bt_case_waterline(c, v);
+    if (!n) {
+        printf("body                 none\n");
+        return;
+    }
+    bt_moments m = bt_shape_moments(n, v);
+    double ahead = c->tow.direction - c->body.yaw, across = bt_shape_width(n, v, cos(ahead), sin(ahead)), along = bt_shape_width(n, v, -sin(ahead), cos(ahead));
+    double mass = bt_case_body_mass(c), displaced = c->water.density * m.area * c->body.draft;
+    printf("body                 %.4g m along the tow, %.4g m across, waterline %.4g m2, draft %.4g m, sail %.4g m\n", along, across, m.area, c->body.draft, c->body.sail);
+    printf("body mass            %.4g kg, %.4g kg with added mass; displaced water %.4g kg (ratio %.3f)\n", mass, mass * (1 + c->body.added_mass), displaced, mass / displaced);
+    printf("domain width / body  %.3g\n", c->domain.width / across);
+    double speed = c->tow.speed;
+    if (c->tow.mode == BT_TOW_NONE) {
+        printf("tow                  none, free drift\n");
+        return;
+    }
+    printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", c->tow.mode == BT_TOW_LINE ? "line" : "speed", speed, bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
+    if (c->tow.mode == BT_TOW_LINE)
+        printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(mass * (1 + c->body.added_mass) * c->tow.line_length / c->tow.line_stiffness));
+}
+
+static void print_step(const bt_case *c, const ice_numbers *n)
+{
+    double speed = bt_case_reference_speed(c), dt = c->run.dt;
+    printf("steps                %" PRId64 " of %g s = %g s\n", bt_case_steps(c), dt, c->run.duration);
+    printf("reference speed      %.4g m/s, contact law solved to %.3g m/s\n", speed, speed * c->solver.tolerance);
+    double longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5;
+    printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(dt <= longest));
+    if (n->count < 1) return;
+    double passed = dt * speed / n->size;
+    printf("time step, floes     moves %.3g floe sizes a step, at most 0.1 (%.3g s to pass a floe): %s\n", passed, n->size / speed, verdict(passed <= 0.1));
+}
+
+static void print_cost(const bt_case *c, const ice_numbers *n)
+{
+    double seconds = n->count * (double)bt_case_steps(c) * seconds_per_floe_step;
+    double frames = c->run.duration / c->output.frame_interval;
+    printf("memory               about %.3g MB\n", n->count * bytes_per_floe / 1e6 + 20);
+    printf("frames               %.0f, about %.3g MB on disk\n", floor(frames) + 1, frames * n->count * 32 / 1e6);
+    printf("wall time            rough estimate %.2g s on one core (1 us a floe and step, dense ice)\n", seconds);
+}
+
+int bt_cmd_check(int argc, char **argv)
+{
+    bt_cmd_case file = {0};
+    bt_cmd_parse(&check_argp, argc, argv, &file);
+    bt_case c;
+    bt_field f;
+    bt_errors err = {0};
+    bt_field_init(&f);
+    bt_status status = bt_case_read(&c, file.path, file.set, file.n_set, &err);
+    if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
+    if (status == BT_OK) {
+        ice_numbers n = c.ice.field ? ice_of_field(&c, &f) : ice_of_case(&c);
+        printf("%s: valid\n", file.path);
+        if (c.run.title) printf("title                %s\n", c.run.title);
+        printf("domain               %g x %g m\n", c.domain.length, c.domain.width);
+        print_ice(&c, &n);
+        print_body(&c);
+        print_step(&c, &n);
+        print_cost(&c, &n);
+    }
+    bt_field_free(&f);
+    bt_case_free(&c);
+    free(file.set);
+    return bt_cmd_end(status, &err);
+}

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: MIT
+// bergtow field: the ice field of a case to an HDF5 file that a case can read back with ice.field.
+#include "bergtow/field.h"
+#include "cmd.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef struct {
+    bt_cmd_case file;
+    const char *output;
+} options;
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'o': o->output = arg; return 0;
+    case ARGP_KEY_END:
+        if (!o->output || !*o->output) argp_error(state, "no output file given; name one with -o FIELD.h5");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option field_options[] = {
+    {"output", 'o', "FIELD.h5", 0, "HDF5 file to write", 0},
+    {0},
+};
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp field_argp = {.options = field_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
+                                       .doc = "Make the ice field of a case and write it; another case reads it with ice.field."};
+
+int bt_cmd_field(int argc, char **argv)
+{
+    options o = {0};
+    bt_cmd_parse(&field_argp, argc, argv, &o);
+    bt_case c;
+    bt_field f;
+    bt_errors err = {0};
+    bt_field_init(&f);
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK && c.ice.field) {
+        bt_errors_add(&err, "%s: ice.field: the case reads its field from %s; remove the key to make one", o.file.path, c.ice.field);
+        status = BT_ERR_CASE;
+    }
+    double start = bt_clock();
+    if (status == BT_OK) status = bt_field_generate(&c, &f, &err);
+    if (status == BT_OK) status = bt_field_write(&f, &c, o.output, &err);
+    if (status == BT_OK)
+        printf("%s: %d floes, concentration %.4f of %.6g m2, made in %.2f s\n", o.output, f.n, f.concentration, f.ice_area, bt_clock() - start);
+    bt_field_free(&f);
+    bt_case_free(&c);
+    free(o.file.set);
+    return bt_cmd_end(status, &err);
+}

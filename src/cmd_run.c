@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+// bergtow run: a case to a result folder.
+#include "bergtow/run.h"
+#include "cmd.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef struct {
+    bt_cmd_case file;
+    bt_run_options run;
+    bool force;
+} options;
+
+enum { KEY_STEPS = 256, KEY_DUMP, KEY_FORCE };
+
+// STEP:FILE.h5
+static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
+{
+    char *colon = strchr(arg, ':');
+    if (!colon || !colon[1]) argp_error(state, "--dump-contacts %s: give STEP:FILE.h5, as in 100:contacts.h5", arg);
+    *colon = 0;
+    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 0, INT64_MAX);
+    run->dump_path = colon + 1;
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'o':
+        if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
+        o->run.dir = arg;
+        return 0;
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 'q': o->run.quiet = true; return 0;
+    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_DUMP: parse_dump(state, arg, &o->run); return 0;
+    case KEY_FORCE: o->force = true; return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option run_options[] = {
+    {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
+    {"threads", 't', "N", 0, "OpenMP threads, default run.threads of the case, or all cores; the result does not depend on it", 0},
+    {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
+    {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
+    {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
+    {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
+    {0},
+};
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp run_argp = {.options = run_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
+                                     .doc = "Tow the body of a case through its ice and write a result folder."};
+
+// out/NAME for path/NAME.yml
+static char *default_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
+    char *folder = NULL;
+    if (asprintf(&folder, "out/%.*s", yaml ? (int)(dot - name) : (int)strlen(name), name) < 0) abort();
+    return folder;
+}
+
+// The command as it could be typed again, for the provenance of the result. argv[0] is the command.
+static char *join(int argc, char **argv)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) abort();
+    fputs("bergtow", out);
+    for (int i = 0; i < argc; i++) {
+        bool safe = *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") == strlen(argv[i]);
+        fputs(safe ? " " : " '", out);
+        for (const char *s = argv[i]; *s; s++) {
+            if (*s == '\'') fputs("'\\''", out);
+            else fputc(*s, out);
+        }
+        if (!safe) fputc('\'', out);
+    }
+    fclose(out);
+    return text;
+}
+
+// A long run must not take the place of another by a slip of the hand.
+static bt_status check_folder(const char *dir, bool force, bt_errors *err)
+{
+    char *result = NULL;
+    if (asprintf(&result, "%s/result.h5", dir) < 0) abort();
+    bool taken = !access(result, F_OK);
+    if (taken && !force) bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+    free(result);
+    return taken && !force ? BT_ERR_IO : BT_OK;
+}
+
+int bt_cmd_run(int argc, char **argv)
+{
+    options o = {.run = {.dump_step = -1}};
+    char *command_line = join(argc, argv);
+    o.run.command_line = command_line;
+    bt_cmd_parse(&run_argp, argc, argv, &o);
+    char *folder = o.run.dir ? NULL : default_folder(o.file.path);
+    if (folder) o.run.dir = folder;
+
+    bt_case c;
+    bt_errors err = {0};
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK) status = check_folder(o.run.dir, o.force, &err);
+    if (status == BT_OK) status = bt_run(&c, &o.run, &err);
+    bt_case_free(&c);
+    free(o.file.set);
+    free(folder);
+    free(command_line);
+    return bt_cmd_end(status, &err);
+}

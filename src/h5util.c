@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// HDF5 with one way to fail: every call's result goes through a handle that keeps the first error.
+#include "h5util.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fileio.h"
+#include "h5driver.h"
+
+static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
+{
+    if (n == 0 && e->desc) snprintf(data, 200, "%s", e->desc);
+    return 0;
+}
+
+/// Report as "path: cannot ACTION: reason; remedy" and mark the handle as failed.
+static void fail(bt_h5 *h, const char *action)
+{
+    if (h->status != BT_OK) return;
+    if (*h->errnum) {
+        h->status = bt_file_fail(h->path, action, *h->errnum, h->err);
+        return;
+    }
+    char text[200] = "unknown reason";
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, innermost_text, text);
+    h->status = BT_ERR_IO;
+    bt_errors_add(h->err, "%s: cannot %s: HDF5: %s; %s", h->path, action, text, bt_file_remedy(0));
+}
+
+/// After writes: HDF5's own word, and what the driver has not told it.
+static void check(bt_h5 *h, bool done)
+{
+    if (!done || *h->errnum) fail(h, "write the file");
+}
+
+bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
+{
+    *h = (bt_h5){.file = -1, .path = strdup(path), .status = BT_OK, .errnum = bt_alloc(1, sizeof(int)), .err = err};
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    bool set = bt_h5driver_select(access, h->errnum) >= 0;
+    // Metadata stays in memory between flushes, so that a reader, or an interrupted run, finds the state of the last flush.
+    H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
+    set = set && H5Pget_mdc_config(access, &cache) >= 0;
+    cache.evictions_enabled = 0;
+    cache.incr_mode = H5C_incr__off;
+    cache.flash_incr_mode = H5C_flash_incr__off;
+    cache.decr_mode = H5C_decr__off;
+    set = set && H5Pset_mdc_config(access, &cache) >= 0;
+    if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+    if (h->file < 0) fail(h, "create the file");
+    H5Pclose(access);
+    if (h->status != BT_OK) bt_h5_close(h);
+    return h->status;
+}
+
+void bt_h5_flush(bt_h5 *h)
+{
+    if (h->status != BT_OK) return;
+    check(h, H5Fflush(h->file, H5F_SCOPE_LOCAL) >= 0);
+}
+
+bt_status bt_h5_close(bt_h5 *h)
+{
+    if (h->file >= 0) {
+        bt_h5_flush(h);
+        check(h, H5Fclose(h->file) >= 0);
+    }
+    free(h->path);
+    free(h->errnum);
+    const bt_status status = h->status;
+    *h = (bt_h5){.file = -1, .status = status};
+    return status;
+}
+
+void bt_h5_group(bt_h5 *h, const char *name)
+{
+    if (h->status != BT_OK) return;
+    const hid_t g = H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    check(h, g >= 0 && H5Gclose(g) >= 0);
+}
+
+/// Creation properties under which two runs of one case give the same file contents.
+static hid_t quiet_creation(void)
+{
+    const hid_t p = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_obj_track_times(p, 0);
+    return p;
+}
+
+static void write_in_space(bt_h5 *h, const char *name, hid_t type, hid_t mem, hid_t space, const void *data)
+{
+    const hid_t create = quiet_creation();
+    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
+    check(h, d >= 0 && (!filled || H5Dwrite(d, mem, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
+    if (d >= 0) check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    H5Pclose(create);
+}
+
+void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
+{
+    if (h->status != BT_OK) return;
+    const hid_t space = H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL);
+    write_in_space(h, name, mem, mem, space, data);
+    H5Sclose(space);
+}
+
+static hid_t text_type(size_t size)
+{
+    const hid_t t = H5Tcopy(H5T_C_S1);
+    H5Tset_size(t, size);
+    H5Tset_cset(t, H5T_CSET_UTF8);
+    return t;
+}
+
+void bt_h5_write_text(bt_h5 *h, const char *name, const char *text)
+{
+    if (h->status != BT_OK) return;
+    const hid_t type = text_type(strlen(text) + 1), space = H5Screate(H5S_SCALAR);
+    write_in_space(h, name, type, type, space, text);
+    H5Sclose(space);
+    H5Tclose(type);
+}
+
+void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names)
+{
+    if (h->status != BT_OK) return;
+    const hid_t type = text_type(H5T_VARIABLE), space = H5Screate_simple(1, &n, NULL);
+    write_in_space(h, name, type, type, space, names);
+    H5Sclose(space);
+    H5Tclose(type);
+}
+
+static void attr(bt_h5 *h, const char *object, const char *name, hid_t type, const void *value)
+{
+    if (h->status != BT_OK) return;
+    const hid_t space = H5Screate(H5S_SCALAR), o = H5Oopen(h->file, object, H5P_DEFAULT);
+    if (o >= 0 && H5Aexists(o, name) > 0) H5Adelete(o, name);
+    const hid_t a = o < 0 ? -1 : H5Acreate2(o, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    check(h, a >= 0 && H5Awrite(a, type, value) >= 0);
+    if (a >= 0) H5Aclose(a);
+    if (o >= 0) H5Oclose(o);
+    H5Sclose(space);
+}
+
+// Variable length: a fixed-length attribute can be neither empty nor longer than 64 kB.
+void bt_h5_attr_text(bt_h5 *h, const char *object, const char *name, const char *text)
+{
+    const hid_t type = text_type(H5T_VARIABLE);
+    attr(h, object, name, type, &text);
+    H5Tclose(type);
+}
+
+void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t value)
+{
+    attr(h, object, name, H5T_NATIVE_INT64, &value);
+}
+
+void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value)
+{
+    attr(h, object, name, H5T_NATIVE_DOUBLE, &value);
+}
+
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool deflate)
+{
+    if (h->status != BT_OK) return -1;
+    hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk};
+    for (int k = 1; k < rank; k++) {
+        now[k] = dims[k - 1];
+        // A chunk is neither empty nor larger than a fixed dimension: an empty dimension gets room for one.
+        most[k] = piece[k] = now[k] ? now[k] : 1;
+    }
+    const hid_t space = H5Screate_simple(rank, now, most), create = quiet_creation();
+    H5Pset_chunk(create, rank, piece);
+    if (deflate) {
+        H5Pset_shuffle(create);
+        H5Pset_deflate(create, 4);
+    }
+    const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
+    check(h, d >= 0);
+    H5Pclose(create);
+    H5Sclose(space);
+    return d;
+}
+
+void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data)
+{
+    if (h->status != BT_OK || n == 0) return;
+    hid_t space = H5Dget_space(dataset);
+    hsize_t size[3] = {0}, start[3] = {at};
+    const int rank = H5Sget_simple_extent_dims(space, size, NULL);
+    H5Sclose(space);
+    size[0] = at + n;
+    check(h, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
+    if (h->status != BT_OK) return;
+    space = H5Dget_space(dataset);
+    size[0] = n;
+    const hid_t here = H5Screate_simple(rank, size, NULL);
+    const bool filled = H5Sget_simple_extent_npoints(here) > 0;
+    check(h, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+                 (!filled || H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) >= 0));
+    H5Sclose(here);
+    H5Sclose(space);
+}

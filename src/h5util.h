@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+// HDF5 with one way to fail: every call's result goes through a handle that keeps the first error.
+#ifndef BT_H5UTIL_H
+#define BT_H5UTIL_H
+
+#include <hdf5.h>
+
+#include "bergtow/base.h"
+
+/// An open file and its state. After a failure every function below does nothing, so that a sequence of
+/// writes needs one check at its end.
+typedef struct bt_h5 {
+    hid_t file;
+    char *path;
+    bt_status status;
+    int *errnum;    ///< first error of the file system, see h5driver.h
+    bt_errors *err; ///< where the next error goes; the caller of each public function sets it
+} bt_h5;
+
+/// Create (truncate) a file that other programs may read while it is being written.
+bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
+/// Push everything to the file system.
+void bt_h5_flush(bt_h5 *h);
+/// Close; releases the path. Returns the status of the whole, this call included.
+bt_status bt_h5_close(bt_h5 *h);
+
+void bt_h5_group(bt_h5 *h, const char *name);
+/// Whole dataset [n] (width 0) or [n][width], contiguous. mem: H5T_NATIVE_...
+void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data);
+void bt_h5_write_text(bt_h5 *h, const char *name, const char *text);                         ///< scalar, UTF-8
+void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names);     ///< [n], UTF-8
+/// Attributes of an object ("/" for the root). A second write replaces the first.
+void bt_h5_attr_text(bt_h5 *h, const char *object, const char *name, const char *text);
+void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t value);
+void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value);
+
+/// A dataset of rank 1 to 3 that grows along its first dimension from zero; the others are dims[rank − 1].
+/// chunk: entries of the first dimension in a chunk. deflate: shuffle and deflate too. Returns −1 on failure.
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool deflate);
+/// Append n entries along the first dimension, which has `at` entries now.
+void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data);
+
+#endif

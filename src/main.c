@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// The program bergtow: options that need no command, and the way to the commands.
+#include "cmd.h"
+#include "revision.h"
+#include "suggest.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct {
+    const char *name, *summary;
+    int (*run)(int argc, char **argv);
+} commands[] = {
+    {"run", "tow the body through the ice and write a result folder", bt_cmd_run},
+    {"check", "validate a case and print the numbers that follow from it", bt_cmd_check},
+    {"field", "make the ice field of a case only", bt_cmd_field},
+};
+enum { N_COMMANDS = sizeof commands / sizeof *commands };
+
+static void print_version(FILE *out, struct argp_state *state)
+{
+    (void)state;
+    fprintf(out, "bergtow %s (%s, %s)\n", BT_VERSION, BT_REVISION, BT_COMPILER);
+}
+
+static void print_help(FILE *out)
+{
+    fputs("Usage: bergtow COMMAND [OPTION...]\n"
+          "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
+    for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-12s %s\n", commands[i].name, commands[i].summary);
+    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning\n"
+          "  --version    version, revision and compiler\n"
+          "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
+          "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
+          "6 stopped on a signal.\n", out);
+}
+
+static int refuse_word(const char *kind, const char *word, const char *const *known)
+{
+    const char *near = bt_suggest(word, known);
+    if (near) fprintf(stderr, "bergtow: %s: unknown %s; did you mean %s?\n", word, kind, near);
+    else fprintf(stderr, "bergtow: %s: unknown %s; see bergtow --help\n", word, kind);
+    return BT_ERR_USAGE;
+}
+
+// Ranks that each run the whole case and write the same folder would spoil it.
+static bool several_ranks(void)
+{
+    const char *size = getenv("OMPI_COMM_WORLD_SIZE"), *rank = getenv("OMPI_COMM_WORLD_RANK");
+    if (!size || atoi(size) <= 1) return false;
+    if (!rank || atoi(rank) == 0)
+        fprintf(stderr, "bergtow: started on %s ranks, but this version runs on one; start it without mpirun and use --threads N\n", size);
+    return true;
+}
+
+int main(int argc, char **argv)
+{
+    argp_err_exit_status = BT_ERR_USAGE;
+    argp_program_version_hook = print_version;
+    if (argc < 2) {
+        print_help(stderr);
+        return BT_ERR_USAGE;
+    }
+    const char *word = argv[1];
+    bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
+    if (help) print_help(stdout);
+    else if (version) print_version(stdout, NULL);
+    else if (!strcmp(word, "--list-keys")) bt_case_list_keys(stdout);
+    if (help || version || !strcmp(word, "--list-keys")) return fflush(stdout) ? BT_ERR_IO : BT_OK;
+
+    if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
+    const char *names[N_COMMANDS + 1] = {NULL};
+    for (int i = 0; i < N_COMMANDS; i++) {
+        names[i] = commands[i].name;
+        if (!strcmp(word, names[i])) return several_ranks() ? BT_ERR_USAGE : commands[i].run(argc - 1, argv + 1);
+    }
+    return refuse_word("command", word, names);
+}

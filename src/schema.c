@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+// The table of keys of a case file.
+//
+// Sources named in the sentences:
+//   [Yulmetov & Løset 2017]  Cold Reg. Sci. Technol. 138: broken-ice towing tests and their numerical model
+//   [Hunke & Comeau 2011]    J. Geophys. Res. 116, C05008: icebergs in sea ice, drag coefficients
+//   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
+//   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
+//   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
+// "assumed" is a choice of this program without a measurement behind it.
+#include "schema.h"
+
+#include "suggest.h"
+#include "value.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const frames[] = {"basin", "geographic", NULL};
+static const char *const bounds[] = {"wall", "periodic", "open", NULL};
+static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NULL};
+static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
+static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
+static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
+static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
+static const char *const tow_modes[] = {"none", "speed", "line", NULL};
+static const char *const tilts[] = {"none", "slope", "geostrophic", NULL};
+
+#define AT(member) .offset = offsetof(bt_case, member)
+#define REAL(key, member, kind, preset_, range_, doc_) \
+    {.name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member), .doc = doc_}
+#define INT(key, member, preset_, range_, doc_) \
+    {.name = key, .type = BT_KEY_INT, .preset = preset_, .range = range_, AT(member), .doc = doc_}
+#define BOOL(key, member, preset_, doc_) {.name = key, .type = BT_KEY_BOOL, .preset = preset_, AT(member), .doc = doc_}
+#define TEXT(key, member, preset_, doc_) {.name = key, .type = BT_KEY_TEXT, .preset = preset_, AT(member), .doc = doc_}
+#define CHOICE(key, member, names, preset_, doc_) \
+    {.name = key, .type = BT_KEY_CHOICE, .choices = names, .preset = preset_, AT(member), .doc = doc_}
+
+// Ranges guard against slips of units and against values the model has no meaning for; they are wide on purpose.
+#define ANYWHERE "[-1e7, 1e7]"
+#define ANY_SPEED "[-100, 100]"
+
+const bt_key bt_case_keys[] = {
+    TEXT("run.title", run.title, "none", "one line for the reports"),
+    REAL("run.dt", run.dt, TIME, NULL, "(0, 1000]",
+         "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at most 5 s at full scale [Yulmetov & Løset 2017]"),
+    REAL("run.duration", run.duration, TIME, NULL, "(0, 1e9]", "simulated time"),
+    INT("run.threads", run.threads, "0", "[0, 1024]", "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
+
+    CHOICE("domain.frame", domain.frame, frames, "basin",
+           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
+    REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "extent along x; the default is HSVA's large ice tank, from memory"),
+    REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
+    REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
+    REAL("domain.y0", domain.y0, LENGTH, "= -width/2", ANYWHERE, "low corner of the domain"),
+    CHOICE("domain.ends", domain.ends, bounds, "wall", "boundaries at the ends of x"),
+    CHOICE("domain.sides", domain.sides, bounds, "wall", "boundaries at the ends of y"),
+    REAL("domain.wall_friction", domain.wall_friction, RATIO, "0.1", "[0, 10]", "Coulomb coefficient between ice or body and walls, assumed"),
+    REAL("domain.wall_restitution", domain.wall_restitution, RATIO, "0", "[0, 1]", "restitution at walls, assumed"),
+    REAL("domain.ends_closing", domain.ends_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each end wall"),
+    REAL("domain.sides_closing", domain.sides_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each side wall"),
+
+    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "area fraction of ice in the ice region less the body's footprint, 0 = open water"),
+    REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
+    REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
+    REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
+    REAL("ice.y_max", ice.y_max, LENGTH, "= domain.y0 + domain.width", ANYWHERE, "ice region, high end of y"),
+    CHOICE("ice.shape", ice.shape, ice_shapes, "voronoi", "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
+    INT("ice.sides", ice.sides, "6", "[3, 32]", "corners of the floes of shape polygons"),
+    REAL("ice.aspect", ice.aspect, RATIO, "1", "[1, 10]", "length / width of the floes of shape rectangles"),
+    REAL("ice.size", ice.size, LENGTH, "1 m", "(0, 1e5]",
+         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale [Yulmetov & Løset 2017]"),
+    CHOICE("ice.size_law", ice.size_law, size_laws, "single", "distribution of the diameter"),
+    REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the diameter, laws single and lognormal, assumed"),
+    REAL("ice.size_min", ice.size_min, LENGTH, "0 m", "[0, 1e5]", "smallest diameter, needed by law power; 0 = no limit"),
+    REAL("ice.size_max", ice.size_max, LENGTH, "0 m", "[0, 1e5]", "largest diameter, needed by law power; 0 = no limit"),
+    REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
+         "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
+    REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
+    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes"),
+    REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
+    REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
+    REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",
+         "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & Løset 2013]"),
+    REAL("ice.restitution", ice.restitution, RATIO, "0", "[0, 1]", "restitution of floe collisions, assumed"),
+    REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
+    REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
+    REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag of the floe's edge in water [Hunke & Comeau 2011]"),
+    REAL("ice.drag.water_skin", ice.drag.water_skin, RATIO, "5.5e-3", "[0, 10]", "skin drag of water under a floe [Hunke & Comeau 2011]"),
+    REAL("ice.drag.air_form", ice.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag of the floe's edge in air [Hunke & Comeau 2011]"),
+    REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]", "skin drag of air over a floe [Hunke & Comeau 2011]"),
+    INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
+    REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
+    TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
+
+    CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
+    REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]", "length of a named shape along its own x, assumed"),
+    REAL("body.width", body.width, LENGTH, "= body.length", "(0, 1e5]", "width of a named shape"),
+    {.name = "body.vertices", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = "[-1e5, 1e5]", AT(body.vertices),
+     .offset_count = offsetof(bt_case, body.n_vertices), .doc = "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
+    REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin), 0 (geographic)", ANYWHERE, "centroid at time zero"),
+    REAL("body.y", body.y, LENGTH, "0 m", ANYWHERE, "centroid at time zero"),
+    REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the body's own x from the x axis towards y at time zero"),
+    REAL("body.vx", body.vx, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero, tow modes none and line"),
+    REAL("body.vy", body.vy, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero, tow modes none and line"),
+    REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero, tow modes none and line"),
+    REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]", "depth below the waterline, assumed"),
+    REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]", "height above the waterline"),
+    REAL("body.density", body.density, DENSITY, "900 kg/m3", "[1, 2e4]", "density of the body, for its mass when none is given [Hunke & Comeau 2011]"),
+    REAL("body.mass", body.mass, MASS, "0 kg", "[0, 1e13]", "mass without added mass; 0 = density x waterline area x (draft + sail)"),
+    REAL("body.added_mass", body.added_mass, RATIO, "0.5", "[0, 10]", "added mass / mass [Hunke & Comeau 2011]"),
+    REAL("body.added_inertia", body.added_inertia, RATIO, "0.5", "[0, 10]", "added moment of inertia / its own, assumed equal to the added mass"),
+    REAL("body.friction", body.friction, RATIO, "= ice.friction", "[0, 10]", "Coulomb coefficient ice on body"),
+    REAL("body.restitution", body.restitution, RATIO, "= ice.restitution", "[0, 1]", "restitution ice on body"),
+    REAL("body.drag.water_form", body.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag over the draft [Hunke & Comeau 2011]"),
+    REAL("body.drag.water_skin", body.drag.water_skin, RATIO, "5e-4", "[0, 10]", "skin drag of water under the body [Hunke & Comeau 2011]"),
+    REAL("body.drag.air_form", body.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag over the sail [Hunke & Comeau 2011]"),
+    REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]", "skin drag of air over the body [Hunke & Comeau 2011]"),
+
+    CHOICE("tow.mode", tow.mode, tow_modes, "speed", "none: free drift; speed: the body's velocity is prescribed; line: a carriage pulls it on a line"),
+    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed) or of the carriage (mode line) [Yulmetov & Løset 2017]"),
+    REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow from the x axis towards y"),
+    REAL("tow.ramp", tow.ramp, TIME, "5 s", "[0, 1e6]", "time in which the speed rises linearly from 0, assumed"),
+    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, mode line, assumed"),
+    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "10 kN", "[0, 1e12]", "EA: tension per unit of relative stretch, mode line, assumed"),
+    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]", "tension per stretching speed, mode line, assumed"),
+    REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own x"),
+    REAL("tow.hull_y", tow.hull_y, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
+
+    REAL("water.density", water.density, DENSITY, "1027 kg/m3", "[500, 2000]", "density of the water [Hunke & Comeau 2011]"),
+    REAL("water.current_x", water.current_x, SPEED, "0 m/s", ANY_SPEED, "current along x"),
+    REAL("water.current_y", water.current_y, SPEED, "0 m/s", ANY_SPEED, "current along y"),
+    REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]", "latitude of the Coriolis force, 0 = no Coriolis force"),
+    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none, given by its slope, or in geostrophic balance with the current"),
+    REAL("water.slope_x", water.slope_x, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along x, for tilt slope"),
+    REAL("water.slope_y", water.slope_y, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along y, for tilt slope"),
+
+    REAL("air.density", air.density, DENSITY, "1.29 kg/m3", "[0, 10]", "density of the air [Hunke & Comeau 2011]"),
+    REAL("air.wind_x", air.wind_x, SPEED, "0 m/s", ANY_SPEED, "wind along x"),
+    REAL("air.wind_y", air.wind_y, SPEED, "0 m/s", ANY_SPEED, "wind along y"),
+
+    REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
+    REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
+    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "sweeps after which a step is left and counted as not converged, assumed"),
+    BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
+    REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]", "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the projection]"),
+    INT("solver.position_sweeps", solver.position_sweeps, "50", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
+    REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
+
+    INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
+    REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
+    REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
+    REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+
+    REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]", "measured mean ice resistance, shown beside the computed one"),
+    TEXT("reference.source", reference.source, "none", "where the measured force was published"),
+};
+const int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys;
+
+#undef AT
+#define AT(member) .offset = offsetof(bt_floe_def, member)
+
+const bt_key bt_floe_keys[] = {
+    CHOICE("shape", shape, floe_shapes, "disc", "outline of the floe"),
+    REAL("length", length, LENGTH, "none", "(0, 1e5]", "length of a named shape along its own x, needed unless the shape is polygon"),
+    REAL("width", width, LENGTH, "= length", "(0, 1e5]", "width of a named shape"),
+    {.name = "vertices", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = "[-1e5, 1e5]", AT(vertices),
+     .offset_count = offsetof(bt_floe_def, n_vertices), .doc = "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
+    REAL("x", x, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
+    REAL("y", y, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
+    REAL("yaw", yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the floe's own x from the x axis towards y"),
+    REAL("vx", vx, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero"),
+    REAL("vy", vy, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero"),
+    REAL("yaw_rate", yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero"),
+    REAL("thickness", thickness, LENGTH, "= ice.thickness", "(0, 100]", "thickness"),
+    BOOL("fixed", fixed, "false", "at rest for ever, as a structure or grounded ice"),
+};
+const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
+
+int bt_schema_find(const bt_key *keys, int n, const char *name)
+{
+    for (int i = 0; i < n; i++)
+        if (!strcmp(keys[i].name, name)) return i;
+    return -1;
+}
+
+bool bt_schema_is_section(const char *name)
+{
+    size_t n = strlen(name);
+    for (int i = 0; i < bt_n_case_keys; i++)
+        if (!strncmp(bt_case_keys[i].name, name, n) && bt_case_keys[i].name[n] == '.') return true;
+    return false;
+}
+
+static const char *last_part(const char *name)
+{
+    const char *dot = strrchr(name, '.');
+    return dot ? dot + 1 : name;
+}
+
+const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64])
+{
+    int least = bt_suggest_limit(name) + 1;
+    const char *best = NULL;
+    // A known last part in the wrong section counts as one edit: run.seed is nearer to ice.seed than to anything else.
+    for (int i = 0; i < n; i++) {
+        int d = bt_suggest_distance(name, keys[i].name);
+        if (d > 1 && !strcmp(last_part(name), last_part(keys[i].name))) d = 1;
+        if (d < least) {
+            least = d;
+            best = keys[i].name;
+        }
+    }
+    if (keys != bt_case_keys) return best;
+    for (int i = 0; i < n; i++)
+        for (const char *dot = strchr(keys[i].name, '.'); dot; dot = strchr(dot + 1, '.')) {
+            char section[64] = {0};
+            memcpy(section, keys[i].name, (size_t)(dot - keys[i].name));
+            int d = bt_suggest_distance(name, section);
+            if (d >= least) continue;
+            least = d;
+            memcpy(buffer, section, sizeof section);
+            best = buffer;
+        }
+    if (bt_suggest_distance(name, "floes") < least) best = "floes";
+    return best;
+}
+
+void bt_schema_preset(const bt_key *keys, int n, void *base)
+{
+    char why[BT_WHY];
+    for (int i = 0; i < n; i++) {
+        const bt_key *k = &keys[i];
+        if (k->type == BT_KEY_POINTS) continue;
+        char *member = (char *)base + k->offset;
+        // Every preset is read without complaint: tests/unit/test_case.c. NaN stands for "not given" in a real.
+        if (k->preset && k->preset[0] != '=') bt_value_read(k, base, k->preset, true, why);
+        else if (k->type == BT_KEY_REAL) memcpy(member, &(double){NAN}, sizeof(double));
+    }
+}
+
+void bt_schema_release(const bt_key *keys, int n, void *base)
+{
+    for (int i = 0; i < n; i++) {
+        if (keys[i].type != BT_KEY_TEXT && keys[i].type != BT_KEY_POINTS) continue;
+        void *p;
+        memcpy(&p, (char *)base + keys[i].offset, sizeof p);
+        free(p);
+        memset((char *)base + keys[i].offset, 0, sizeof p);
+    }
+}

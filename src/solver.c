@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: MIT
+// Rows, colours and projected Gauss–Seidel sweeps; equations and layout in bergtow/solver.h.
+#include "bergtow/solver.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "anderson.h"
+#include "bergtow/sum.h"
+#include "bergtow/tow.h"
+
+#define SEQUENTIAL BT_MAX_COLOURS ///< colour of the manifolds done one after the other
+#define MIN_PARALLEL_ROWS 3000    ///< fewer rows than this are swept faster by one thread (barriers)
+
+bt_solver *bt_solver_create(void)
+{
+    bt_solver *s = bt_alloc(1, sizeof *s);
+    s->anderson = bt_alloc(1, sizeof *s->anderson);
+    return s;
+}
+
+void bt_solver_free(bt_solver *s)
+{
+    if (!s) return;
+    bt_anderson_free(s->anderson);
+    void *arrays[] = {s->rows, s->unit, s->row_of, s->used, s->colour, s->shift, s->push, s->step, s->scale, s->anderson};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    free(s);
+}
+
+static void reserve(bt_solver *s, bt_idx n_rows, bt_idx n_man, bt_idx n_bodies)
+{
+    if (n_rows > s->cap_rows) {
+        s->cap_rows = n_rows + n_rows / 4;
+        free(s->rows);
+        s->rows = bt_alloc_aligned((size_t)s->cap_rows, sizeof *s->rows);
+        s->step = bt_realloc(s->step, 2 * (size_t)s->cap_rows, sizeof *s->step);
+        s->scale = bt_realloc(s->scale, 2 * (size_t)s->cap_rows, sizeof *s->scale);
+        s->push = bt_realloc(s->push, (size_t)s->cap_rows, sizeof *s->push);
+    }
+    if (n_man >= s->cap_man) { // also the first time, when there is none
+        s->cap_man = n_man + n_man / 4 + 1;
+        s->row_of = bt_realloc(s->row_of, (size_t)s->cap_man, sizeof *s->row_of);
+        s->colour = bt_realloc(s->colour, (size_t)s->cap_man, sizeof *s->colour);
+        s->unit = bt_realloc(s->unit, (size_t)s->cap_man + 1, sizeof *s->unit);
+    }
+    if (n_bodies > s->cap_bodies) {
+        s->cap_bodies = n_bodies;
+        s->used = bt_realloc(s->used, (size_t)n_bodies, sizeof *s->used);
+        free(s->shift);
+        s->shift = bt_alloc_aligned((size_t)n_bodies, sizeof *s->shift);
+    }
+}
+
+/// First-fit colours in the order of the manifolds; fills colour and the units' starts by colour.
+static void colour_manifolds(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    const bt_contacts *c = w->contacts;
+    const bt_bodies *b = &w->bodies;
+    memset(s->used, 0, (size_t)b->n * sizeof *s->used);
+    bt_idx count[BT_MAX_COLOURS + 1] = {0};
+    int n_colours = 0;
+    for (bt_idx k = 0; k < c->n_man; k++) {
+        bt_idx i = c->man[k].a, j = c->man[k].b;
+        bool move_i = b->inv[i].m > 0, move_j = b->inv[j].m > 0;
+        uint64_t used = (move_i ? s->used[i] : 0) | (move_j ? s->used[j] : 0);
+        int colour = SEQUENTIAL;
+        if (!(move_i && b->large[i]) && !(move_j && b->large[j]) && ~used) {
+            colour = __builtin_ctzll(~used);
+            if (move_i) s->used[i] |= (uint64_t)1 << colour;
+            if (move_j) s->used[j] |= (uint64_t)1 << colour;
+            if (colour >= n_colours) n_colours = colour + 1;
+        }
+        s->colour[k] = (uint8_t)colour;
+        count[colour]++;
+    }
+    s->n_colours = n_colours;
+    s->start[0] = 0;
+    for (int k = 0; k < n_colours; k++) s->start[k + 1] = s->start[k] + count[k];
+    s->start[n_colours + 1] = s->start[n_colours] + count[SEQUENTIAL];
+}
+
+static double normal_velocity(const bt_row *r, const bt_vel *va, const bt_vel *vb)
+{
+    return r->nx * (vb->x - va->x) + r->ny * (vb->y - va->y) + r->rbn * vb->w - r->ran * va->w;
+}
+
+static double tangent_velocity(const bt_row *r, const bt_vel *va, const bt_vel *vb)
+{
+    return r->nx * (vb->y - va->y) - r->ny * (vb->x - va->x) + r->rbt * vb->w - r->rat * va->w;
+}
+
+/// Normal bias b of model equation (1).
+static double bias_of(const bt_world *w, const bt_row *r, double restitution)
+{
+    const bt_bodies *b = &w->bodies;
+    if (restitution > 0) {
+        // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
+        // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
+        // from the slop on, or rounding would decide which of two points of a square hit rebounds.
+        double approach = normal_velocity(r, &b->vel_start[r->a], &b->vel_start[r->b]);
+        double closing = normal_velocity(r, &b->vel_free[r->a], &b->vel_free[r->b]);
+        if (approach < -w->par.rest_speed && r->gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
+            return restitution * approach;
+    }
+    return bt_max(r->gap, 0) / w->par.dt;
+}
+
+static void fill_row(const bt_world *w, const bt_manifold *m, const bt_point *p, bt_row *r)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
+    const double nx = m->nx, ny = m->ny;
+    *r = (bt_row){
+        .a = m->a,
+        .b = m->b,
+        .nx = nx,
+        .ny = ny,
+        .ran = p->ra[0] * ny - p->ra[1] * nx,
+        .rbn = p->rb[0] * ny - p->rb[1] * nx,
+        .rat = p->ra[0] * nx + p->ra[1] * ny,
+        .rbt = p->rb[0] * nx + p->rb[1] * ny,
+        .mu = b->friction[m->b],
+        .ln = p->ln,
+        .lt = p->lt,
+        .gap = p->gap,
+    };
+    r->mn = 1 / (ia.m + ib.m + ia.i * r->ran * r->ran + ib.i * r->rbn * r->rbn);
+    r->mt = 1 / (ia.m + ib.m + ia.i * r->rat * r->rat + ib.i * r->rbt * r->rbt);
+    r->bias = bias_of(w, r, b->restitution[m->b]);
+    if (!w->par.warm_start) r->ln = r->lt = 0;
+}
+
+void bt_solver_prepare(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    const bt_contacts *c = w->contacts;
+    reserve(s, (bt_idx)c->n_points, c->n_man, w->bodies.n);
+    s->n_rows = (bt_idx)c->n_points;
+    colour_manifolds(w);
+
+    // Units (manifolds by colour), their first rows, then the rows themselves.
+    bt_idx next[BT_MAX_COLOURS + 1];
+    memcpy(next, s->start, (size_t)s->n_colours * sizeof *next);
+    next[SEQUENTIAL] = s->start[s->n_colours];
+    bt_idx *unit_man = (bt_idx *)s->row_of; // scratch: manifold of each unit, until row_of takes its place
+    bt_idx n_units = c->n_man;
+    for (bt_idx k = 0; k < n_units; k++) unit_man[next[s->colour[k]]++] = k;
+    bt_idx row = 0;
+    for (bt_idx u = 0; u < n_units; u++) {
+        s->unit[u] = row;
+        const bt_manifold *m = &c->man[unit_man[u]];
+        for (int i = 0; i < m->n_points; i++, row++) {
+            fill_row(w, m, &m->p[i], &s->rows[row]);
+            s->scale[2 * row] = 1 / sqrt(s->rows[row].mn);
+            s->scale[2 * row + 1] = 1 / sqrt(s->rows[row].mt);
+        }
+    }
+    s->unit[n_units] = row;
+    memcpy(next, s->start, (size_t)s->n_colours * sizeof *next);
+    next[SEQUENTIAL] = s->start[s->n_colours];
+    for (bt_idx k = 0; k < n_units; k++) s->row_of[k] = s->unit[next[s->colour[k]]++];
+}
+
+/// Add impulse (ln, lt) of a row to both bodies. Bodies of infinite mass are never written: they are shared by rows
+/// of one colour.
+static inline void apply(const bt_row *r, double ln, double lt, bt_vel *v, const bt_inv *inv)
+{
+    const double jx = ln * r->nx - lt * r->ny, jy = ln * r->ny + lt * r->nx;
+    const bt_inv ia = inv[r->a], ib = inv[r->b];
+    if (ia.m > 0) {
+        v[r->a].x -= ia.m * jx;
+        v[r->a].y -= ia.m * jy;
+        v[r->a].w -= ia.i * (ln * r->ran + lt * r->rat);
+    }
+    if (ib.m > 0) {
+        v[r->b].x += ib.m * jx;
+        v[r->b].y += ib.m * jy;
+        v[r->b].w += ib.i * (ln * r->rbn + lt * r->rbt);
+    }
+}
+
+static inline double clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
+
+/// Gauss–Seidel update of one contact point, normal then tangent; returns the larger correction, m/s.
+static inline double update_row(bt_row *r, bt_vel *v, const bt_inv *inv, double step[2])
+{
+    double wn = normal_velocity(r, &v[r->a], &v[r->b]) + r->bias;
+    double dn = bt_max(0, r->ln - wn * r->mn) - r->ln;
+    r->ln += dn;
+    apply(r, dn, 0, v, inv);
+    double wt = tangent_velocity(r, &v[r->a], &v[r->b]);
+    double dt = clamp(r->lt - wt * r->mt, r->mu * r->ln) - r->lt;
+    r->lt += dt;
+    apply(r, 0, dt, v, inv);
+    step[0] = dn;
+    step[1] = dt;
+    return bt_max(fabs(dn) / r->mn, fabs(dt) / r->mt);
+}
+
+static double sweep(bt_world *w, bool parallel)
+{
+    bt_solver *s = w->solver;
+    bt_vel *v = w->bodies.vel;
+    const bt_inv *inv = w->bodies.inv;
+    double change = 0;
+#pragma omp parallel if (parallel) reduction(max : change)
+    for (int k = 0; k < s->n_colours; k++) {
+#pragma omp for schedule(static)
+        for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++)
+            for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
+    }
+    const bt_idx last = s->start[s->n_colours + 1];
+    for (bt_idx i = s->unit[s->start[s->n_colours]]; i < s->unit[last]; i++)
+        change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
+    if (w->tow && w->tow->mode == BT_TOW_LINE) change = bt_max(change, bt_tow_update(w->tow, &v[w->towed], inv[w->towed]));
+    return change;
+}
+
+double bt_solver_residual(const bt_world *w)
+{
+    const bt_solver *s = w->solver;
+    const bt_vel *v = w->bodies.vel;
+    double worst = 0;
+#pragma omp parallel for schedule(static) reduction(max : worst) if (s->n_rows > MIN_PARALLEL_ROWS)
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        double wn = normal_velocity(r, &v[r->a], &v[r->b]) + r->bias;
+        double wt = tangent_velocity(r, &v[r->a], &v[r->b]);
+        double dn = bt_max(0, r->ln - wn * r->mn) - r->ln;
+        double dt = clamp(r->lt - wt * r->mt, r->mu * r->ln) - r->lt;
+        worst = bt_max(worst, bt_max(fabs(dn) / r->mn, fabs(dt) / r->mt));
+    }
+    if (w->tow && w->tow->mode == BT_TOW_LINE) worst = bt_max(worst, bt_tow_residual(w->tow, &v[w->towed]));
+    return worst;
+}
+
+static void warm_start(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_vel *v = w->bodies.vel;
+    const bt_inv *inv = w->bodies.inv;
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        bt_row *r = &s->rows[i];
+        r->lt = clamp(r->lt, r->mu * r->ln);
+        if (r->ln != 0) apply(r, r->ln, r->lt, v, inv);
+    }
+    if (w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
+}
+
+static void move_unit(bt_solver *s, bt_idx u, const double *move, bt_vel *v, const bt_inv *inv)
+{
+    for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) {
+        const double dn = move[2 * i] / s->scale[2 * i], dt = move[2 * i + 1] / s->scale[2 * i + 1];
+        if (dn == 0 && dt == 0) continue;
+        s->rows[i].ln += dn;
+        s->rows[i].lt += dt;
+        apply(&s->rows[i], dn, dt, v, inv);
+    }
+}
+
+/// U* + M⁻¹ Jᵀ λ from scratch: what increments have rounded away does not build up.
+static void velocities_from_impulses(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_bodies *b = &w->bodies;
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        if (b->inv[r->a].m > 0) b->vel[r->a] = b->vel_free[r->a];
+        if (b->inv[r->b].m > 0) b->vel[r->b] = b->vel_free[r->b];
+    }
+    bt_tow *t = w->tow && w->tow->mode == BT_TOW_LINE ? w->tow : NULL;
+    if (t) b->vel[w->towed] = b->vel_free[w->towed];
+    for (bt_idx i = 0; i < s->n_rows; i++)
+        if (s->rows[i].ln != 0) apply(&s->rows[i], s->rows[i].ln, s->rows[i].lt, b->vel, b->inv);
+    if (t) bt_tow_apply(t, t->lambda, &b->vel[w->towed], b->inv[w->towed]);
+}
+
+/// One step of Anderson acceleration after a sweep. Unknowns are scaled by √W to the common unit √(N s m/s).
+static void accelerate(bt_world *w, bool parallel)
+{
+    bt_solver *s = w->solver;
+    bt_anderson *a = s->anderson;
+    bt_tow *t = w->tow && w->tow->mode == BT_TOW_LINE && w->tow->taut ? w->tow : NULL;
+    const double line = t ? sqrt(t->w) : 0;
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        const double *scale = s->scale + 2 * i;
+        a->g[2 * i] = r->ln * scale[0];
+        a->g[2 * i + 1] = r->lt * scale[1];
+        a->f[2 * i] = s->step[2 * i] * scale[0];
+        a->f[2 * i + 1] = s->step[2 * i + 1] * scale[1];
+    }
+    a->g[2 * s->n_rows] = t ? t->lambda * line : 0;
+    a->f[2 * s->n_rows] = t ? t->step * line : 0;
+    if (!bt_anderson_advance(a)) return;
+
+    bt_vel *v = w->bodies.vel;
+    const bt_inv *inv = w->bodies.inv;
+#pragma omp parallel if (parallel)
+    for (int k = 0; k < s->n_colours; k++) {
+#pragma omp for schedule(static)
+        for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++) move_unit(s, u, a->move, v, inv);
+    }
+    for (bt_idx u = s->start[s->n_colours]; u < s->start[s->n_colours + 1]; u++) move_unit(s, u, a->move, v, inv);
+    if (t) bt_tow_apply(t, a->move[2 * s->n_rows] / line, &v[w->towed], inv[w->towed]);
+    if (t) t->lambda += a->move[2 * s->n_rows] / line;
+}
+
+void bt_solver_solve(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_contacts *c = w->contacts;
+    const double tolerance = w->par.tolerance;
+    const bool parallel = s->n_rows > MIN_PARALLEL_ROWS;
+    warm_start(w);
+    bt_step_stats *st = &w->stats;
+    st->sweeps = 0;
+    st->residual = bt_solver_residual(w);
+    if (st->residual > tolerance) bt_anderson_start(s->anderson, 2 * (size_t)s->n_rows + 1);
+    while (st->residual > tolerance && st->sweeps < w->par.max_sweeps) {
+        double change = sweep(w, parallel);
+        st->sweeps++;
+        if (change <= tolerance || st->sweeps == w->par.max_sweeps) {
+            velocities_from_impulses(w);
+            st->residual = bt_solver_residual(w);
+            if (st->residual <= tolerance) break;
+        }
+        if (!w->par.plain_sweeps && st->sweeps < w->par.max_sweeps) accelerate(w, parallel);
+    }
+    st->converged = st->residual <= tolerance;
+    for (bt_idx k = 0; k < c->n_man; k++) {
+        const bt_row *r = &s->rows[s->row_of[k]];
+        for (int i = 0; i < c->man[k].n_points; i++) {
+            c->man[k].p[i].ln = r[i].ln;
+            c->man[k].p[i].lt = r[i].lt;
+        }
+    }
+}
+
+double bt_solver_work(const bt_world *w)
+{
+    const bt_solver *s = w->solver;
+    const bt_bodies *b = &w->bodies;
+    bt_sum work = {0};
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        if (r->ln == 0) continue;
+        const bt_vel *fa = &b->vel_free[r->a], *fb = &b->vel_free[r->b], *va = &b->vel[r->a], *vb = &b->vel[r->b];
+        bt_sum_add(&work, 0.5 * r->ln * (normal_velocity(r, fa, fb) + normal_velocity(r, va, vb)) +
+                              0.5 * r->lt * (tangent_velocity(r, fa, fb) + tangent_velocity(r, va, vb)));
+    }
+    return bt_sum_value(&work);
+}
+
+void bt_solver_impulse_on(const bt_world *w, bt_idx i, double j[3])
+{
+    const bt_solver *s = w->solver;
+    bt_sum sum[3] = {{0}, {0}, {0}};
+    for (bt_idx k = 0; k < s->n_rows; k++) {
+        const bt_row *r = &s->rows[k];
+        if ((r->a != i && r->b != i) || r->ln == 0) continue;
+        double sign = r->b == i ? 1 : -1;
+        bt_sum_add(&sum[0], sign * (r->ln * r->nx - r->lt * r->ny));
+        bt_sum_add(&sum[1], sign * (r->ln * r->ny + r->lt * r->nx));
+        bt_sum_add(&sum[2], sign * (r->b == i ? r->ln * r->rbn + r->lt * r->rbt : r->ln * r->ran + r->lt * r->rat));
+    }
+    for (int k = 0; k < 3; k++) j[k] = bt_sum_value(&sum[k]);
+}

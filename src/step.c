@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
+#include <math.h>
+
+#include "bergtow/contacts.h"
+#include "bergtow/forces.h"
+#include "bergtow/solver.h"
+#include "bergtow/sum.h"
+#include "bergtow/tow.h"
+#include "bergtow/world.h"
+
+static double wrap(double x, double low, double period)
+{
+    if (period > 0) {
+        if (x < low) return x + period;
+        if (x >= low + period) return x - period;
+    }
+    return x;
+}
+
+/// X2 = X1 + U2 Δt + D.
+static void advance(bt_world *w)
+{
+    bt_bodies *b = &w->bodies;
+    const bt_solver *s = w->solver;
+    const double dt = w->par.dt;
+#pragma omp parallel for schedule(static) if (b->n > 2000)
+    for (bt_idx i = 0; i < b->n; i++) {
+        double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
+        if (s->shifted) {
+            dx += s->shift[i].x;
+            dy += s->shift[i].y;
+            turn += s->shift[i].w;
+        }
+        if (dx == 0 && dy == 0 && turn == 0) continue;
+        bt_pose *p = &b->pose[i];
+        p->x = wrap(p->x + dx, w->par.x0, w->par.period_x);
+        p->y = wrap(p->y + dy, w->par.y0, w->par.period_y);
+        if (turn != 0) {
+            p->yaw += turn;
+            bt_world_turn_outline(w, i);
+        }
+        // Rounding of a pose of kilometres must not make the path shorter than the move.
+        b->path[i] += (sqrt(dx * dx + dy * dy) + b->radius[i] * fabs(turn)) * (1 + 1e-9);
+        if (i == w->towed && w->tow) {
+            w->tow->travel_x += dx;
+            w->tow->travel_y += dy;
+        }
+    }
+    if (w->tow) {
+        bt_tow *t = w->tow;
+        double speed = bt_tow_speed(t, t->time + dt);
+        t->carriage_x += dt * speed * t->ux;
+        t->carriage_y += dt * speed * t->uy;
+        t->time = (double)(w->step + 1) * dt;
+    }
+}
+
+/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
+/// line; returns the difference over the momentum exchanged (both from the velocities and the rows, independently).
+static double momentum_residual(const bt_world *w)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_solver *s = w->solver;
+    bt_sum gained[2] = {{0}, {0}}, applied[2] = {{0}, {0}}, exchanged = {0}, carried = {0};
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->motion[i] != BT_DYNAMIC) continue;
+        double dx = b->vel[i].x - b->vel_free[i].x, dy = b->vel[i].y - b->vel_free[i].y;
+        if (dx == 0 && dy == 0) continue;
+        bt_sum_add(&gained[0], dx / b->inv[i].m);
+        bt_sum_add(&gained[1], dy / b->inv[i].m);
+        bt_sum_add(&carried, b->mass[i] * (fabs(b->vel[i].x) + fabs(b->vel[i].y)));
+    }
+    for (bt_idx k = 0; k < s->n_rows; k++) {
+        const bt_row *r = &s->rows[k];
+        if (r->ln == 0) continue;
+        double sign = (b->inv[r->b].m > 0) - (b->inv[r->a].m > 0);
+        bt_sum_add(&exchanged, r->ln);
+        if (sign == 0) continue;
+        bt_sum_add(&applied[0], sign * (r->ln * r->nx - r->lt * r->ny));
+        bt_sum_add(&applied[1], sign * (r->ln * r->ny + r->lt * r->nx));
+    }
+    if (w->tow && w->tow->mode == BT_TOW_LINE) {
+        bt_sum_add(&applied[0], w->tow->lambda * w->tow->lx);
+        bt_sum_add(&applied[1], w->tow->lambda * w->tow->ly);
+        bt_sum_add(&exchanged, w->tow->lambda);
+    }
+    double ex = bt_sum_value(&gained[0]) - bt_sum_value(&applied[0]);
+    double ey = bt_sum_value(&gained[1]) - bt_sum_value(&applied[1]);
+    // A step that exchanges next to nothing is measured against the momentum carried: rounding is relative to that.
+    double scale = bt_max(bt_sum_value(&exchanged), 1e-4 * bt_sum_value(&carried));
+    return scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
+}
+
+static double kinetic_energy(const bt_world *w)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_sum e = {0};
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->motion[i] != BT_DYNAMIC) continue;
+        const bt_vel *v = &b->vel[i];
+        if (v->x == 0 && v->y == 0 && v->w == 0) continue;
+        bt_sum_add(&e, 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
+    }
+    return bt_sum_value(&e);
+}
+
+void bt_world_step(bt_world *w)
+{
+    bt_step_stats *st = &w->stats;
+    double t0 = bt_clock();
+    bt_forces_predict(w); // U*, effective M
+    bt_tow_begin(w);
+    double t1 = bt_clock();
+    bt_contacts_detect(w, bt_contacts_margin(w)); // gaps and J at X1
+    double t2 = bt_clock();
+    bt_solver_prepare(w);
+    double t3 = bt_clock();
+    bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+    bt_solver_project(w);
+    st->momentum_residual = momentum_residual(w);
+    st->contact_work = bt_solver_work(w);
+    double t4 = bt_clock();
+    advance(w); // X2 = X1 + U2 Δt
+    st->kinetic_energy = kinetic_energy(w);
+    st->n_points = w->contacts->n_points;
+    st->overlap = w->contacts->overlap;
+    w->step++;
+    double t5 = bt_clock();
+    st->forces_s = t1 - t0;
+    st->detect_s = t2 - t1;
+    st->colour_s = t3 - t2;
+    st->solve_s = t4 - t3;
+    st->advance_s = t5 - t4;
+}

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+// The summary as JSON for scripts and as a table for readers.
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+
+#include "json.h"
+#include "summary.h"
+
+typedef struct phase_row { const char *name; double seconds; } phase_row;
+#define N_PHASES 7
+
+static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
+{
+    const phase_row all[N_PHASES] = {{"detect", p->detect}, {"colour", p->colour}, {"forces", p->forces},
+                                     {"solve", p->solve}, {"advance", p->advance}, {"exchange", p->exchange},
+                                     {"output", p->output}};
+    for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
+}
+
+static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
+{
+    bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
+    bt_json_number(j, "mean_ice_resistance_se_n", s->ice.se);
+    bt_json_number(j, "sd_ice_resistance_n", s->ice.sd);
+    bt_json_number(j, "p95_ice_resistance_n", s->p95);
+    bt_json_number(j, "p99_ice_resistance_n", s->p99);
+    bt_json_number(j, "peak_ice_resistance_n", s->peak);
+    bt_json_string(j, "peak_conversion", "mean over a step, impulse / dt");
+    bt_json_number(j, "mean_tow_force_n", s->tow.mean);
+    bt_json_number(j, "mean_tow_force_se_n", s->tow.se);
+    bt_json_number(j, "mean_drag_force_n", s->drag.mean);
+    bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
+    bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
+    bt_json_number(j, "peak_line_tension_n", s->body ? h->peak_tension : NAN);
+    bt_json_open(j, "budget", '{');
+    bt_json_number(j, "tow_minus_drag_minus_inertia_n", s->balance);
+    bt_json_number(j, "closure_n", s->closure);
+    bt_json_number(j, "closure_relative", s->closure_relative);
+    bt_json_number(j, "ice_momentum_closure_relative", s->budget_closure_relative);
+    bt_json_close(j, '}');
+    bt_json_open(j, "window", '{');
+    bt_json_number(j, "start_s", s->window.start);
+    bt_json_number(j, "end_s", s->window.end);
+    bt_json_int(j, "n_samples", s->window.n);
+    bt_json_number(j, "n_independent", s->window.n ? s->ice.n_eff : NAN);
+    bt_json_number(j, "correlation_time_s", s->window.correlation_time);
+    bt_json_string(j, "rule", !s->body ? NULL : s->window.given ? "given" : "mser5");
+    bt_json_string(j, "warning", s->window.warning);
+    bt_json_close(j, '}');
+    if (isnan(c->reference.mean_force)) {
+        bt_json_string(j, "reference", NULL);
+        return;
+    }
+    bt_json_open(j, "reference", '{');
+    bt_json_number(j, "mean_force_n", c->reference.mean_force);
+    bt_json_string(j, "source", c->reference.source);
+    bt_json_number(j, "ratio", s->reference_ratio);
+    bt_json_close(j, '}');
+}
+
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    bt_json_string(&j, "title", c->run.title);
+    bt_json_string(&j, "version", BT_VERSION);
+    bt_json_int(&j, "n_floes", n_floes);
+    bt_json_int(&j, "n_steps", t->n_steps);
+    bt_json_number(&j, "dt_s", t->dt);
+    bt_json_number(&j, "sim_time_s", s->sim_time);
+    bt_json_number(&j, "wall_time_s", t->wall_time);
+    bt_json_int(&j, "ranks", t->ranks);
+    bt_json_int(&j, "threads", t->threads);
+    bt_json_number(&j, "concentration", t->concentration);
+    bt_json_number(&j, "mean_size_m", t->mean_size);
+    json_forces(&j, s, h, c);
+    bt_json_number(&j, "max_overlap_m", h->max_overlap);
+    bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
+    bt_json_int(&j, "unconverged_steps", h->unconverged);
+    bt_json_number(&j, "max_residual_m_s", h->max_residual);
+    bt_json_number(&j, "tolerance_m_s", t->tolerance);
+    bt_json_number(&j, "mean_sweeps", s->sweeps);
+    bt_json_number(&j, "contacts_mean", s->contacts);
+    bt_json_number(&j, "contact_work_j", h->contact_work);
+    bt_json_int(&j, "positive_work_steps", h->positive_work);
+    bt_json_number(&j, "momentum_residual", h->max_momentum_residual);
+    bt_json_int(&j, "floes_outside", t->floes_outside);
+    bt_json_number(&j, "ns_per_floe_step", s->ns_per_floe_step);
+    phase_row rows[N_PHASES];
+    phase_rows(&t->phases, rows);
+    bt_json_open(&j, "phases_s", '{');
+    for (int i = 0; i < N_PHASES; i++) bt_json_number(&j, rows[i].name, rows[i].seconds);
+    bt_json_close(&j, '}');
+    char hash[17];
+    snprintf(hash, sizeof hash, "%016" PRIx64, t->state_hash);
+    bt_json_string(&j, "state_hash", hash);
+    bt_json_string(&j, "stopped", t->stopped);
+    bt_json_open(&j, "warnings", '[');
+    for (size_t i = 0; i < s->warnings.n; i++) bt_json_string(&j, NULL, s->warnings.text[i]);
+    bt_json_close(&j, ']');
+    bt_json_close(&j, '}');
+    return j.text;
+}
+
+/// A force with a prefix that keeps three digits before the point.
+static const char *force(char out[32], double newton)
+{
+    const double size = fabs(newton);
+    if (size >= 1e6) snprintf(out, 32, "%.4g MN", newton / 1e6);
+    else if (size >= 1e3) snprintf(out, 32, "%.4g kN", newton / 1e3);
+    else snprintf(out, 32, "%.4g N", newton);
+    return out;
+}
+
+static void print_forces(const bt_summary *s, const bt_history *h, const bt_case *c)
+{
+    char a[32], b[32], d[32];
+    if (s->window.n == 0) {
+        printf("  steady window       none\n");
+        return;
+    }
+    printf("  steady window       %g to %g s (%s), %.3g independent samples, correlation time %.3g s\n", s->window.start,
+           s->window.end, s->window.given ? "given" : "found by MSER-5", s->ice.n_eff, s->window.correlation_time);
+    printf("  ice resistance      %s +- %s (standard error), sd %s\n", force(a, s->ice.mean), force(b, s->ice.se),
+           force(d, s->ice.sd));
+    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95),
+           force(b, s->p99), force(d, s->peak));
+    printf("    from balances     %s by tow - drag - inertia, %s by the momentum of the ice\n", force(a, s->balance),
+           force(b, s->budget.mean));
+    printf("  tow force           %s +- %s, drag %s", force(a, s->tow.mean), force(b, s->tow.se), force(d, s->drag.mean));
+    if (!isnan(h->peak_tension)) printf(", peak line tension %s", force(a, h->peak_tension));
+    printf("\n");
+    if (!isnan(c->reference.mean_force))
+        printf("  measured            %s (%s): computed / measured = %.3g\n", force(a, c->reference.mean_force),
+               c->reference.source ? c->reference.source : "no source given", s->reference_ratio);
+}
+
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes)
+{
+    if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
+    printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
+           (long long)t->n_steps, t->dt, s->sim_time);
+    if (s->body) print_forces(s, h, c);
+    if (h->n)
+        printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
+               (long long)h->unconverged);
+    printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
+           t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
+    printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);
+    printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
+    if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);
+    printf("\n ");
+    phase_row rows[N_PHASES];
+    phase_rows(&t->phases, rows);
+    double sum = 0;
+    for (int i = 0; i < N_PHASES; i++) sum += rows[i].seconds;
+    for (int i = 0; i < N_PHASES; i++) printf(" %s %.1f %%%s", rows[i].name, sum > 0 ? 100 * rows[i].seconds / sum : 0.0,
+                                              i + 1 < N_PHASES ? "," : "\n");
+    printf("  state hash          %016" PRIx64 "\n", t->state_hash);
+    for (size_t i = 0; i < s->warnings.n; i++) printf("  warning: %s\n", s->warnings.text[i]);
+}

@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: MIT
+"""Bad input from a user's hand: each kind must end with its exit code and a message that names it and says what to do."""
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+BERGTOW = os.path.abspath(os.environ.get("BERGTOW", "build/release/bergtow"))
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DONE, USAGE, CASE, IO = 0, 2, 3, 4
+
+# A small case that is done at once, for the kinds of bad input that need the rest to be good.
+GOOD = """\
+run: {dt: 0.1, duration: 1}
+domain: {length: 12, width: 8}
+ice: {concentration: 0.3, size: 1}
+body: {x: 4}
+"""
+
+
+def call(*arguments, cwd, env=None):
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_"))} | (env or {})
+    return subprocess.run([BERGTOW, *map(str, arguments)], cwd=cwd, env=environment, capture_output=True, timeout=60)
+
+
+def refused(result, code, *fragments):
+    """The call ended with this code, and one line of stderr holds all the fragments."""
+    text = result.stderr.decode("utf-8", "replace")
+    assert result.returncode == code, f"exit code {result.returncode}, wanted {code}:\n{text}"
+    assert any(all(f in line for f in fragments) for line in text.splitlines()), f"no line with {fragments} in:\n{text}"
+    assert "Sanitizer" not in text and "runtime error" not in text, text
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "good.yml").write_text(GOOD)
+    return tmp_path
+
+
+def test_the_good_case_is_good(folder):
+    """Otherwise every test below would pass for the wrong reason."""
+    result = call("check", "good.yml", cwd=folder)
+    assert result.returncode == DONE and not result.stderr, result.stderr
+    assert b"good.yml: valid" in result.stdout
+
+
+# ---- the text of a case ----
+
+TEXTS = {
+    "unknown key": (GOOD + "tow: {sped: 1}\n", "bad.yml:5: tow.sped: unknown key; did you mean tow.speed?"),
+    "unknown section": (GOOD + "iec: {size: 1}\n", "bad.yml:5: iec: unknown key; did you mean ice?"),
+    "key in the wrong section": (GOOD + "tow: {friction: 1}\n", "bad.yml:5: tow.friction: unknown key; did you mean ice.friction?"),
+    "duplicate key": (GOOD + "run: {dt: 0.2}\n", "bad.yml:5: run: duplicate key, first given in line 1"),
+    "duplicate in two spellings": (GOOD + "run.dt: 0.2\n", "bad.yml:5: run.dt: duplicate key, first given in line 1"),
+    "missing required key": ("run: {dt: 0.1}\n", "bad.yml: run.duration: missing"),
+    "NaN": (GOOD + "tow: {speed: .nan}\n", 'bad.yml:5: tow.speed: ".nan" is not a number'),
+    "infinity": (GOOD + "tow: {speed: .inf}\n", 'bad.yml:5: tow.speed: ".inf" is not a number'),
+    "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
+    "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"), "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
+    "concentration above one": (GOOD.replace("0.3", "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
+    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed", "m/s"),
+    "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
+    "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),
+    "hexadecimal": (GOOD + "tow: {speed: 0x10}\n", 'bad.yml:5: tow.speed: "x10"'),
+    "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", 'bad.yml:5: tow.speed: ",13"'),
+    "fraction for a whole number": (GOOD + "solver: {max_sweeps: 1.5}\n", "bad.yml:5: solver.max_sweeps", "whole number"),
+    "integer overflow": (GOOD.replace("size: 1", "seed: 99999999999999999999"), "bad.yml:3: ice.seed: 99999999999999999999 is too large"),
+    "unknown choice": (GOOD.replace("x: 4", "shape: shipp"), "bad.yml:4: body.shape:", "did you mean ship?"),
+    "neither true nor false": (GOOD + "solver: {warm_start: 2}\n", "bad.yml:5: solver.warm_start:", "true"),
+    "empty value": (GOOD + "tow:\n  speed:\n", "bad.yml:6: tow.speed: has no value"),
+    "list for a value": (GOOD + "tow: {speed: [1, 2]}\n", "bad.yml:5: tow.speed: is a list"),
+    "value for a section": (GOOD + "tow: 1\n", "bad.yml:5: tow: is a section"),
+    "body larger than the basin": (GOOD.replace("x: 4", "length: 20"), "bad.yml:4: body.length: the body spans", "domain.width"),
+    "body outside": (GOOD.replace("x: 4", "x: 40"), "bad.yml:4: body.x:", "outside the domain"),
+    "tow through the wall": (GOOD.replace("duration: 1}", "duration: 1000}"), "bad.yml:1: run.duration:", "a wall stands after"),
+    "body that is not convex": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0],[1,0.2],[0,2]]"), "bad.yml:4: body.vertices: the waterline is refused"),
+    "two points": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0]]"), "bad.yml:4: body.vertices: has 2 points"),
+    "ice region outside": (GOOD.replace("size: 1", "x_max: 13"), "bad.yml:3: ice.x_max: 13 m is outside the domain"),
+    "empty ice region": (GOOD.replace("size: 1", "x_min: 5, x_max: 5"), "bad.yml:3: ice.x_min: 5 m is not below ice.x_max"),
+    "floes larger than the basin": (GOOD.replace("size: 1", "size: 30"), "bad.yml:3: ice.size: 30 m is larger than the ice region"),
+    "too many floes": (GOOD.replace("size: 1", "size: 0.1 mm"), "bad.yml:3: ice.size:", "floes, at most"),
+    "too many steps": (GOOD.replace("dt: 0.1", "dt: 1e-12"), "bad.yml:1: run.dt:", "steps"),
+    "step longer than the run": (GOOD.replace("dt: 0.1", "dt: 2"), "bad.yml:1: run.dt: 2 s is longer than run.duration"),
+    "no line": (GOOD + "tow: {mode: line, line_stiffness: 0}\n", "bad.yml:5: tow.line_stiffness:", "needs a stiffness"),
+    "floe by hand outside": (GOOD + "floes: [{x: 30, y: 0, length: 1}]\n", "bad.yml:5: floes[0]: is outside the domain"),
+    "floe by hand without place": (GOOD + "floes: [{x: 9, length: 1}]\n", "bad.yml:5: floes[0].y: missing"),
+    "anchor": (GOOD.replace("run: {", "run: &a {"), "bad.yml:1: anchors and aliases"),
+    "two documents": (GOOD + "---\n" + GOOD, "bad.yml:5: a second document"),
+    "not YAML": (GOOD + "tow: {speed: 1\n", "not valid YAML"),
+    "tabulator": ("run:\n\tdt: 1\n", "bad.yml:2: not valid YAML"),
+    "deep nesting": ("[" * 1000, "nested deeper"),
+    "empty file": ("", "bad.yml: holds no keys"),
+    "a list": ("- 1\n", "is not a case"),
+}
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_text_of_a_case(folder, kind):
+    text, *fragments = TEXTS[kind]
+    (folder / "bad.yml").write_text(text)
+    for command in ("check", "run"):
+        refused(call(command, "bad.yml", cwd=folder), CASE, *fragments)
+    assert not (folder / "out").exists(), "a refused case left a result folder"
+
+
+def test_all_errors_of_a_file_come_at_once(folder):
+    (folder / "bad.yml").write_text("run: {dt: x}\nice: {size: -1, sise: 2}\ntow: {mode: fast}\n")
+    lines = call("check", "bad.yml", cwd=folder).stderr.decode().splitlines()
+    assert len(lines) == 5, lines
+    assert all(line.startswith("bergtow: bad.yml:") and ";" in line for line in lines), lines
+
+
+def test_binary_garbage(folder):
+    (folder / "bad.yml").write_bytes(bytes(range(256)) * 40)
+    refused(call("check", "bad.yml", cwd=folder), CASE, "bad.yml", "not UTF-8")
+
+
+def test_latin1_text(folder):
+    (folder / "bad.yml").write_bytes(b"run: {title: \"is\xe5\", dt: 0.1, duration: 1}\n")
+    refused(call("check", "bad.yml", cwd=folder), CASE, "bad.yml", "not UTF-8")
+
+
+def test_huge_file(folder):
+    (folder / "bad.yml").write_bytes(b"#" * (17 << 20))
+    refused(call("check", "bad.yml", cwd=folder), CASE, "bad.yml", "16 MiB")
+
+
+# ---- files and folders ----
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_missing_file(folder, command):
+    refused(call(command, "absent.yml", cwd=folder), IO, "absent.yml: cannot be read: No such file")
+
+
+def test_folder_as_case(folder):
+    (folder / "cases").mkdir()
+    refused(call("check", "cases", cwd=folder), IO, "cases: is a folder")
+
+
+def field_case(folder, name):
+    (folder / "bad.yml").write_text(GOOD.replace("size: 1", f"field: {name}"))
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_missing_field_file(folder, command):
+    field_case(folder, "absent.h5")
+    result = call(command, "bad.yml", cwd=folder)
+    refused(result, result.returncode, "absent.h5")
+    assert result.returncode in (CASE, IO)
+
+
+def test_text_as_field_file(folder):
+    (folder / "field.h5").write_text("no field\n" * 100)
+    field_case(folder, "field.h5")
+    refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
+
+
+def test_empty_field_file(folder):
+    (folder / "field.h5").write_bytes(b"")
+    field_case(folder, "field.h5")
+    refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
+
+
+def test_hdf5_without_field(folder):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / "field.h5", "w") as f:
+        f["something"] = [1, 2, 3]
+    field_case(folder, "field.h5")
+    refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
+
+
+def make_field(folder):
+    result = call("field", "good.yml", "-o", "field.h5", cwd=folder)
+    assert result.returncode == DONE, result.stderr
+    field_case(folder, "field.h5")
+    return folder / "field.h5"
+
+
+def test_a_field_is_read_back(folder):
+    make_field(folder)
+    result = call("check", "bad.yml", cwd=folder)
+    assert result.returncode == DONE, result.stderr
+    assert b"read from the field file" in result.stdout
+
+
+@pytest.mark.parametrize("keep", [0.1, 0.5, 0.9])
+def test_truncated_field_file(folder, keep):
+    path = make_field(folder)
+    data = path.read_bytes()
+    path.write_bytes(data[:int(keep * len(data))])
+    refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
+
+
+@pytest.mark.parametrize("name, value", [("pose", float("nan")), ("vertices", float("inf")), ("thickness", -1.0), ("offsets", 10**12)])
+def test_field_file_with_a_bad_value(folder, name, value):
+    h5py = pytest.importorskip("h5py")
+    path = make_field(folder)
+    with h5py.File(path, "r+") as f:
+        data = f["floes"][name]
+        data[(1,) * data.ndim] = value
+    refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
+
+
+def test_impossible_packing(folder):
+    (folder / "bad.yml").write_text(GOOD.replace("concentration: 0.3", "shape: polygons, concentration: 0.95"))
+    for arguments in (("run", "bad.yml"), ("field", "bad.yml", "-o", "x.h5")):
+        refused(call(*arguments, cwd=folder), CASE, "bad.yml", "concentration")
+
+
+def test_unwritable_output_folder(folder):
+    refused(call("run", "good.yml", "-o", "good.yml/out", cwd=folder), IO, "good.yml/out")
+
+
+def test_unwritable_field_file(folder):
+    refused(call("field", "good.yml", "-o", "absent/field.h5", cwd=folder), IO, "absent/field.h5")
+
+
+def test_a_result_is_not_replaced_unasked(folder):
+    (folder / "out" / "good").mkdir(parents=True)
+    old = folder / "out" / "good" / "result.h5"
+    old.write_text("dear to somebody")
+    refused(call("run", "good.yml", cwd=folder), IO, "out/good: holds a result", "--force")
+    assert old.read_text() == "dear to somebody"
+    result = call("run", "good.yml", "--force", "--quiet", cwd=folder)
+    assert result.returncode == DONE, result.stderr
+    assert old.read_bytes()[:4] == b"\x89HDF"
+
+
+# ---- the command line ----
+
+USAGES = {
+    "no arguments": ([], "Usage: bergtow"),
+    "unknown command": (["rum", "good.yml"], "rum: unknown command; did you mean run?"),
+    "unlike any command": (["banana"], "banana: unknown command; see bergtow --help"),
+    "unknown option": (["--verison"], "--verison: unknown option; did you mean --version?"),
+    "unknown option of a command": (["run", "good.yml", "--thread-count", "3"], "--thread-count: unknown option"),
+    "mistyped option of a command": (["run", "good.yml", "--quite"], "--quite: unknown option; did you mean --quiet?"),
+    "unknown letter": (["run", "good.yml", "-z"], "invalid option -- 'z'"),
+    "option of another command": (["check", "good.yml", "--steps", "3"], "--steps: unknown option"),
+    "no case": (["run"], "no case file given"),
+    "two cases": (["run", "good.yml", "good.yml"], "one case at a time"),
+    "threads: a word": (["run", "good.yml", "--threads", "two"], "--threads two: give a whole number"),
+    "threads: none": (["run", "good.yml", "--threads", "0"], "--threads 0: give a whole number"),
+    "threads: negative": (["run", "good.yml", "--threads=-1"], "--threads -1: give a whole number"),
+    "threads: too many": (["run", "good.yml", "--threads", "99999999999999999999"], "give a whole number"),
+    "steps: a fraction": (["run", "good.yml", "--steps", "1.5"], "--steps 1.5: give a whole number"),
+    "option without value": (["run", "good.yml", "-o"], "requires an argument"),
+    "empty folder name": (["run", "good.yml", "-o", ""], "name of the folder is empty"),
+    "dump without file": (["run", "good.yml", "--dump-contacts", "3"], "--dump-contacts 3: give STEP:FILE.h5"),
+    "dump of no step": (["run", "good.yml", "--dump-contacts", "x:a.h5"], "give a whole number"),
+    "field without output": (["field", "good.yml"], "no output file given"),
+}
+
+
+@pytest.mark.parametrize("kind", USAGES)
+def test_command_line(folder, kind):
+    arguments, fragment = USAGES[kind]
+    refused(call(*arguments, cwd=folder), USAGE, fragment)
+    assert not (folder / "out").exists()
+
+
+SETS = {
+    "unknown key": ("tow.sped=1", "--set tow.sped=1: unknown key; did you mean tow.speed?"),
+    "no value": ("tow.speed", "--set tow.speed: is not key=value"),
+    "empty value": ("tow.speed=", "--set tow.speed=: has no value"),
+    "a section": ("tow=1", "--set tow=1: tow is a section"),
+    "junk": ("ice.friction=0.3x", '--set ice.friction=0.3x: "x"'),
+    "out of range": ("ice.concentration=1.2", "--set ice.concentration=1.2: 1.2 is out of range"),
+    "against another key": ("run.dt=2", "--set run.dt=2: 2 s is longer than run.duration"),
+    "list": ("floes=[]", "--set floes=[]: the list of floes cannot be set"),
+}
+
+
+@pytest.mark.parametrize("kind", SETS)
+def test_set(folder, kind):
+    override, fragment = SETS[kind]
+    refused(call("check", "good.yml", "--set", override, cwd=folder), CASE, fragment)
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_several_ranks_are_refused_once(folder, command):
+    for rank in (0, 1):
+        result = call(command, "good.yml", cwd=folder, env={"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": str(rank)})
+        assert result.returncode == USAGE
+        assert bool(result.stderr) == (rank == 0), result.stderr
+    assert not (folder / "out").exists()
+
+
+# ---- what must work ----
+
+@pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "), (["--list-keys"], b"ice.concentration"),
+                                                 (["run", "--help"], b"--dump-contacts"), (["check", "--help"], b"--set"), (["field", "--help"], b"--output")])
+def test_help(folder, arguments, fragment):
+    result = call(*arguments, cwd=folder)
+    assert result.returncode == DONE and fragment in result.stdout and not result.stderr
+
+
+@pytest.mark.parametrize("case", sorted((ROOT / "cases").rglob("*.yml")), ids=lambda p: p.name)
+def test_shipped_cases_are_valid(folder, case):
+    if "run:" not in case.read_text():
+        pytest.skip("not a case but a study")
+    result = call("check", case, cwd=folder)
+    assert result.returncode == DONE, result.stderr
+    assert b"TOO LARGE" not in result.stdout
