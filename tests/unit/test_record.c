@@ -165,9 +165,12 @@ static char *attribute(hid_t file, const char *object, const char *name)
     assert_true(a >= 0);
     const hid_t t = H5Aget_type(a);
     assert_true(H5Aread(a, t, &text) >= 0);
+    static char kept[4096];
+    snprintf(kept, sizeof kept, "%s", text);
+    H5free_memory(text);
     H5Tclose(t);
     H5Aclose(a);
-    return text;
+    return kept;
 }
 
 static int64_t int_attribute(hid_t file, const char *object, const char *name)
@@ -275,6 +278,8 @@ static void bodies_case_and_provenance_are_there(void **state)
     read_all(f, "/bodies/names", v, d, text, sizeof text);
     assert_string_equal(text[0], names[0]);
     assert_string_equal(text[1], names[1]);
+    H5free_memory(text[0]);
+    H5free_memory(text[1]);
 
     char fixed[4096] = "";
     const hid_t c = H5Dopen2(f, "/case_as_given", H5P_DEFAULT), ct = H5Dget_type(c);
