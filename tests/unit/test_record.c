@@ -217,6 +217,14 @@ static void series_and_frames_come_back_to_the_bit(void **state)
 
     double time[FRAMES], pose[FRAMES][FLOES][3], other[FRAMES][BODIES - FLOES][3], force[FRAMES][FLOES], speed[FRAMES][BODIES];
     float points[FRAMES][VERTICES][2];
+    for (int k = 0; k < FRAMES; k++) {
+        snprintf(path, sizeof path, "/xdmf/%06d/floe_points", k);
+        assert_int_equal(read_all(f, path, H5T_NATIVE_FLOAT, d, points[k], sizeof points[k]), 2);
+        assert_true(d[0] == 12 && d[1] == 2);
+        snprintf(path, sizeof path, "/xdmf/%06d/body_points", k);
+        read_all(f, path, H5T_NATIVE_FLOAT, d, points[k][12], 8 * sizeof points[k][12]);
+        assert_true(d[0] == 8 && d[1] == 2);
+    }
     read_all(f, "/frames/time", H5T_NATIVE_DOUBLE, d, time, sizeof time);
     assert_int_equal(d[0], FRAMES);
     assert_int_equal(read_all(f, "/frames/pose", H5T_NATIVE_DOUBLE, d, pose, sizeof pose), 3);
@@ -225,8 +233,6 @@ static void series_and_frames_come_back_to_the_bit(void **state)
     assert_true(d[0] == FRAMES && d[1] == BODIES - FLOES && d[2] == 3);
     read_all(f, "/frames/contact_force", H5T_NATIVE_DOUBLE, d, force, sizeof force);
     read_all(f, "/frames/speed", H5T_NATIVE_DOUBLE, d, speed, sizeof speed);
-    read_all(f, "/frames/points", H5T_NATIVE_FLOAT, d, points, sizeof points);
-    assert_true(d[0] == FRAMES && d[1] == VERTICES && d[2] == 2);
     for (int k = 0; k < FRAMES; k++) {
         double p[BODIES][3], q[FLOES], v[BODIES];
         frame(k, p, q, v);
