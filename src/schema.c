@@ -91,7 +91,7 @@ const bt_key bt_case_keys[] = {
     REAL("ice.drag.air_form", ice.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag of the floe's edge in air [Hunke & Comeau 2011]"),
     REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]", "skin drag of air over a floe [Hunke & Comeau 2011]"),
     INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
-    REAL("ice.shake", ice.shake, RATIO, "10", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
+    REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
     TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
 
     CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
