@@ -18,7 +18,8 @@ PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test
 def run(tmp_path_factory):
     subprocess.run(["make", "-s", str(PROGRAM)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     folder = tmp_path_factory.mktemp("run")
-    subprocess.run([ROOT / PROGRAM, "write", folder], check=True)
+    done = subprocess.run([ROOT / PROGRAM, "write", folder], check=True, stdout=subprocess.PIPE, text=True, errors="replace")
+    (folder / "table.txt").write_text(done.stdout, encoding="utf-8")
     return folder
 
 
@@ -111,3 +112,15 @@ def test_summary_is_json_with_every_promised_number(run):
     assert summary["p95_ice_resistance_n"] == pytest.approx(np.percentile(window, 95), rel=1e-14)
     assert summary["p99_ice_resistance_n"] == pytest.approx(np.percentile(window, 99), rel=1e-14)
     assert summary["peak_ice_resistance_n"] == window.max()
+
+
+def test_the_printed_table_says_the_same(run):
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    table = (run / "table.txt").read_text(encoding="utf-8")
+    force = summary["mean_ice_resistance_n"]
+    assert f"ice resistance      {force / 1000:#.4g} kN +- {summary['mean_ice_resistance_se_n']:#.4g} N" in table
+    assert f"{summary['window']['start_s']:g} to 60 s (found by MSER-5)" in table
+    assert "computed / measured = 2" in table
+    assert "detect 3.6 %, colour 7.1 %, forces 10.7 %, solve 14.3 %, advance 17.9 %, exchange 21.4 %, output 25.0 %" in table
+    assert summary["state_hash"] in table
+    assert "warning" not in table

@@ -2,7 +2,7 @@
 // A made-up run through the recorder, read back with HDF5; and the recorder without space or permission.
 //
 //     test_record              the tests
-//     test_record write DIR    write the made-up run into DIR (for tests/cli/test_xdmf.py)
+//     test_record write DIR    write the made-up run into DIR and print its table (for tests/cli/test_xdmf.py)
 //     test_record length FILE  print the lengths of two series and of the frames (a reader in another process)
 #include <math.h>
 #include <setjmp.h>
@@ -111,6 +111,8 @@ static bt_status record_frame(bt_record *r, int k, bt_errors *err)
     return bt_record_frame(r, 0.5 * k, &pose[0][0], force, speed, err);
 }
 
+static bool print_summary;
+
 static bt_status write_run(const char *dir, const bt_case *c, int steps, int frames, bt_errors *err)
 {
     const bt_record_bodies b = bodies();
@@ -123,6 +125,7 @@ static bt_status write_run(const char *dir, const bt_case *c, int steps, int fra
         if (frames && i % (steps / frames) == 0) record_frame(r, i / (steps / frames), err);
     }
     const bt_run_totals t = totals(steps);
+    if (print_summary) bt_record_print_summary(r, &t);
     return bt_record_close(r, &t, err);
 }
 
@@ -583,6 +586,43 @@ static void an_empty_field_can_be_recorded(void **state)
     free(xdmf);
 }
 
+static void many_floes_are_packed(void **state)
+{
+    (void)state;
+    enum { MANY = 3000 };
+    static double v[4 * MANY][2], pose[MANY][3], ones[MANY];
+    static int64_t o[MANY + 1];
+    static float points[4 * MANY][2], speed[MANY];
+    for (int i = 0; i < MANY; i++) {
+        o[i + 1] = 4 * (i + 1);
+        for (int k = 0; k < 4; k++) v[4 * i + k][0] = (k == 0) - (k == 2), v[4 * i + k][1] = (k == 1) - (k == 3);
+        pose[i][0] = i;
+        ones[i] = 1 + i;
+    }
+    bt_errors err = {0};
+    const bt_case c = made_up_case();
+    const bt_record_bodies b = {.n_floes = MANY, .n_bodies = MANY, .offsets = o, .vertices = &v[0][0], .thickness = ones,
+                                .area = ones, .towed = -1};
+    bt_record *r;
+    assert_int_equal(bt_record_open(&r, in_folder("many"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_frame(r, 0, &pose[0][0], ones, ones, &err), BT_OK);
+    const bt_run_totals t = totals(0);
+    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
+    const hid_t f = H5Fopen(in_folder("many/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
+    hsize_t d[3];
+    read_all(f, "/xdmf/000000/floe_points", H5T_NATIVE_FLOAT, d, points, sizeof points);
+    assert_int_equal(d[0], 4 * MANY);
+    read_all(f, "/xdmf/000000/floe_speed", H5T_NATIVE_FLOAT, d, speed, sizeof speed);
+    for (int i = 0; i < MANY; i++) {
+        assert_true(points[4 * i][0] == (float)(i + 1) && points[4 * i + 1][1] == 1);
+        assert_true(speed[i] == (float)(1 + i));
+    }
+    const hid_t set = H5Dopen2(f, "/xdmf/000000/floe_points", H5P_DEFAULT);
+    assert_true(H5Dget_storage_size(set) < sizeof points / 2);
+    H5Dclose(set);
+    H5Fclose(f);
+}
+
 static void a_failed_run_leaves_no_old_summary(void **state)
 {
     (void)state;
@@ -734,7 +774,8 @@ int main(int argc, char **argv)
     if (argc == 3 && strcmp(argv[1], "length") == 0) return print_lengths(argv[2]);
     if (argc == 3 && strcmp(argv[1], "write") == 0) {
         bt_errors err = {0};
-        bt_case c = made_up_case();
+        const bt_case c = made_up_case();
+        print_summary = true;
         const bt_status status = write_run(argv[2], &c, 600, 3, &err);
         bt_errors_print(&err);
         return status;
@@ -750,6 +791,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(every_doubt_is_told),
         cmocka_unit_test(without_a_towed_body_forces_are_null),
         cmocka_unit_test(an_empty_field_can_be_recorded),
+        cmocka_unit_test(many_floes_are_packed),
         cmocka_unit_test(a_failed_run_leaves_no_old_summary),
         cmocka_unit_test(a_running_and_a_killed_run_can_be_read),
         cmocka_unit_test(folders_that_cannot_be_written_are_named),
