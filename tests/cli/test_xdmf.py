@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""frames.xdmf and summary.json of the made-up run of tests/unit/test_record.c, read with the standard parsers."""
+"""frames.xdmf and summary.json of the made-up run of tests/made_up_run.h, read with the standard parsers."""
 import json
 import os
 import subprocess
