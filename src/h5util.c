@@ -90,22 +90,41 @@ static hid_t quiet_creation(void)
     return p;
 }
 
-static void write_in_space(bt_h5 *h, const char *name, hid_t type, hid_t mem, hid_t space, const void *data)
+static void deflate(hid_t create)
 {
-    const hid_t create = quiet_creation();
+    H5Pset_shuffle(create);
+    H5Pset_deflate(create, 4);
+}
+
+/// Takes over (closes) the creation properties and the space.
+static void write_in_space(bt_h5 *h, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
+{
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
-    check(h, d >= 0 && (!filled || H5Dwrite(d, mem, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
+    check(h, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
     if (d >= 0) check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    H5Sclose(space);
     H5Pclose(create);
 }
 
 void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
 {
     if (h->status != BT_OK) return;
-    const hid_t space = H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL);
-    write_in_space(h, name, mem, mem, space, data);
-    H5Sclose(space);
+    write_in_space(h, name, quiet_creation(), mem, H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL), data);
+}
+
+void bt_h5_write_packed(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
+{
+    if (h->status != BT_OK) return;
+    const hid_t create = quiet_creation();
+    const int rank = width ? 2 : 1;
+    const hsize_t size[2] = {n, width};
+    // The index of a chunked dataset takes 2 kB.
+    if (n * (width ? width : 1) * H5Tget_size(mem) > 8192) {
+        H5Pset_chunk(create, rank, size);
+        deflate(create);
+    }
+    write_in_space(h, name, create, mem, H5Screate_simple(rank, size, NULL), data);
 }
 
 static hid_t text_type(size_t size)
@@ -119,18 +138,16 @@ static hid_t text_type(size_t size)
 void bt_h5_write_text(bt_h5 *h, const char *name, const char *text)
 {
     if (h->status != BT_OK) return;
-    const hid_t type = text_type(strlen(text) + 1), space = H5Screate(H5S_SCALAR);
-    write_in_space(h, name, type, type, space, text);
-    H5Sclose(space);
+    const hid_t type = text_type(strlen(text) + 1);
+    write_in_space(h, name, quiet_creation(), type, H5Screate(H5S_SCALAR), text);
     H5Tclose(type);
 }
 
 void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names)
 {
     if (h->status != BT_OK) return;
-    const hid_t type = text_type(H5T_VARIABLE), space = H5Screate_simple(1, &n, NULL);
-    write_in_space(h, name, type, type, space, names);
-    H5Sclose(space);
+    const hid_t type = text_type(H5T_VARIABLE);
+    write_in_space(h, name, quiet_creation(), type, H5Screate_simple(1, &n, NULL), names);
     H5Tclose(type);
 }
 
@@ -164,7 +181,7 @@ void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double va
     attr(h, object, name, H5T_NATIVE_DOUBLE, &value);
 }
 
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool deflate)
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool packed)
 {
     if (h->status != BT_OK) return -1;
     hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk};
@@ -175,10 +192,7 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
     }
     const hid_t space = H5Screate_simple(rank, now, most), create = quiet_creation();
     H5Pset_chunk(create, rank, piece);
-    if (deflate) {
-        H5Pset_shuffle(create);
-        H5Pset_deflate(create, 4);
-    }
+    if (packed) deflate(create);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     check(h, d >= 0);
     H5Pclose(create);
