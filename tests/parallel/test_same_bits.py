@@ -54,7 +54,7 @@ def test_the_cases_reach_the_parallel_loops(one_thread):
 @pytest.mark.parametrize("threads", [2, 4])
 def test_threads(one_thread, threads):
     case, one, folder = one_thread
-    many = run(folder, case, "--threads", threads, name=f"out{threads}")
+    many = run(folder, case, "--threads", threads, name=f"out{threads}", env=environment())
     assert many.summary["threads"] == threads
     assert_same(one, many)
 
@@ -91,7 +91,7 @@ ODD = changed(
 HAND = {
     "run": {"dt": 0.1, "duration": 8}, "domain": {"length": 9, "width": 5.3, "sides": "periodic"}, "ice": {"concentration": 0},
     "body": {"shape": "none"},
-    "floes": [{"shape": "disc", "length": 1.1, "x": 2, "y": 0.1, "vx": 0.37, "vy": -0.11, "yaw_rate": 7},
+    "floes": [{"shape": "disc", "length": 1.1, "x": 2, "y": 0.1, "yaw": 50, "vx": 0.37, "vy": -0.11, "yaw_rate": 7},
               {"shape": "polygon", "vertices": [[0, 0], [1.7, 0], [1, 1.3]], "x": 5, "y": -0.1, "yaw": 31, "thickness": "7 cm"},
               {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 7.7, "y": 0, "yaw": 80, "fixed": True}],
 }
@@ -146,13 +146,14 @@ def test_sampling_and_frames_do_not_touch_the_state(tmp_path):
 
 def test_the_hash_sees_the_last_bit(tmp_path):
     """A hash that ignored something would make every test above pass."""
-    base = run(tmp_path, HAND, name="base").hash
+    base = run(tmp_path, changed(HAND, run__duration=0.1), name="base").hash
+    # A few bits more of a velocity are too little to change the pose in one step: the hash must see both.
     nudged = []
-    for key, value in (("x", 2 * (1 + 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 1e-13), ("vx", 0.37 * (1 + 2e-16)), ("yaw_rate", 7 * (1 + 3e-16))):
+    for key, value in (("x", 2 * (1 + 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 50 * (1 + 2e-16)), ("vx", 0.37 * (1 + 1e-15)), ("yaw_rate", 7 * (1 + 1e-15))):
         case = changed(HAND, run__duration=0.1)
-        same = changed(case)
         case["floes"][0][key] = value
-        assert value != HAND["floes"][0].get(key, 0)
-        nudged.append((key, run(tmp_path, case, name=f"nudged-{key}").hash != run(tmp_path, same, name=f"same-{key}").hash))
+        assert value != HAND["floes"][0][key]
+        nudged.append((key, run(tmp_path, case, name=key).hash != base))
     assert all(seen for _, seen in nudged), nudged
-    assert run(tmp_path, HAND, "--steps", 79, name="shorter").hash != base
+    still = {"run": {"dt": 0.1, "duration": 9}, "ice": {"concentration": 0.3}, "body": {"shape": "none"}}
+    assert run(tmp_path, still, "--steps", 1, name="one").hash != run(tmp_path, still, "--steps", 2, name="two").hash
