@@ -37,7 +37,7 @@ BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
 TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
 
-.PHONY: all help deps demo test test-long clean install tests lint asan
+.PHONY: all help deps demo test test-long clean install tests lint asan FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug or asan for the others)
@@ -75,6 +75,52 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
 	$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
 
 tests: $(TEST_BIN) ## build the test programs
+
+# --- What a fresh Debian lacks -------------------------------------------------------------------------------
+
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev \
+        libmetis-dev libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
+        python3-yaml python3-pytest ffmpeg
+
+deps: ## install the Debian packages that are missing
+	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
+	if [ -z "$$missing" ]; then exit 0; fi; \
+	echo "bergtow needs these Debian packages:" $$missing; \
+	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
+	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
+	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
+	$$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+
+# pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
+AGAIN := $(MAKE) --no-print-directory -j$(J)
+
+DEMO := out/demo
+demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw its pictures
+	@$(AGAIN) all
+	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
+	$(PYTHON) postproc/plot_force.py $(DEMO)
+	$(PYTHON) postproc/plot_field.py $(DEMO)
+	$(PYTHON) postproc/animate.py $(DEMO)
+	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+
+PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
+test: deps ## every test: units, known answers, same bits, command line
+	@$(AGAIN) all tests
+	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
+
+test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time step, tolerance cut tenfold
+	@$(AGAIN) all
+	BERGTOW=build/release/bergtow $(PYTEST) tests/long
+
+lint: ## format, cppcheck, names of external symbols
+	@tests/lint.sh
+
+asan: ## the unit and physics tests under AddressSanitizer and UBSan
+	@$(AGAIN) CONFIG=asan all tests
+	@for t in $(TEST_SRC:%.c=build/asan/%); do echo $$t; ASAN_OPTIONS=detect_leaks=1 $$t >build/asan/log 2>&1 || { cat build/asan/log; exit 1; }; done
+
+install: all ## install the program into DESTDIR PREFIX
+	install -D -m 755 $(BUILD)/bergtow $(DESTDIR)$(PREFIX)/bin/bergtow
 
 clean: ## remove build/ and out/
 	rm -rf build out

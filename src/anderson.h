@@ -5,7 +5,7 @@
 
 #include "bergtow/base.h"
 
-#define BT_ANDERSON_DEPTH 6
+#define BT_ANDERSON_DEPTH 4 // 6 to 16 need fewer sweeps on smooth problems, but stall on sticking and slipping heavy chains
 
 typedef struct bt_anderson {
     size_t n, cap;

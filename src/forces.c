@@ -43,11 +43,14 @@ static drag_load drag_at(const bt_world *w, bt_idx i, const bt_vel *u)
     return l;
 }
 
-static bt_vel predict(const bt_world *w, bt_idx i, bt_vel u, double cos_f, double sin_f)
+static void predict(bt_world *w, bt_idx i, double cos_f, double sin_f)
 {
     const bt_params *p = &w->par;
-    const double dt = p->dt, m = w->bodies.mass[i], inertia = w->bodies.inertia[i];
-    drag_load l = drag_at(w, i, &u);
+    bt_bodies *b = &w->bodies;
+    const double dt = p->dt, m = b->mass[i], inertia = b->inertia[i];
+    bt_vel u = b->vel[i];
+    b->vel_start[i] = u;
+    const drag_load l = drag_at(w, i, &u);
     if (sin_f != 0) {
         double rx = u.x - p->balance_u, ry = u.y - p->balance_v;
         u.x = p->balance_u + cos_f * rx - sin_f * ry;
@@ -55,10 +58,12 @@ static bt_vel predict(const bt_world *w, bt_idx i, bt_vel u, double cos_f, doubl
     }
     u.x += dt * p->tilt_ax;
     u.y += dt * p->tilt_ay;
-    u.x = (m * u.x + dt * l.jx) / (m + dt * l.k);
-    u.y = (m * u.y + dt * l.jy) / (m + dt * l.k);
-    u.w = inertia * u.w / (inertia + dt * l.kw);
-    return u;
+    const bt_inv inv = {1 / (m + dt * l.k), 1 / (inertia + dt * l.kw)};
+    u.x = (m * u.x + dt * l.jx) * inv.m;
+    u.y = (m * u.y + dt * l.jy) * inv.m;
+    u.w = inertia * u.w * inv.i;
+    b->inv[i] = inv;
+    b->vel[i] = b->vel_free[i] = u;
 }
 
 void bt_forces_predict(bt_world *w)
@@ -67,11 +72,8 @@ void bt_forces_predict(bt_world *w)
     const double turn = w->par.coriolis * w->par.dt, cos_f = cos(turn), sin_f = sin(turn);
 #pragma omp parallel for schedule(static) if (b->n > 2000)
     for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] == BT_DYNAMIC) {
-            b->vel_start[i] = b->vel[i];
-            b->vel[i] = predict(w, i, b->vel[i], cos_f, sin_f);
-        }
-        b->vel_free[i] = b->vel[i];
+        if (b->motion[i] == BT_DYNAMIC) predict(w, i, cos_f, sin_f);
+        else b->vel_free[i] = b->vel[i];
     }
 }
 
@@ -79,14 +81,16 @@ void bt_forces_impulse(const bt_world *w, bt_idx i, double j[3])
 {
     const bt_bodies *b = &w->bodies;
     const bt_params *p = &w->par;
+    const bt_vel *u = &b->vel[i];
     if (b->motion[i] == BT_DYNAMIC) {
-        j[0] = b->mass[i] * (b->vel_free[i].x - b->vel_start[i].x);
-        j[1] = b->mass[i] * (b->vel_free[i].y - b->vel_start[i].y);
-        j[2] = b->inertia[i] * (b->vel_free[i].w - b->vel_start[i].w);
+        const bt_vel *u1 = &b->vel_start[i], *free = &b->vel_free[i];
+        const double m = b->mass[i], inertia = b->inertia[i], me = 1 / b->inv[i].m, ie = 1 / b->inv[i].i;
+        j[0] = me * free->x - m * u1->x - (me - m) * u->x;
+        j[1] = me * free->y - m * u1->y - (me - m) * u->y;
+        j[2] = ie * free->w - inertia * u1->w - (ie - inertia) * u->w;
         return;
     }
-    const bt_vel *u = &b->vel[i];
-    drag_load l = drag_at(w, i, u);
+    const drag_load l = drag_at(w, i, u);
     j[0] = p->dt * (l.jx - l.k * u->x + b->mass[i] * (p->tilt_ax - p->coriolis * (u->y - p->balance_v)));
     j[1] = p->dt * (l.jy - l.k * u->y + b->mass[i] * (p->tilt_ay + p->coriolis * (u->x - p->balance_u)));
     j[2] = -p->dt * l.kw * u->w;

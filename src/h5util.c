@@ -2,83 +2,74 @@
 // HDF5 with one way to fail: every call's result goes through a handle that keeps the first error.
 #include "h5util.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "fileio.h"
+#include "h5driver.h"
 
-/// The system's reason out of HDF5's error stack: the file driver prints "errno = N" into its message.
-typedef struct reason {
-    int errnum;
-    char text[200];
-} reason;
-
-static herr_t find_reason(unsigned n, const H5E_error2_t *e, void *data)
+static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
 {
-    (void)n;
-    reason *r = data;
-    if (!e->desc) return 0;
-    const char *at = strstr(e->desc, "errno = ");
-    if (at && !r->errnum) r->errnum = atoi(at + sizeof "errno = " - 1);
-    if (!r->text[0]) snprintf(r->text, sizeof r->text, "%s", e->desc);
+    if (n == 0 && e->desc) snprintf(data, 200, "%s", e->desc);
     return 0;
 }
 
-void bt_h5_fail(bt_h5 *h, const char *action)
+/// Report as "path: cannot ACTION: reason; remedy" and mark the handle as failed.
+static void fail(bt_h5 *h, const char *action)
 {
     if (h->status != BT_OK) return;
-    reason r = {0};
-    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_reason, &r); // the innermost message first
-    if (r.errnum) {
-        h->status = bt_file_fail(h->path, action, r.errnum, h->err);
+    if (*h->errnum) {
+        h->status = bt_file_fail(h->path, action, *h->errnum, h->err);
         return;
     }
+    char text[200] = "unknown reason";
+    H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, innermost_text, text);
     h->status = BT_ERR_IO;
-    bt_errors_add(h->err, "%s: cannot %s: HDF5: %s; %s", h->path, action, r.text[0] ? r.text : "unknown reason",
-                  bt_file_remedy(0));
+    bt_errors_add(h->err, "%s: cannot %s: HDF5: %s; %s", h->path, action, text, bt_file_remedy(0));
+}
+
+/// After writes: HDF5's own word, and what the driver has not told it.
+static void check(bt_h5 *h, bool done)
+{
+    if (!done || *h->errnum) fail(h, "write the file");
 }
 
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
 {
-    *h = (bt_h5){.file = -1, .path = strdup(path), .status = BT_OK, .err = err};
+    *h = (bt_h5){.file = -1, .path = strdup(path), .status = BT_OK, .errnum = bt_alloc(1, sizeof(int)), .err = err};
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
-    // The writer's exclusive lock would keep every reader out for the whole run. Without it a reader sees the file as of
-    // the last flush; and metadata stays in memory between flushes, so that an interrupted run leaves just that.
-    H5Pset_file_locking(access, 0, 1);
+    bool set = bt_h5driver_select(access, h->errnum) >= 0;
+    // Metadata stays in memory between flushes, so that a reader, or an interrupted run, finds the state of the last flush.
     H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
-    if (H5Pget_mdc_config(access, &cache) >= 0) {
-        cache.evictions_enabled = 0;
-        cache.incr_mode = H5C_incr__off;
-        cache.flash_incr_mode = H5C_flash_incr__off;
-        cache.decr_mode = H5C_decr__off;
-        H5Pset_mdc_config(access, &cache);
-    }
-    h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
-    if (h->file < 0) bt_h5_fail(h, "create the file");
+    set = set && H5Pget_mdc_config(access, &cache) >= 0;
+    cache.evictions_enabled = 0;
+    cache.incr_mode = H5C_incr__off;
+    cache.flash_incr_mode = H5C_flash_incr__off;
+    cache.decr_mode = H5C_decr__off;
+    set = set && H5Pset_mdc_config(access, &cache) >= 0;
+    if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
+    if (h->file < 0) fail(h, "create the file");
     H5Pclose(access);
-    if (h->status != BT_OK) {
-        free(h->path);
-        h->path = NULL;
-    }
+    if (h->status != BT_OK) bt_h5_close(h);
     return h->status;
 }
 
 void bt_h5_flush(bt_h5 *h)
 {
     if (h->status != BT_OK) return;
-    if (H5Fflush(h->file, H5F_SCOPE_LOCAL) < 0) bt_h5_fail(h, "write the file");
+    check(h, H5Fflush(h->file, H5F_SCOPE_LOCAL) >= 0);
 }
 
 bt_status bt_h5_close(bt_h5 *h)
 {
     if (h->file >= 0) {
         bt_h5_flush(h);
-        if (H5Fclose(h->file) < 0) bt_h5_fail(h, "close the file");
+        check(h, H5Fclose(h->file) >= 0);
     }
     free(h->path);
+    free(h->errnum);
     const bt_status status = h->status;
     *h = (bt_h5){.file = -1, .status = status};
     return status;
@@ -88,7 +79,7 @@ void bt_h5_group(bt_h5 *h, const char *name)
 {
     if (h->status != BT_OK) return;
     const hid_t g = H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    if (g < 0 || H5Gclose(g) < 0) bt_h5_fail(h, "write the file");
+    check(h, g >= 0 && H5Gclose(g) >= 0);
 }
 
 /// Creation properties under which two runs of one case give the same file contents.
@@ -99,22 +90,41 @@ static hid_t quiet_creation(void)
     return p;
 }
 
-static void write_in_space(bt_h5 *h, const char *name, hid_t type, hid_t mem, hid_t space, const void *data)
+static void deflate(hid_t create)
 {
-    const hid_t create = quiet_creation();
+    H5Pset_shuffle(create);
+    H5Pset_deflate(create, 4);
+}
+
+/// Takes over (closes) the creation properties and the space.
+static void write_in_space(bt_h5 *h, const char *name, hid_t create, hid_t type, hid_t space, const void *data)
+{
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
-    if (d < 0 || (filled && H5Dwrite(d, mem, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)) bt_h5_fail(h, "write the file");
-    if (d >= 0) H5Dclose(d);
+    check(h, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
+    if (d >= 0) check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    H5Sclose(space);
     H5Pclose(create);
 }
 
 void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
 {
     if (h->status != BT_OK) return;
-    const hid_t space = H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL);
-    write_in_space(h, name, mem, mem, space, data);
-    H5Sclose(space);
+    write_in_space(h, name, quiet_creation(), mem, H5Screate_simple(width ? 2 : 1, (hsize_t[]){n, width}, NULL), data);
+}
+
+void bt_h5_write_packed(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data)
+{
+    if (h->status != BT_OK) return;
+    const hid_t create = quiet_creation();
+    const int rank = width ? 2 : 1;
+    const hsize_t size[2] = {n, width};
+    // The index of a chunked dataset takes 2 kB.
+    if (n * (width ? width : 1) * H5Tget_size(mem) > 8192) {
+        H5Pset_chunk(create, rank, size);
+        deflate(create);
+    }
+    write_in_space(h, name, create, mem, H5Screate_simple(rank, size, NULL), data);
 }
 
 static hid_t text_type(size_t size)
@@ -128,18 +138,16 @@ static hid_t text_type(size_t size)
 void bt_h5_write_text(bt_h5 *h, const char *name, const char *text)
 {
     if (h->status != BT_OK) return;
-    const hid_t type = text_type(strlen(text) + 1), space = H5Screate(H5S_SCALAR);
-    write_in_space(h, name, type, type, space, text);
-    H5Sclose(space);
+    const hid_t type = text_type(strlen(text) + 1);
+    write_in_space(h, name, quiet_creation(), type, H5Screate(H5S_SCALAR), text);
     H5Tclose(type);
 }
 
 void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names)
 {
     if (h->status != BT_OK) return;
-    const hid_t type = text_type(H5T_VARIABLE), space = H5Screate_simple(1, &n, NULL);
-    write_in_space(h, name, type, type, space, names);
-    H5Sclose(space);
+    const hid_t type = text_type(H5T_VARIABLE);
+    write_in_space(h, name, quiet_creation(), type, H5Screate_simple(1, &n, NULL), names);
     H5Tclose(type);
 }
 
@@ -149,7 +157,7 @@ static void attr(bt_h5 *h, const char *object, const char *name, hid_t type, con
     const hid_t space = H5Screate(H5S_SCALAR), o = H5Oopen(h->file, object, H5P_DEFAULT);
     if (o >= 0 && H5Aexists(o, name) > 0) H5Adelete(o, name);
     const hid_t a = o < 0 ? -1 : H5Acreate2(o, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    if (a < 0 || H5Awrite(a, type, value) < 0) bt_h5_fail(h, "write the file");
+    check(h, a >= 0 && H5Awrite(a, type, value) >= 0);
     if (a >= 0) H5Aclose(a);
     if (o >= 0) H5Oclose(o);
     H5Sclose(space);
@@ -173,7 +181,7 @@ void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double va
     attr(h, object, name, H5T_NATIVE_DOUBLE, &value);
 }
 
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool deflate)
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool packed)
 {
     if (h->status != BT_OK) return -1;
     hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk};
@@ -184,12 +192,9 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
     }
     const hid_t space = H5Screate_simple(rank, now, most), create = quiet_creation();
     H5Pset_chunk(create, rank, piece);
-    if (deflate) {
-        H5Pset_shuffle(create);
-        H5Pset_deflate(create, 4);
-    }
+    if (packed) deflate(create);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
-    if (d < 0) bt_h5_fail(h, "write the file");
+    check(h, d >= 0);
     H5Pclose(create);
     H5Sclose(space);
     return d;
@@ -203,17 +208,14 @@ void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, con
     const int rank = H5Sget_simple_extent_dims(space, size, NULL);
     H5Sclose(space);
     size[0] = at + n;
-    if (rank < 1 || H5Dset_extent(dataset, size) < 0) {
-        bt_h5_fail(h, "write the file");
-        return;
-    }
+    check(h, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
+    if (h->status != BT_OK) return;
     space = H5Dget_space(dataset);
     size[0] = n;
     const hid_t here = H5Screate_simple(rank, size, NULL);
     const bool filled = H5Sget_simple_extent_npoints(here) > 0;
-    if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) < 0 ||
-        (filled && H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) < 0))
-        bt_h5_fail(h, "write the file");
+    check(h, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+                 (!filled || H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) >= 0));
     H5Sclose(here);
     H5Sclose(space);
 }

@@ -13,6 +13,7 @@ typedef struct bt_h5 {
     hid_t file;
     char *path;
     bt_status status;
+    int *errnum;    ///< first error of the file system, see h5driver.h
     bt_errors *err; ///< where the next error goes; the caller of each public function sets it
 } bt_h5;
 
@@ -23,12 +24,11 @@ void bt_h5_flush(bt_h5 *h);
 /// Close; releases the path. Returns the status of the whole, this call included.
 bt_status bt_h5_close(bt_h5 *h);
 
-/// Report the pending HDF5 error as "path: cannot ACTION: reason; remedy" and mark the handle as failed.
-void bt_h5_fail(bt_h5 *h, const char *action);
-
 void bt_h5_group(bt_h5 *h, const char *name);
 /// Whole dataset [n] (width 0) or [n][width], contiguous. mem: H5T_NATIVE_...
 void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data);
+/// The same, shuffled and deflated where that pays. For data of some size that are written once.
+void bt_h5_write_packed(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data);
 void bt_h5_write_text(bt_h5 *h, const char *name, const char *text);                         ///< scalar, UTF-8
 void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names);     ///< [n], UTF-8
 /// Attributes of an object ("/" for the root). A second write replaces the first.
@@ -37,8 +37,8 @@ void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t valu
 void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value);
 
 /// A dataset of rank 1 to 3 that grows along its first dimension from zero; the others are dims[rank − 1].
-/// chunk: entries of the first dimension in a chunk. deflate: shuffle and deflate too. Returns −1 on failure.
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool deflate);
+/// chunk: entries of the first dimension in a chunk. packed: shuffled and deflated. Returns −1 on failure.
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk, bool packed);
 /// Append n entries along the first dimension, which has `at` entries now.
 void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data);
 

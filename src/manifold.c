@@ -223,9 +223,10 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, cons
         bool of_b = false;
         const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
         clip_points(ref, edge, inc, ref_b, d[0], d[1], margin, m);
-        if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + 1e-9 * w->bodies.radius[a])
+        if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie)
             return true;
-        // The nearest vertex lies beside the reference edge: a corner is near.
+        // The nearest vertex lies beside the reference edge, and not by the tilt of two nearly parallel edges: a
+        // corner is near.
         m->n_points = 0;
         if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) {
             double x[2], y[2];

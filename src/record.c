@@ -7,6 +7,7 @@
 #include "bergtow/record.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -35,10 +36,11 @@ struct bt_record {
     int64_t n_merged;
     double last_flush;     ///< bt_clock
     // frames
-    hid_t frame_time, pose, body_pose, contact_force, speed, points;
+    hid_t frame_time, pose, body_pose, contact_force, speed;
     double *times;         ///< [n_frames] s
     int64_t n_frames, cap_frames;
     float *world;          ///< [offsets[n_bodies]][2] m, scratch
+    float *cells;          ///< [n_bodies] scratch
 };
 
 static void write_bodies(bt_record *r, const bt_record_bodies *b)
@@ -93,7 +95,8 @@ static void create_series(bt_record *r)
     static const char *const merge[] = {[BT_KEEP_LAST] = "last step", [BT_KEEP_MEAN] = "mean of the steps",
                                         [BT_KEEP_MAX] = "largest of the steps", [BT_KEEP_SUM] = "sum of the steps"};
     bt_h5_group(&r->h5, "/series");
-    bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", bt_max(1, (double)r->c->output.sample_every));
+    const int64_t every = r->c->output.sample_every;
+    bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
     for (int k = 0; k < bt_n_series_fields; k++) {
         const bt_series_field *f = &bt_series_fields[k];
         char *name = bt_file_join("/series", f->name);
@@ -109,14 +112,12 @@ static void create_frames(bt_record *r)
 {
     bt_h5 *h = &r->h5;
     const hsize_t nf = (hsize_t)r->n_floes, nb = (hsize_t)(r->n_bodies - r->n_floes), all = (hsize_t)r->n_bodies;
-    const hsize_t vertices = (hsize_t)r->offsets[r->n_bodies];
     bt_h5_group(h, "/frames");
     r->frame_time = bt_h5_growing(h, "/frames/time", H5T_NATIVE_DOUBLE, 1, NULL, BUFFER, false);
     r->pose = bt_h5_growing(h, "/frames/pose", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){nf, 3}, 1, true);
     r->body_pose = bt_h5_growing(h, "/frames/body_pose", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){nb, 3}, 1, true);
     r->contact_force = bt_h5_growing(h, "/frames/contact_force", H5T_NATIVE_DOUBLE, 2, &nf, 1, true);
     r->speed = bt_h5_growing(h, "/frames/speed", H5T_NATIVE_DOUBLE, 2, &all, 1, true);
-    r->points = bt_h5_growing(h, "/frames/points", H5T_NATIVE_FLOAT, 3, (hsize_t[]){vertices, 2}, 1, true);
     bt_h5_attr_text(h, "/frames/time", "units", "s");
     bt_h5_attr_text(h, "/frames/pose", "units", "m, m, rad");
     bt_h5_attr_text(h, "/frames/pose", "description", "x, y, yaw of each floe");
@@ -126,8 +127,6 @@ static void create_frames(bt_record *r)
     bt_h5_attr_text(h, "/frames/contact_force", "description", "largest normal contact force on the floe in the step");
     bt_h5_attr_text(h, "/frames/speed", "units", "m/s");
     bt_h5_attr_text(h, "/frames/speed", "description", "speed of the centroid: floes, then /bodies");
-    bt_h5_attr_text(h, "/frames/points", "units", "m");
-    bt_h5_attr_text(h, "/frames/points", "description", "vertices of floes, then of /bodies, in the world frame");
 }
 
 static void record_free(bt_record *r)
@@ -140,13 +139,14 @@ static void record_free(bt_record *r)
     free(r->buffer);
     free(r->times);
     free(r->world);
+    free(r->cells);
     free(r);
 }
 
 /// Close datasets and file; returns the status of everything that went to the file.
 static bt_status close_file(bt_record *r)
 {
-    const hid_t frames[] = {r->frame_time, r->pose, r->body_pose, r->contact_force, r->speed, r->points};
+    const hid_t frames[] = {r->frame_time, r->pose, r->body_pose, r->contact_force, r->speed};
     for (int k = 0; k < bt_n_series_fields; k++)
         if (r->series[k] >= 0) H5Dclose(r->series[k]);
     for (size_t k = 0; k < sizeof frames / sizeof *frames; k++)
@@ -193,10 +193,11 @@ bt_status bt_record_open(bt_record **out, const char *dir, const bt_case *c, con
     r->vertices = bt_alloc(coordinates, sizeof *r->vertices);
     if (coordinates) memcpy(r->vertices, b->vertices + 2 * b->offsets[0], coordinates * sizeof *r->vertices);
     r->world = bt_alloc(coordinates, sizeof *r->world);
+    r->cells = bt_alloc((size_t)b->n_bodies, sizeof *r->cells);
     r->buffer = bt_alloc((size_t)bt_n_series_fields * BUFFER, sizeof *r->buffer);
     r->series = bt_alloc((size_t)bt_n_series_fields, sizeof *r->series);
     for (int k = 0; k < bt_n_series_fields; k++) r->series[k] = -1;
-    r->frame_time = r->pose = r->body_pose = r->contact_force = r->speed = r->points = -1;
+    r->frame_time = r->pose = r->body_pose = r->contact_force = r->speed = -1;
     r->h5.file = -1;
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, "result.h5");
@@ -268,7 +269,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
         case BT_KEEP_LAST: *m = x; break;
         case BT_KEEP_MEAN:
         case BT_KEEP_SUM: *m += x; break;
-        case BT_KEEP_MAX: *m = x <= *m ? *m : x; break; // a NaN stays in sight
+        case BT_KEEP_MAX: *m = bt_max_seen(*m, x); break;
         }
     }
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
@@ -288,6 +289,36 @@ static void place_vertices(bt_record *r, const double *pose)
     }
 }
 
+/// One dataset of the frame's group in single precision.
+static void write_cells(bt_record *r, const char *name, const double *x, bt_idx n)
+{
+    char path[64];
+    snprintf(path, sizeof path, "/xdmf/%06lld/%s", (long long)r->n_frames, name);
+    for (bt_idx i = 0; i < n; i++) r->cells[i] = (float)x[i];
+    bt_h5_write_packed(&r->h5, path, H5T_NATIVE_FLOAT, (hsize_t)n, 0, r->cells);
+}
+
+/// What frames.xdmf refers to, see xdmf.c.
+static void write_for_paraview(bt_record *r, const double *contact_force, const double *speed)
+{
+    const bt_idx nf = r->n_floes, nb = r->n_bodies - nf;
+    const int64_t floe_vertices = r->offsets[nf], body_vertices = r->offsets[r->n_bodies] - floe_vertices;
+    char path[64];
+    snprintf(path, sizeof path, "/xdmf/%06lld", (long long)r->n_frames);
+    bt_h5_group(&r->h5, path);
+    if (nf > 0) {
+        snprintf(path, sizeof path, "/xdmf/%06lld/floe_points", (long long)r->n_frames);
+        bt_h5_write_packed(&r->h5, path, H5T_NATIVE_FLOAT, (hsize_t)floe_vertices, 2, r->world);
+        write_cells(r, "floe_speed", speed, nf);
+        write_cells(r, "floe_force", contact_force, nf);
+    }
+    if (nb > 0) {
+        snprintf(path, sizeof path, "/xdmf/%06lld/body_points", (long long)r->n_frames);
+        bt_h5_write_packed(&r->h5, path, H5T_NATIVE_FLOAT, (hsize_t)body_vertices, 2, r->world + 2 * floe_vertices);
+        write_cells(r, "body_speed", speed + nf, nb);
+    }
+}
+
 bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force,
                           const double *speed, bt_errors *err)
 {
@@ -301,7 +332,7 @@ bt_status bt_record_frame(bt_record *r, double time, const double *pose, const d
     bt_h5_append(h, r->body_pose, H5T_NATIVE_DOUBLE, at, 1, pose + 3 * (size_t)r->n_floes);
     bt_h5_append(h, r->contact_force, H5T_NATIVE_DOUBLE, at, 1, contact_force);
     bt_h5_append(h, r->speed, H5T_NATIVE_DOUBLE, at, 1, speed);
-    bt_h5_append(h, r->points, H5T_NATIVE_FLOAT, at, 1, r->world);
+    write_for_paraview(r, contact_force, speed);
     if (h->status != BT_OK) return h->status;
     if (r->n_frames == r->cap_frames) {
         r->cap_frames = r->cap_frames ? 2 * r->cap_frames : 64;
@@ -325,13 +356,11 @@ static void write_totals(bt_record *r, const bt_run_totals *t)
 
 static bt_status write_xdmf(const bt_record *r, bt_errors *err)
 {
-    char *h5 = bt_file_join(r->dir, "result.h5");
     char *text = bt_xdmf_text(&(bt_xdmf){
-        .h5 = h5, .n_floes = r->n_floes, .n_others = r->n_bodies - r->n_floes, .floe_vertices = r->offsets[r->n_floes],
-        .other_vertices = r->offsets[r->n_bodies] - r->offsets[r->n_floes], .time = r->times, .n_frames = r->n_frames});
+        .n_floes = r->n_floes, .n_bodies = r->n_bodies - r->n_floes, .floe_vertices = r->offsets[r->n_floes],
+        .body_vertices = r->offsets[r->n_bodies] - r->offsets[r->n_floes], .time = r->times, .n_frames = r->n_frames});
     const bt_status status = write_text(r, "frames.xdmf", text, err);
     free(text);
-    free(h5);
     return status;
 }
 

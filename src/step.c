@@ -56,7 +56,7 @@ static void advance(bt_world *w)
     }
 }
 
-/// Σ M (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
+/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
 /// line; returns the difference over the momentum exchanged (both from the velocities and the rows, independently).
 static double momentum_residual(const bt_world *w)
 {
@@ -67,8 +67,8 @@ static double momentum_residual(const bt_world *w)
         if (b->motion[i] != BT_DYNAMIC) continue;
         double dx = b->vel[i].x - b->vel_free[i].x, dy = b->vel[i].y - b->vel_free[i].y;
         if (dx == 0 && dy == 0) continue;
-        bt_sum_add(&gained[0], b->mass[i] * dx);
-        bt_sum_add(&gained[1], b->mass[i] * dy);
+        bt_sum_add(&gained[0], dx / b->inv[i].m);
+        bt_sum_add(&gained[1], dy / b->inv[i].m);
         bt_sum_add(&carried, b->mass[i] * (fabs(b->vel[i].x) + fabs(b->vel[i].y)));
     }
     for (bt_idx k = 0; k < s->n_rows; k++) {
@@ -109,7 +109,7 @@ void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
     double t0 = bt_clock();
-    bt_forces_predict(w); // U* = U1 + M⁻¹ F_ext Δt
+    bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     double t1 = bt_clock();
     bt_contacts_detect(w, bt_contacts_margin(w)); // gaps and J at X1

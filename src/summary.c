@@ -43,10 +43,9 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     h->sum_contacts += s->contacts;
     h->sum_sweeps += s->sweeps;
     h->contact_work += s->contact_work;
-    h->max_overlap = bt_max(h->max_overlap, s->overlap);
-    h->max_residual = bt_max(h->max_residual, s->residual);
-    // !(a <= b) lets a NaN through into the maximum instead of losing it.
-    if (!(s->momentum_residual <= h->max_momentum_residual)) h->max_momentum_residual = s->momentum_residual;
+    h->max_overlap = bt_max_seen(h->max_overlap, s->overlap);
+    h->max_residual = bt_max_seen(h->max_residual, s->residual);
+    h->max_momentum_residual = bt_max_seen(h->max_momentum_residual, s->momentum_residual);
     if (!isnan(s->line_tension)) h->peak_tension = isnan(h->peak_tension) ? s->line_tension
                                                                           : bt_max(h->peak_tension, s->line_tension);
     h->unconverged += s->unconverged != 0;
@@ -182,7 +181,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (h->positive_work)
         bt_errors_add(&s->warnings, "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
                       (long long)h->positive_work, (long long)h->n);
-    if (h->max_overlap > OVERLAP_LIMIT * t->mean_size)
+    if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
         bt_errors_add(&s->warnings, "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
                       "solver.position_sweeps", h->max_overlap, 100 * h->max_overlap / t->mean_size);
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))

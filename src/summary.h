@@ -17,6 +17,9 @@ typedef struct bt_history {
     int64_t unconverged, positive_work;
 } bt_history;
 
+/// The larger of the two, and NaN when one of them is: a maximum must not hide it.
+static inline double bt_max_seen(double a, double b) { return a >= b || a != a ? a : b; }
+
 void bt_history_init(bt_history *h);
 void bt_history_add(bt_history *h, const bt_sample *s);
 void bt_history_free(bt_history *h);

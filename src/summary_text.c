@@ -107,9 +107,9 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
 static const char *force(char out[32], double newton)
 {
     const double size = fabs(newton);
-    if (size >= 1e6) snprintf(out, 32, "%.4g MN", newton / 1e6);
-    else if (size >= 1e3) snprintf(out, 32, "%.4g kN", newton / 1e3);
-    else snprintf(out, 32, "%.4g N", newton);
+    if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
+    else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
+    else snprintf(out, 32, "%#.4g N", newton);
     return out;
 }
 

@@ -2,16 +2,16 @@
 // The frames for ParaView: an XML description of what is in result.h5.
 //
 // ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame in the world frame, in single
-// precision (/frames/points). The polygons never change: their connectivity is stored once (/xdmf/floes,
-// /xdmf/bodies) and each frame is a hyperslab of the points. Floes and other bodies are two blocks, because only
-// floes have a contact force; the speed is one dataset of which each block takes its part. References to
-// result.h5 are absolute: ParaView's Xdmf3 reader does not resolve relative ones.
+// precision; the polygons never change, and their connectivity is stored once:
+//     /xdmf/floes, /xdmf/bodies                                  mixed topology
+//     /xdmf/NNNNNN/{floe_points, floe_speed, floe_force, body_points, body_speed}     frame NNNNNN
+// Floes and other bodies are two blocks, because only floes have a contact force. Each frame has datasets of its own: as
+// hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps a
+// geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be moved.
 #include "xdmf.h"
 
 #include <inttypes.h>
-#include <limits.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #define XDMF_POLYGON 3
 
@@ -30,71 +30,41 @@ int64_t bt_xdmf_topology(int64_t n, const int64_t *offsets, int32_t *out)
     return k;
 }
 
-static void escape(FILE *f, const char *s)
+static void data_item(FILE *f, int64_t n, int width, const char *type, const char *dataset)
 {
-    for (; *s; s++) {
-        switch (*s) {
-        case '&': fputs("&amp;", f); break;
-        case '<': fputs("&lt;", f); break;
-        case '>': fputs("&gt;", f); break;
-        default: fputc(*s, f);
-        }
-    }
+    fprintf(f, "<DataItem Dimensions=\"%" PRId64 "%s\" NumberType=\"%s\" Precision=\"4\" Format=\"HDF\">result.h5:%s</DataItem>",
+            n, width == 2 ? " 2" : "", type, dataset);
 }
 
-/// One block of one frame: cells [cell0, cell0 + cells) with points [point0, point0 + points).
-typedef struct block {
-    const char *name, *topology;
-    int64_t cell0, cells, point0, points;
-    bool forced; ///< has a contact force
-} block;
-
-static void attribute(FILE *f, const char *h5, const char *name, const char *dataset, int64_t frame, int64_t n_frames,
-                      int64_t first, int64_t count, int64_t width)
+static void attribute(FILE *f, int64_t n, const char *name, int64_t frame, const char *kind, const char *quantity)
 {
-    fprintf(f,
-            "          <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">\n"
-            "            <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 %" PRId64 "\">\n"
-            "              <DataItem Dimensions=\"3 2\" Format=\"XML\">%" PRId64 " %" PRId64 " 1 1 1 %" PRId64 "</DataItem>\n"
-            "              <DataItem Dimensions=\"%" PRId64 " %" PRId64 "\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">",
-            name, count, frame, first, count, n_frames, width);
-    escape(f, h5);
-    fprintf(f, ":%s</DataItem>\n            </DataItem>\n          </Attribute>\n", dataset);
+    char path[64];
+    snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_%s", frame, kind, quantity);
+    fprintf(f, "          <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">\n            ", name);
+    data_item(f, n, 1, "Float", path);
+    fputs("\n          </Attribute>\n", f);
 }
 
-static void write_block(FILE *f, const bt_xdmf *x, const char *h5, const block *b, int64_t frame)
+/// Floes or other bodies of one frame: kind "floe" or "body".
+static void block(FILE *f, const char *name, const char *kind, int64_t cells, int64_t points, int64_t frame)
 {
-    const int64_t all_points = x->floe_vertices + x->other_vertices;
-    fprintf(f,
-            "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
-            "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n"
-            "            <DataItem Dimensions=\"%" PRId64 "\" NumberType=\"Int\" Precision=\"4\" Format=\"HDF\">",
-            b->name, b->cells, b->points + 2 * b->cells);
-    escape(f, h5);
-    fprintf(f,
-            ":%s</DataItem>\n          </Topology>\n"
-            "          <Geometry GeometryType=\"XY\">\n"
-            "            <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 %" PRId64 " 2\">\n"
-            "              <DataItem Dimensions=\"3 3\" Format=\"XML\">%" PRId64 " %" PRId64 " 0 1 1 1 1 %" PRId64
-            " 2</DataItem>\n"
-            "              <DataItem Dimensions=\"%" PRId64 " %" PRId64
-            " 2\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">",
-            b->topology, b->points, frame, b->point0, b->points, x->n_frames, all_points);
-    escape(f, h5);
-    fputs(":/frames/points</DataItem>\n            </DataItem>\n          </Geometry>\n", f);
-    attribute(f, h5, "speed", "/frames/speed", frame, x->n_frames, b->cell0, b->cells, x->n_floes + x->n_others);
-    if (b->forced) attribute(f, h5, "contact_force", "/frames/contact_force", frame, x->n_frames, 0, b->cells, x->n_floes);
+    if (cells == 0) return;
+    char path[64];
+    snprintf(path, sizeof path, "/xdmf/%s", name);
+    fprintf(f, "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
+               "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n            ", name, cells);
+    data_item(f, points + 2 * cells, 1, "Int", path);
+    fputs("\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
+    snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_points", frame, kind);
+    data_item(f, points, 2, "Float", path);
+    fputs("\n          </Geometry>\n", f);
+    attribute(f, cells, "speed", frame, kind, "speed");
+    if (*kind == 'f') attribute(f, cells, "contact_force", frame, kind, "force");
     fputs("        </Grid>\n", f);
 }
 
 char *bt_xdmf_text(const bt_xdmf *x)
 {
-    char absolute[PATH_MAX];
-    const char *h5 = realpath(x->h5, absolute) ? absolute : x->h5;
-    const block blocks[] = {
-        {"floes", "/xdmf/floes", 0, x->n_floes, 0, x->floe_vertices, true},
-        {"bodies", "/xdmf/bodies", x->n_floes, x->n_others, x->floe_vertices, x->other_vertices, false},
-    };
     char *text = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&text, &size);
@@ -103,8 +73,8 @@ char *bt_xdmf_text(const bt_xdmf *x)
     for (int64_t i = 0; i < x->n_frames; i++) {
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
                    "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);
-        for (size_t k = 0; k < sizeof blocks / sizeof *blocks; k++)
-            if (blocks[k].cells > 0) write_block(f, x, h5, &blocks[k], i);
+        block(f, "floes", "floe", x->n_floes, x->floe_vertices, i);
+        block(f, "bodies", "body", x->n_bodies, x->body_vertices, i);
         fputs("      </Grid>\n", f);
     }
     fputs("    </Grid>\n  </Domain>\n</Xdmf>\n", f);

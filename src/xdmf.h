@@ -7,9 +7,8 @@
 
 /// Sizes of what result.h5 holds.
 typedef struct bt_xdmf {
-    const char *h5;                            ///< path of result.h5
-    int64_t n_floes, n_others;                 ///< cells
-    int64_t floe_vertices, other_vertices;     ///< points
+    int64_t n_floes, n_bodies;                 ///< cells: floes, other bodies
+    int64_t floe_vertices, body_vertices;      ///< points
     const double *time;                        ///< [n_frames] s
     int64_t n_frames;
 } bt_xdmf;

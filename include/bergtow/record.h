@@ -89,8 +89,8 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
 
 /// Take one frame: pose [n_bodies][3] m, m, rad; floe contact force [n_floes] N (largest normal force on the floe in this
 /// step); speed of the centroid [n_bodies] m/s. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
-/// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies] and, for
-/// ParaView, all vertices in the world frame /frames/points [T][V][2] (single precision).
+/// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies]; and
+/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/xdmf.c).
 bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force,
                           const double *speed, bt_errors *err);
 

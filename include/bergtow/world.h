@@ -23,7 +23,7 @@ typedef enum {
 } bt_motion;
 
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
-typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/M, 1/I with added mass; 0 for infinite
+typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).

@@ -121,11 +121,16 @@ static void not_a_number_stays_visible(void **s)
 static void a_large_offset_does_not_drown_the_spread(void **s)
 {
     (void)s;
-    double x[1000], y[1000];
+    enum { N = 100000 };
+    static double x[N], y[N];
     uint64_t state = 5;
-    ar1(x, 1000, 0.5, &state);
-    for (int i = 0; i < 1000; i++) y[i] = x[i] + 1e9;
-    const bt_mean a = bt_stats_mean(x, 1000), b = bt_stats_mean(y, 1000);
+    ar1(x, N, 0.5, &state);
+    for (int i = 0; i < N; i++) {
+        y[i] = x[i] + 1e9;
+        x[i] = y[i] - 1e9; // exact
+    }
+    const bt_mean a = bt_stats_mean(x, N), b = bt_stats_mean(y, N);
+    assert_true(fabs(b.mean - 1e9 - a.mean) < 1.5e-7); // one unit in the last place of 1e9 is 1.2e-7
     assert_true(fabs(a.se / b.se - 1) < 1e-5 && fabs(a.sd / b.sd - 1) < 1e-5);
 }
 

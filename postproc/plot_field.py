@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""The ice field of a run before, during and after the tow, with the channel that the body leaves."""
+import command
+import style
+from bergtow_read import Run, RunError
+from scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+
+def frames_to_show(run, times):
+    """[(label, frame)]: the frames nearest to the times asked for, else first, half of the tow, last."""
+    if not run.n_frames:
+        raise RunError(run.result, "holds no frames", "set output.frame_interval and run the case again")
+    if times:
+        return [("", run.frame_at(t)) for t in times]
+    last = run.n_frames - 1
+    shown = [("before", 0), ("during", last // 2), ("after", last)]
+    return [shown[i] for i in range(3) if i == 0 or shown[i][1] > shown[i - 1][1]]
+
+
+def layout(n, view, turned):
+    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation).
+
+    Wide views stand one below the other, others side by side; sizes follow from the view, so nothing is left blank.
+    """
+    wide, high = view[1] - view[0], view[3] - view[2]
+    if turned:
+        wide, high = high, wide
+    head, foot, left, gap = 0.98, 0.62, 0.78, 0.42
+    if wide > 1.5 * high:
+        width = 12.0
+        w = width - left - 1.15
+        h = w * high / wide
+        size = (width, head + n * h + (n - 1) * gap + foot)
+        rects = [(left, foot + (n - 1 - i) * (h + gap), w, h) for i in range(n)]
+        length = size[1] - head - foot
+        tall = min(length, 4.5)
+        return size, rects, (left + w + 0.22, foot + (length - tall) / 2, 0.16, tall), "vertical"
+    h = min(6.6, 3.9 * high / wide)
+    w = h * wide / high
+    width = max(left + n * w + (n - 1) * 0.25 + 0.3, 7.0)
+    foot += 0.78
+    size = (width, head + h + foot)
+    spare = (width - left - 0.3 - n * w) / max(n - 1, 1)
+    rects = [(left + i * (w + min(spare, 1.0)), foot, w, h) for i in range(n)]
+    right = rects[-1][0] + w
+    long = min(right - left, 5.0)
+    return size, rects, (left + (right - left - long) / 2, 0.58, long, 0.15), "horizontal"
+
+
+def draw(run, kind="speed", times=(), window="auto"):
+    """The figure. kind: speed, force or thickness; times: s; window: whole, body, or auto."""
+    shown = frames_to_show(run, times)
+    follow = window == "body" or (window == "auto" and needs_window(run))
+    if follow and run.towed is None:
+        raise RunError(run.result, "has no towed body", "use --window whole")
+    view = view_body(run) if follow else view_whole(run)
+    size, rects, cax, orientation = layout(len(shown), view, run.geographic)
+    figure = plt.figure(figsize=size)
+    colouring = Colouring(run, kind, [frame for _, frame in shown])
+
+    def inches(rect):
+        return rect[0] / size[0], rect[1] / size[1], rect[2] / size[0], rect[3] / size[1]
+
+    stacked = orientation == "vertical"
+    for i, ((label, frame), rect) in enumerate(zip(shown, rects)):
+        axes = figure.add_axes(inches(rect))
+        scene = Scene(axes, run, colouring, view, follow)
+        scene.show(frame)
+        words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
+        if label:
+            words.insert(0, label)
+        if follow:
+            x, y = run.body_pose(frame)[run.towed, :2]
+            words.append(f"body at x = {x:.1f} m, y = {y:.1f} m")
+        axes.set_title(", ".join(words))
+        if stacked and i < len(shown) - 1:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
+        if not stacked and i > 0:
+            axes.set_ylabel("")
+            axes.tick_params(labelleft=False)
+    if run.n_floes:
+        colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
+    style.headline(figure, run, "ice field", 0.2 / size[0])
+    return figure
+
+
+def main(argv=None):
+    p = command.parser("Draw the ice field before, during and after the tow.", "field.png")
+    p.add_argument("--colour", "--color", choices=COLOURS, default="speed", help="what colours the floes (default: speed)")
+    p.add_argument("--times", metavar="T", type=float, nargs="+", default=(),
+                   help="draw the frames nearest to these times, s, in place of first, middle and last")
+    p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
+                   help="the whole domain, or a window about the body (default: auto, the body in long domains)")
+    a = p.parse_args(argv)
+    if not np.isfinite(a.times).all():
+        p.error("--times: not a finite number")
+    path = command.output(p, a, "field.png", command.PICTURES)
+    with Run(a.run) as run:
+        command.save(draw(run, a.colour, a.times, a.window), path)
+
+
+if __name__ == "__main__":
+    command.guarded(main)

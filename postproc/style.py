@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""One look for all pictures: backend, fonts, sizes, colours, and the words of titles.
+
+Line colours are those of Okabe & Ito (2008), told apart with any colour vision. Maps of floes rise in lightness
+contrast against the water, so that they also read in grey.
+"""
+import textwrap
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first)
+import numpy as np  # noqa: E402
+from matplotlib.colors import LinearSegmentedColormap  # noqa: E402
+
+WATER = "#0c2a43"
+PAPER = "#ffffff"
+INK = "#1d2733"
+FAINT = "#66727f"
+GRID = "#dfe5ea"
+WALL = "#8a949e"
+FIXED = "#5f6871"
+BODY = "#12b3a6"
+BODY_EDGE = "#03302d"
+TRACK = "#8fe3da"
+
+ICE = "#0072b2"       # ice resistance
+TOW = "#d55e00"       # tow force
+DRAG = "#009e73"      # drag
+INERTIA = "#8c6bb1"   # inertia
+WINDOW = "#f0f3f6"    # steady window
+REFERENCE = "#000000"
+
+#: floes by speed: resting ice is white, moving ice turns to vermilion
+SPEED_MAP = LinearSegmentedColormap.from_list("speed", ["#eaf3f8", "#f6dfae", "#f2a541", "#dd5f1b", "#a62a0c"])
+#: floes by contact force: unloaded ice is white, loaded ice turns to purple
+FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#d877b3", "#ab2f86", "#6a0f5b"])
+#: floes by thickness: thin ice is grey-blue, thick ice is white, as from an aircraft
+THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
+
+DPI = 150
+
+plt.rcParams.update({
+    "font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
+    "axes.labelsize": 10.5, "axes.titlesize": 11, "axes.titlelocation": "left", "axes.titlepad": 6,
+    "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.axisbelow": True,
+    "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": False, "grid.color": GRID, "grid.linewidth": 0.7,
+    "xtick.color": FAINT, "ytick.color": FAINT, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
+    "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.width": 0.8, "ytick.major.width": 0.8,
+    "legend.frameon": False, "legend.fontsize": 9.5, "lines.linewidth": 1.6, "lines.solid_capstyle": "round",
+    "figure.dpi": DPI, "savefig.dpi": DPI, "figure.facecolor": PAPER, "svg.fonttype": "none", "pdf.fonttype": 42,
+})
+
+
+def scale(values, unit):
+    """(factor, unit): values / factor read well in the unit, with its k, M or G where they are large."""
+    values = np.asarray(values, dtype=float)
+    values = np.abs(values[np.isfinite(values)])
+    top = values.max(initial=0.0)
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if top >= 2 * factor:
+            return factor, prefix + unit
+    return 1.0, unit
+
+
+def short(value, digits=3):
+    """A number to so many significant digits, without exponent where that can be avoided."""
+    if value == 0 or not np.isfinite(value):
+        return f"{value:g}"
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"
+
+
+def quantity(value, unit):
+    """A number with unit, in thousands where it is large: 12345, "N" gives 12.3 kN."""
+    factor, name = scale([value], unit)
+    return f"{short(value / factor)} {name}"
+
+
+def conditions(run):
+    """What was run, in a few words: concentration, thickness, number of floes, tow."""
+    words = []
+    concentration = run.number("concentration", run.value("ice.concentration"))
+    if run.n_floes and np.isfinite(concentration):
+        words.append(f"{100 * concentration:.0f} % ice")
+    if run.n_floes:
+        words.append(f"{run.n_floes} floes")
+        if np.isfinite(run.value("ice.thickness")):
+            words.append(f"{run.value('ice.thickness'):g} m thick")
+    mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
+    if run.towed is not None and mode != "none" and np.isfinite(speed):
+        words.append(f"towed at {speed:g} m/s" + (" on a line" if mode == "line" else ""))
+    if run.summary.get("stopped"):
+        words.append("stopped early")
+    return ", ".join(words)
+
+
+def plain(text):
+    """Text of a case as one line that matplotlib draws as it is."""
+    return " ".join(str(text).split()).replace("$", r"\$")
+
+
+def title(run):
+    """Title of the case, or the name of the run's folder; at most 80 characters."""
+    return plain(textwrap.shorten(run.summary.get("title") or run.path.resolve().name, 80, placeholder=" ..."))
+
+
+def headline(figure, run, subject, left=0.02):
+    """Title and conditions at the head of a figure, at fixed distances from its top."""
+    height = figure.get_size_inches()[1]
+    figure.text(left, 1 - 0.14 / height, f"{title(run)}: {subject}", va="top", fontsize=13.5, fontweight="bold")
+    figure.text(left, 1 - 0.42 / height, conditions(run), va="top", fontsize=10.5, color=FAINT)

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// How far a run is: one line rewritten on a terminal, plain lines elsewhere.
+#ifndef BT_PROGRESS_H
+#define BT_PROGRESS_H
+
+#include <stdio.h>
+
+#include "bergtow/base.h"
+
+/// Set by the caller before bt_progress_start. In zeroed memory: to stderr, with the monotonic clock, not quiet.
+typedef struct bt_progress {
+    FILE *out;              ///< NULL = stderr
+    double (*clock)(void);  ///< s, NULL = bt_clock; a test sets its own
+    double interval;        ///< wall time between plain lines, s; a terminal is rewritten every 0.2 s
+    int64_t n_steps;        ///< of the whole run
+    bool quiet, terminal;   ///< terminal is found by bt_progress_start unless it is set
+    // state
+    double started, last;   ///< s
+    int64_t first_step;
+    double force_sum;       ///< N
+    int64_t n_force;
+    bool drawn;
+} bt_progress;
+
+/// Begin at a step (not 0 when a run is resumed).
+void bt_progress_start(bt_progress *p, int64_t step);
+/// After a step: its number, the simulated time (s) and the ice resistance of the step (N; NaN without towed body).
+/// Costs one clock reading unless a line is due.
+void bt_progress_step(bt_progress *p, int64_t step, double time, double ice_resistance);
+/// Take the line off the terminal, so that the next output begins on an empty one.
+void bt_progress_end(bt_progress *p);
+
+#endif

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: MIT
+// Builds the world of a case; every derived mass, drag and frame term is formed here and nowhere else.
+#include "bergtow/setup.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/contacts.h"
+#include "bergtow/forces.h"
+#include "bergtow/tow.h"
+
+#define GRAVITY 9.81            // m/s²
+#define EARTH_RATE 7.292115e-5  // Ω, rad/s
+#define LARGE_RATIO 3.0         // a floe with more than this times the mean radius is kept out of the grid
+
+bt_params bt_setup_params(const bt_case *c, double size)
+{
+    const double f = 2 * EARTH_RATE * sin(c->water.latitude);
+    // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
+    // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
+    const double turn = c->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;
+    bt_params p = {
+        .dt = c->run.dt,
+        .x0 = c->domain.x0,
+        .y0 = c->domain.y0,
+        .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+        .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
+        .tolerance = c->solver.tolerance * bt_case_reference_speed(c),
+        .max_sweeps = c->solver.max_sweeps,
+        .warm_start = c->solver.warm_start,
+        .slop = c->solver.slop * size,
+        .position_sweeps = c->solver.position_sweeps,
+        .rest_speed = c->solver.rest_speed,
+        .size = size,
+        .water_u = c->water.current_x,
+        .water_v = c->water.current_y,
+        .air_u = c->air.wind_x,
+        .air_v = c->air.wind_y,
+        .coriolis = turn,
+    };
+    if (c->water.tilt == BT_TILT_GEOSTROPHIC) {
+        p.balance_u = c->water.current_x;
+        p.balance_v = c->water.current_y;
+    } else if (c->water.tilt == BT_TILT_SLOPE) {
+        p.tilt_ax = -GRAVITY * c->water.slope_x;
+        p.tilt_ay = -GRAVITY * c->water.slope_y;
+    }
+    return p;
+}
+
+/// A floe of uniform thickness, floating: draft = h ρ_i/ρ_w.
+static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body_def *d)
+{
+    const bt_moments m = bt_shape_moments(n, v);
+    const double sheet = c->ice.density * h, draft = h * c->ice.density / c->water.density;
+    d->n_vertices = n;
+    d->vertices = v;
+    d->mass = sheet * m.area * (1 + c->ice.added_mass);
+    d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
+    d->friction = c->ice.friction;
+    d->restitution = c->ice.restitution;
+    d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
+                             c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
+}
+
+static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roster *r)
+{
+    for (bt_idx i = 0; i < f->n; i++) {
+        const int64_t first = f->offsets[i];
+        const double *pose = f->pose + 3 * (size_t)i;
+        bt_body_def d = {.motion = BT_DYNAMIC, .x = pose[0], .y = pose[1], .yaw = pose[2]};
+        floe_def(c, (int)(f->offsets[i + 1] - first), f->vertices + 2 * first, f->thickness[i], &d);
+        d.large = sqrt(f->area[i] / BT_PI) > 0.5 * LARGE_RATIO * r->mean_size;
+        r->thickness[bt_world_add(w, &d)] = f->thickness[i];
+    }
+}
+
+static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        double v[2 * BT_MAX_VERTICES];
+        int n = bt_case_floe_outline(g, v);
+        bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
+                         .vx = g->vx, .vy = g->vy, .yaw_rate = g->yaw_rate};
+        floe_def(c, n, v, g->thickness, &d);
+        d.large = bt_shape_moments(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
+        r->thickness[bt_world_add(w, &d)] = g->thickness;
+    }
+}
+
+static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    const bt_moments m = bt_shape_moments(n, v);
+    const double mass = bt_case_body_mass(c);
+    const bool prescribed = c->tow.mode == BT_TOW_SPEED;
+    bt_body_def d = {
+        .motion = prescribed ? BT_KINEMATIC : BT_DYNAMIC,
+        .large = true,
+        .n_vertices = n,
+        .vertices = v,
+        .x = c->body.x,
+        .y = c->body.y,
+        .yaw = c->body.yaw,
+        .vx = c->body.vx,
+        .vy = c->body.vy,
+        .yaw_rate = c->body.yaw_rate,
+        .mass = mass * (1 + c->body.added_mass),
+        // Uniform over the waterline plane, as a prism.
+        .inertia = mass * m.polar / m.area * (1 + c->body.added_inertia),
+        .friction = c->body.friction,
+        .restitution = c->body.restitution,
+        .drag = bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
+                               c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
+    };
+    bt_tow *t = w->tow = bt_alloc(1, sizeof *w->tow);
+    *t = (bt_tow){
+        .mode = c->tow.mode,
+        .ux = cos(c->tow.direction),
+        .uy = sin(c->tow.direction),
+        .speed = c->tow.speed,
+        .ramp = c->tow.ramp,
+        .length0 = c->tow.line_length,
+        .k = c->tow.mode == BT_TOW_LINE ? c->tow.line_stiffness / c->tow.line_length : 0,
+        .c = c->tow.line_damping,
+        .hull_x = c->tow.hull_x,
+        .hull_y = c->tow.hull_y,
+        .dt = c->run.dt,
+        .travel_x = c->body.x,
+        .travel_y = c->body.y,
+    };
+    if (prescribed) {
+        const double s = bt_tow_speed(t, 0);
+        d.vx = s * t->ux;
+        d.vy = s * t->uy;
+        d.yaw_rate = 0;
+    }
+    // The carriage starts a line's length ahead of the fastening point: taut, without tension.
+    const double cy = cos(c->body.yaw), sy = sin(c->body.yaw);
+    t->carriage_x = c->body.x + cy * t->hull_x - sy * t->hull_y + t->length0 * t->ux;
+    t->carriage_y = c->body.y + sy * t->hull_x + cy * t->hull_y + t->length0 * t->uy;
+    w->towed = bt_world_add(w, &d);
+    r->thickness[w->towed] = c->body.draft + c->body.sail;
+}
+
+static void add_wall(const bt_case *c, bt_world *w, double x, double y, double half_x, double half_y, double vx, double vy)
+{
+    const double v[8] = {-half_x, -half_y, half_x, -half_y, half_x, half_y, -half_x, half_y};
+    bt_body_def d = {.motion = vx != 0 || vy != 0 ? BT_KINEMATIC : BT_STATIC, .large = true, .n_vertices = 4, .vertices = v,
+                     .x = x, .y = y, .vx = vx, .vy = vy, .friction = c->domain.wall_friction,
+                     .restitution = c->domain.wall_restitution};
+    bt_world_add(w, &d);
+}
+
+static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
+
+/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners.
+static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
+{
+    const double thick = bt_max(0.1 * bt_max(c->domain.length, c->domain.width), 5 * w->par.size);
+    const double x0 = c->domain.x0, x1 = x0 + c->domain.length, y0 = c->domain.y0, y1 = y0 + c->domain.width;
+    const double mid_x = 0.5 * (x0 + x1), mid_y = 0.5 * (y0 + y1), h = 0.5 * thick;
+    int n = 0;
+    if (c->domain.ends == BT_BOUND_WALL) {
+        const double half = 0.5 * c->domain.width + thick, s = c->domain.ends_closing;
+        add_wall(c, w, x0 - h, mid_y, h, half, s, 0);
+        add_wall(c, w, x1 + h, mid_y, h, half, -s, 0);
+        names[n++] = wall_names[0];
+        names[n++] = wall_names[1];
+    }
+    if (c->domain.sides == BT_BOUND_WALL) {
+        const double half = 0.5 * c->domain.length + thick, s = c->domain.sides_closing;
+        add_wall(c, w, mid_x, y0 - h, half, h, 0, s);
+        add_wall(c, w, mid_x, y1 + h, half, h, 0, -s);
+        names[n++] = wall_names[2];
+        names[n++] = wall_names[3];
+    }
+    return n;
+}
+
+bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
+{
+    double sum = 0, v[2 * BT_MAX_VERTICES];
+    for (bt_idx i = 0; i < f->n; i++) sum += sqrt(4 * f->area[i] / BT_PI);
+    double size = f->n ? sum / f->n : c->ice.size;
+    if (!f->n && c->n_floes) {
+        for (bt_idx i = 0; i < c->n_floes; i++)
+            sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&c->floes[i], v), v).area / BT_PI);
+        size = sum / c->n_floes;
+    }
+    bt_params p = bt_setup_params(c, size);
+    bt_world *w = bt_world_create(&p);
+    const bool with_body = c->body.shape != BT_BODY_ABSENT;
+    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size};
+    r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
+    r->names = bt_alloc(5, sizeof *r->names);
+    add_field(c, f, w, r);
+    add_floes_by_hand(c, w, r);
+    int n = 0;
+    if (with_body) {
+        add_towed_body(c, w, r);
+        r->names[n++] = "towed body";
+    }
+    add_walls(c, w, r->names + n);
+    *out = w;
+
+    // Generated fields are free of overlap by construction; a field that was read or floes given by hand may not be.
+    const double overlap = bt_world_overlap(w);
+    const double allowed = bt_max(p.slop, 1e-9 * size);
+    if (overlap > allowed) {
+        bt_errors_add(err,
+                      "%s: floes, towed body or walls overlap by %.3g m at the start (allowed: %.3g m); move or shrink "
+                      "the floes given by hand, or make the field for this body and domain",
+                      c->path ? c->path : "case", overlap, allowed);
+        return BT_ERR_CASE;
+    }
+    return BT_OK;
+}
+
+void bt_roster_free(bt_roster *r)
+{
+    free(r->thickness);
+    free(r->names);
+    *r = (bt_roster){0};
+}

@@ -1,0 +1,36 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# Runs the compiled test programs given as arguments, then the Python tests, and closes with one line of counts.
+# A program that crashes, or prints no count, is a failure of its own.
+passed=0 failed=0
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+for t in "$@"; do
+    name=${t#*/tests/}
+    start=$(date +%s)
+    "$t" >"$log" 2>&1
+    code=$?
+    p=$(sed -n 's/.*PASSED.* \([0-9][0-9]*\) test(s).*/\1/p' "$log" | tail -1)
+    f=$(sed -n 's/^ *\([0-9][0-9]*\) FAILED TEST(S).*/\1/p' "$log" | tail -1)
+    p=${p:-0} f=${f:-0}
+    if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+    if [ $code -eq 0 ] && [ "$p" -eq 0 ]; then f=1; fi
+    passed=$((passed + p)) failed=$((failed + f))
+    printf '%-40s %4d passed %4d failed  %3d s\n' "$name" "$p" "$f" $(($(date +%s) - start))
+    if [ "$f" -ne 0 ]; then cat "$log"; fi
+done
+
+${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE tests/cli tests/parallel >"$log" 2>&1
+code=$?
+cat "$log"
+p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)
+f=$(sed -n 's/.*\b\([0-9][0-9]*\) failed.*/\1/p' "$log" | tail -1)
+e=$(sed -n 's/.*\b\([0-9][0-9]*\) error.*/\1/p' "$log" | tail -1)
+s=$(sed -n 's/.*\b\([0-9][0-9]*\) skipped.*/\1/p' "$log" | tail -1)
+f=$((${f:-0} + ${e:-0}))
+if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
+passed=$((passed + ${p:-0})) failed=$((failed + f))
+
+echo "$passed passed, $failed failed, ${s:-0} skipped"
+[ "$failed" -eq 0 ]

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// Contact detection: the optimised path against all pairs, distances against an independent computation, features.
+#include "scene.h"
+
+/// Distance of two separate convex polygons by brute force over vertices and edges (own arithmetic, no contact code).
+static double reference_distance(const double *p, int np, const double *q, int nq)
+{
+    double best = INFINITY;
+    for (int side = 0; side < 2; side++) {
+        const double *a = side ? q : p, *b = side ? p : q;
+        int na = side ? nq : np, nb = side ? np : nq;
+        for (int i = 0; i < na; i++)
+            for (int j = 0; j < nb; j++) {
+                const double *e = b + 2 * j, *f = b + 2 * ((j + 1) % nb), *x = a + 2 * i;
+                double dx = f[0] - e[0], dy = f[1] - e[1];
+                double t = ((x[0] - e[0]) * dx + (x[1] - e[1]) * dy) / (dx * dx + dy * dy);
+                t = t < 0 ? 0 : t > 1 ? 1 : t;
+                best = bt_min(best, hypot(x[0] - e[0] - t * dx, x[1] - e[1] - t * dy));
+            }
+    }
+    return best;
+}
+
+static int world_polygon(const bt_world *w, bt_idx i, double shift_x, double shift_y, double *out)
+{
+    const bt_bodies *b = &w->bodies;
+    int n = (int)(b->offset[i + 1] - b->offset[i]);
+    for (int k = 0; k < n; k++) {
+        const double *v = b->vertices + 2 * (b->offset[i] + k);
+        double c = cos(b->pose[i].yaw), s = sin(b->pose[i].yaw);
+        out[2 * k] = b->pose[i].x + shift_x + c * v[0] - s * v[1];
+        out[2 * k + 1] = b->pose[i].y + shift_y + s * v[0] + c * v[1];
+    }
+    return n;
+}
+
+/// Random floes in a box, with large bodies among them; moved at random, so that the list ages.
+static bt_world *random_scene(uint64_t *rng, int n, bool periodic, double box)
+{
+    bt_params p = scene_params(0.1, 1);
+    p.period_x = periodic ? box : 0;
+    p.period_y = periodic ? box : 0;
+    bt_world *w = bt_world_create(&p);
+    double v[2 * BT_MAX_VERTICES];
+    for (int i = 0; i < n; i++) {
+        int nv = scene_random_polygon(rng, 0.2 + 0.5 * scene_uniform(rng), v);
+        bt_body_def d = scene_prism(nv, v, 900);
+        d.x = box * scene_uniform(rng), d.y = box * scene_uniform(rng), d.yaw = 7 * scene_uniform(rng);
+        d.vx = scene_uniform(rng) - 0.5, d.vy = scene_uniform(rng) - 0.5, d.yaw_rate = scene_uniform(rng) - 0.5;
+        bt_world_add(w, &d);
+    }
+    int nv = bt_shape_named("disc", 6, 6, v);
+    bt_body_def d = scene_prism(nv, v, 900);
+    d.x = 0.4 * box, d.y = 0.3 * box, d.vx = 0.5, d.large = true, d.motion = BT_KINEMATIC;
+    bt_world_add(w, &d);
+    if (!periodic) scene_wall(w, -5, -5, 0, box + 5, 0.1);
+    return w;
+}
+
+static void move_all(bt_world *w, uint64_t *rng, double step)
+{
+    bt_bodies *b = &w->bodies;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->motion[i] == BT_STATIC) continue;
+        double dx = step * (scene_uniform(rng) - 0.5), dy = step * (scene_uniform(rng) - 0.5), dr = step * (scene_uniform(rng) - 0.5);
+        b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
+        if (w->par.period_x > 0) b->pose[i].x -= w->par.period_x * floor(b->pose[i].x / w->par.period_x);
+        if (w->par.period_y > 0) b->pose[i].y -= w->par.period_y * floor(b->pose[i].y / w->par.period_y);
+        bt_world_turn_outline(w, i);
+        b->path[i] += hypot(dx, dy) + b->radius[i] * fabs(dr);
+    }
+}
+
+static void detect_equals_brute_force(void **state)
+{
+    (void)state;
+    uint64_t rng = 7;
+    int64_t total = 0;
+    for (int scene = 0; scene < 12; scene++) {
+        const bool periodic = scene % 3 == 2;
+        const double box = scene % 2 ? 12 : 25;
+        bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
+        for (int step = 0; step < 60; step++) {
+            const double margin = step % 20 < 10 ? 0.05 : 0.12; // the margin comes and goes
+            bt_contacts_detect(w, margin);
+            bt_manifold *want;
+            bt_idx n;
+            bt_contacts_brute_force(w, margin, &want, &n);
+            const bt_contacts *c = w->contacts;
+            assert_int_equal(c->n_man, n);
+            total += n;
+            for (bt_idx k = 0; k < n; k++) {
+                assert_int_equal(c->man[k].a, want[k].a);
+                assert_int_equal(c->man[k].b, want[k].b);
+                if (k) assert_true(want[k].a > want[k - 1].a || (want[k].a == want[k - 1].a && want[k].b > want[k - 1].b));
+            }
+            free(want);
+            move_all(w, &rng, 0.03);
+        }
+        assert_true(w->contacts->n_builds < 60); // the list is in fact kept
+        bt_world_free(w);
+    }
+    assert_true(total > 10000);
+}
+
+/// Every separate pair nearer than the margin has a manifold, its least gap is the distance, and none is farther.
+static void gaps_are_distances(void **state)
+{
+    (void)state;
+    uint64_t rng = 11;
+    int seen = 0, corners = 0;
+    for (int scene = 0; scene < 10; scene++) {
+        bt_world *w = random_scene(&rng, 120, scene % 2, 25);
+        const double margin = 0.6;
+        bt_contacts_detect(w, margin);
+        const bt_contacts *c = w->contacts;
+        bt_idx k = 0;
+        for (bt_idx i = 0; i < w->bodies.n; i++)
+            for (bt_idx j = i + 1; j < w->bodies.n; j++) {
+                if (w->bodies.motion[i] != BT_DYNAMIC && w->bodies.motion[j] != BT_DYNAMIC) continue;
+                double p[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], d[2];
+                bt_world_offset(w, i, j, d);
+                int np = world_polygon(w, i, 0, 0, p);
+                int nq = world_polygon(w, j, w->bodies.pose[i].x + d[0] - w->bodies.pose[j].x,
+                                       w->bodies.pose[i].y + d[1] - w->bodies.pose[j].y, q);
+                double distance = reference_distance(p, np, q, nq);
+                while (k < c->n_man && (c->man[k].a < i || (c->man[k].a == i && c->man[k].b < j))) k++;
+                const bool have = k < c->n_man && c->man[k].a == i && c->man[k].b == j;
+                const double gap = have ? bt_min(c->man[k].p[0].gap, c->man[k].p[c->man[k].n_points - 1].gap) : INFINITY;
+                if (have && gap <= 0) continue; // they overlap
+                if (distance > margin + 1e-12) {
+                    assert_false(have);
+                } else if (distance < margin - 1e-12) {
+                    assert_true(have);
+                    // The reference edge may be a near tie (1 % of the radius) of the best one.
+                    CHECK_CLOSE(gap, distance, 0.011);
+                    seen++;
+                    corners += c->man[k].p[0].feature >= 0x7ff00000u && c->man[k].p[0].feature < 0x80000000u;
+                }
+            }
+        bt_world_free(w);
+    }
+    assert_true(seen > 500);
+    assert_true(corners > 20);
+}
+
+/// Both arms of a point end in the same place, on the surfaces' middle; the normal points from a to b.
+static void arms_meet(void **state)
+{
+    (void)state;
+    uint64_t rng = 3;
+    bt_world *w = random_scene(&rng, 200, true, 15);
+    bt_contacts_detect(w, 0.1);
+    assert_true(w->contacts->n_man > 100);
+    for (bt_idx k = 0; k < w->contacts->n_man; k++) {
+        const bt_manifold *m = &w->contacts->man[k];
+        double d[2];
+        bt_world_offset(w, m->a, m->b, d);
+        CHECK_CLOSE(hypot(m->nx, m->ny), 1, 1e-12);
+        assert_true(m->n_points >= 1 && m->n_points <= 2);
+        for (int i = 0; i < m->n_points; i++) {
+            CHECK_CLOSE(m->p[i].ra[0], m->p[i].rb[0] + d[0], 1e-12);
+            CHECK_CLOSE(m->p[i].ra[1], m->p[i].rb[1] + d[1], 1e-12);
+            assert_true(m->p[i].gap <= 0.1);
+        }
+        // Moving b by the normal opens the gap.
+        if (m->p[0].gap > 0) {
+            bt_manifold after;
+            double gap;
+            int32_t axis = -1;
+            const double step = 1e-4;
+            w->bodies.pose[m->b].x += step * m->nx;
+            w->bodies.pose[m->b].y += step * m->ny;
+            if (bt_contacts_pair(w, m->a, m->b, 0.2, m, &after, &gap, &axis))
+                CHECK_CLOSE(bt_min(after.p[0].gap, after.p[after.n_points - 1].gap),
+                            bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) + step, 1e-7);
+            w->bodies.pose[m->b].x -= step * m->nx;
+            w->bodies.pose[m->b].y -= step * m->ny;
+        }
+    }
+    bt_world_free(w);
+}
+
+/// Two squares edge to edge: two points at the ends of the shared edge, the same features while they slide a little.
+static void edge_contact_keeps_its_features(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, 900);
+    bt_world_add(w, &d);
+    d.x = 1.01, d.y = 0.3;
+    bt_world_add(w, &d);
+    uint32_t features[2] = {0, 0};
+    for (int s = 0; s < 50; s++) {
+        bt_contacts_detect(w, 0.05);
+        assert_int_equal(w->contacts->n_man, 1);
+        bt_manifold *m = &w->contacts->man[0];
+        assert_int_equal(m->n_points, 2);
+        CHECK_CLOSE(m->nx, 1, 0.02);
+        if (s == 0) {
+            CHECK_CLOSE(fabs(m->p[0].ra[1] - m->p[1].ra[1]), 0.7, 1e-12);
+            CHECK_CLOSE(m->p[0].gap, 0.01, 1e-12);
+        } else {
+            CHECK_CLOSE(m->p[0].ln, 100 + s - 1, 0);
+            assert_int_equal(m->p[0].feature, features[0]);
+            assert_int_equal(m->p[1].feature, features[1]);
+        }
+        features[0] = m->p[0].feature, features[1] = m->p[1].feature;
+        m->p[0].ln = 100 + s; // must be handed on to the next step
+        w->bodies.pose[1].y += 0.002;
+        w->bodies.pose[1].yaw = 2e-4 * (s % 2 ? 1 : -1); // the two edges take turns in being the better axis
+        bt_world_turn_outline(w, 1);
+        w->bodies.path[1] += 0.01;
+    }
+    bt_world_free(w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(detect_equals_brute_force),
+        cmocka_unit_test(gaps_are_distances),
+        cmocka_unit_test(arms_meet),
+        cmocka_unit_test(edge_contact_keeps_its_features),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// summary.json of made-up runs: its numbers against sums of the test's own, and a warning for each doubt.
+#include "made_up_run.h"
+
+/// The text after "key": up to the end of the line, without a comma.
+static const char *json_value(const char *json, const char *key)
+{
+    static char value[400];
+    char wanted[80];
+    snprintf(wanted, sizeof wanted, "\"%s\": ", key);
+    const char *at = json ? strstr(json, wanted) : NULL;
+    if (!at) {
+        print_error("no %s in %s\n", key, json ? json : "(no file)");
+        return "missing";
+    }
+    snprintf(value, sizeof value, "%s", at + strlen(wanted));
+    value[strcspn(value, "\n")] = '\0';
+    const size_t n = strlen(value);
+    if (n && value[n - 1] == ',') value[n - 1] = '\0';
+    return value;
+}
+
+static void summary_holds_the_numbers(void **state)
+{
+    (void)state;
+    bt_errors err = {0};
+    const bt_case c = made_up_case();
+    assert_int_equal(write_run(in_folder("a"), &c, 600, 3, &err), BT_OK);
+    char *json = slurp(in_folder("a/summary.json"));
+    double mean = 0;
+    const double start = atof(json_value(json, "start_s"));
+    int n = 0;
+    for (int i = 0; i < 600; i++)
+        if (sample(i).time >= start) mean += sample(i).ice_resistance, n++;
+    mean /= n;
+    assert_true(fabs(atof(json_value(json, "mean_ice_resistance_n")) - mean) < 1e-9);
+    assert_true(fabs(atof(json_value(json, "mean_tow_force_n")) - mean - 23) < 1e-9);
+    assert_true(fabs(atof(json_value(json, "closure_n"))) < 1e-9);
+    assert_true(fabs(atof(json_value(json, "ratio")) - mean / 500) < 1e-12);
+    const double se = atof(json_value(json, "mean_ice_resistance_se_n"));
+    assert_true(se > 0 && se < 3);
+    assert_int_equal(atoi(json_value(json, "n_samples")), n);
+    assert_true(n >= 300);
+    assert_string_equal(json_value(json, "rule"), "\"mser5\"");
+    assert_string_equal(json_value(json, "n_floes"), "3");
+    assert_string_equal(json_value(json, "n_steps"), "600");
+    assert_string_equal(json_value(json, "dt_s"), "0.1");
+    assert_string_equal(json_value(json, "sim_time_s"), "60");
+    assert_string_equal(json_value(json, "contacts_mean"), "8.5");
+    assert_string_equal(json_value(json, "mean_sweeps"), "5");
+    assert_string_equal(json_value(json, "unconverged_steps"), "0");
+    assert_string_equal(json_value(json, "positive_work_steps"), "0");
+    assert_string_equal(json_value(json, "contact_work_j"), "-1200");
+    assert_string_equal(json_value(json, "max_overlap_m"), "0.0001");
+    assert_string_equal(json_value(json, "max_overlap_relative"), "5e-05");
+    assert_string_equal(json_value(json, "state_hash"), "\"0123456789abcdef\"");
+    assert_string_equal(json_value(json, "exchange"), "6");
+    assert_true(fabs(atof(json_value(json, "ns_per_floe_step")) - 0.6e9 / 1800) < 1e-3);
+    assert_string_equal(json_value(json, "stopped"), "null");
+    assert_string_equal(json_value(json, "warnings"), "[]");
+    assert_non_null(strstr(json, "\"title\": \"quote \\\" backslash \\\\ newline \\u000a and byte \\ufffd end\""));
+    free(json);
+}
+
+/// Write a run whose samples are changed by spoil, and return its summary.json.
+static char *summary_of(bt_case *c, int steps, const bt_run_totals *t, bt_idx towed, void (*spoil)(bt_sample *, int))
+{
+    bt_errors err = {0};
+    bt_record_bodies b = bodies();
+    b.towed = towed;
+    bt_record *r;
+    assert_int_equal(bt_record_open(&r, in_folder("s"), c, &b, "", &err), BT_OK);
+    for (int i = 0; i < steps; i++) {
+        bt_sample s = sample(i);
+        if (spoil) spoil(&s, i);
+        bt_record_sample(r, &s, &err);
+    }
+    assert_int_equal(bt_record_close(r, t, &err), BT_OK);
+    assert_int_equal(err.n, 0);
+    return slurp(in_folder("s/summary.json"));
+}
+
+static void slow_wave(bt_sample *s, int i)
+{
+    s->ice_resistance = 1000 + 100 * sin(2 * BT_PI * i / 200.0);
+    s->ice_resistance_budget = s->ice_resistance;
+    s->tow_force = s->ice_resistance + 23;
+}
+
+static void everything_wrong(bt_sample *s, int i)
+{
+    s->unconverged = i % 3 == 0;
+    s->contact_work = i % 5 == 0 ? 1 : -1;
+    s->overlap = 0.1;
+    s->momentum_residual = 1e-3;
+    s->tow_force += 100;
+    s->ice_resistance_budget -= 7;
+}
+
+static void broken_number(bt_sample *s, int i)
+{
+    if (i == 400) s->ice_resistance = NAN;
+}
+
+static void every_doubt_is_told(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    bt_run_totals t = totals(600);
+
+    c.output.window_start = 20;
+    char *json = summary_of(&c, 600, &t, FLOES, slow_wave);
+    assert_non_null(strstr(json, "the steady window is short"));
+    assert_string_equal(json_value(json, "rule"), "\"given\"");
+    assert_string_equal(json_value(json, "start_s"), "20");
+    assert_int_not_equal(strncmp(json_value(json, "warning"), "null", 4), 0);
+    free(json);
+
+    t.stopped = "SIGTERM";
+    t.floes_outside = 2;
+    json = summary_of(&c, 600, &t, FLOES, everything_wrong);
+    static const char *const told[] = {"stopped early: SIGTERM", "200 of 600 steps met the sweep limit",
+                                       "120 of 600 steps the contacts added energy", "overlap by up to 0.1 m",
+                                       "momentum is conserved only to 0.001", "2 floes left",
+                                       "differs from tow - drag - inertia", "by the momentum of the ice"};
+    for (size_t k = 0; k < sizeof told / sizeof *told; k++)
+        if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
+    assert_null(strstr(json, "the steady window is short"));
+    free(json);
+
+    t = totals(600);
+    json = summary_of(&c, 600, &t, FLOES, broken_number);
+    assert_string_equal(json_value(json, "mean_ice_resistance_n"), "null");
+    assert_non_null(strstr(json, "not finite"));
+    free(json);
+
+    c.output.window_start = 100;
+    json = summary_of(&c, 600, &t, FLOES, NULL);
+    assert_string_equal(json_value(json, "mean_ice_resistance_n"), "null");
+    assert_non_null(strstr(json, "no steady window: it would begin at 100 s and the run ends at 60 s"));
+    free(json);
+
+    c.output.window_start = -1;
+    c.tow.ramp = 50;
+    json = summary_of(&c, 600, &t, FLOES, NULL);
+    assert_true(atof(json_value(json, "start_s")) >= 50);
+    free(json);
+}
+
+static void without_a_towed_body_forces_are_null(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.reference.mean_force = NAN;
+    const bt_run_totals t = totals(20);
+    char *json = summary_of(&c, 20, &t, -1, NULL);
+    static const char *const null[] = {"mean_ice_resistance_n", "mean_ice_resistance_se_n", "mean_tow_force_n",
+                                       "mean_drag_force_n", "mean_ice_resistance_budget_n", "peak_ice_resistance_n",
+                                       "closure_n", "start_s", "rule", "reference"};
+    for (size_t k = 0; k < sizeof null / sizeof *null; k++) assert_string_equal(json_value(json, null[k]), "null");
+    assert_string_equal(json_value(json, "warnings"), "[]");
+    assert_string_equal(json_value(json, "n_steps"), "20");
+    free(json);
+
+    const bt_run_totals none = totals(0); // not one step
+    json = summary_of(&c, 0, &none, FLOES, NULL);
+    assert_string_equal(json_value(json, "contacts_mean"), "null");
+    assert_string_equal(json_value(json, "sim_time_s"), "0");
+    assert_non_null(strstr(json, "no steady window"));
+    free(json);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(summary_holds_the_numbers),
+        cmocka_unit_test(every_doubt_is_told),
+        cmocka_unit_test(without_a_towed_body_forces_are_null),
+    };
+    int failed;
+    RUN_IN_FOLDER(tests, failed);
+    return failed;
+}
