@@ -212,7 +212,8 @@ static void read_floes(reader *r, bt_field *f)
     }
     f->ice_area = read_ice_area(r);
     if (r->status == BT_OK) {
-        f->n = (bt_idx)n;
+        f->n = f->cap = (bt_idx)n;
+        f->cap_vertices = (int64_t)n_vertices;
         f->area = bt_alloc((size_t)n, sizeof *f->area);
         double sum = 0;
         for (bt_idx i = 0; i < f->n; i++) {

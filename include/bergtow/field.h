@@ -15,6 +15,8 @@ typedef struct bt_field {
     double *area;          ///< [n] m²
     double ice_area;       ///< m², the area that concentration refers to: ice region less the body's footprint
     double concentration;  ///< Σ area / ice_area as made
+    bt_idx cap;            ///< floes the arrays have room for
+    int64_t cap_vertices;  ///< vertices they have room for
 } bt_field;
 
 void bt_field_init(bt_field *f);
