@@ -222,13 +222,18 @@ static void test_surroundings(void **state)
     assert_makes(c, BT_ICE_VORONOI, 0.8, "periodic voronoi");
     assert_makes(c, BT_ICE_RECTANGLES, 0.9, "periodic rectangles");
     assert_makes(c, BT_ICE_POLYGONS, 0.6, "periodic hexagons");
+    c.ice.shake = 0;
+    assert_makes(c, BT_ICE_VORONOI, 0.9, "periodic tessellation");
+    bt_field f = made(&c);
+    assert_true(fabs(f.ice_area - (360 - BT_PI * 2.5 * 2.5 / 4)) < 1e-9); // with all four parts of the body
+    bt_field_free(&f);
     // open ends, a turned square berg that stands half in the ice region
     c = basin();
     c.domain.ends = c.domain.sides = BT_BOUND_OPEN;
     c.body.shape = BT_BODY_SQUARE, c.body.length = 3, c.body.x = 6, c.body.yaw = 0.6;
     c.ice.x_min = 6;
     assert_makes(c, BT_ICE_VORONOI, 0.9, "beside a berg");
-    bt_field f = made(&c);
+    f = made(&c);
     assert_true(fabs(f.ice_area - (30 * 10 - 4.5)) < 1e-9);
     bt_field_free(&f);
     // many floes of very different size
