@@ -12,7 +12,7 @@
 void bt_field_init(bt_field *f)
 {
     *f = (bt_field){0};
-    f->offsets = bt_alloc(16, sizeof *f->offsets);
+    f->offsets = bt_alloc(1, sizeof *f->offsets); // the number of vertices of no floes
 }
 
 void bt_field_free(bt_field *f)
@@ -25,32 +25,28 @@ void bt_field_free(bt_field *f)
     *f = (bt_field){0};
 }
 
-// Arrays always have room for the next power of two, so that no capacity needs to be stored.
-static size_t room_for(int64_t n)
+static void reserve(bt_field *f, int64_t floes, int64_t n_vertices)
 {
-    size_t cap = 16;
-    while (cap < (size_t)n) cap *= 2;
-    return cap;
-}
-
-static bool outgrows(int64_t used, int64_t more, size_t *cap)
-{
-    *cap = room_for(used + more);
-    return used == 0 || *cap != room_for(used);
+    if (floes > f->cap) {
+        size_t cap = (size_t)bt_max((double)floes, 2.0 * f->cap);
+        f->offsets = bt_realloc(f->offsets, cap + 1, sizeof *f->offsets);
+        f->pose = bt_realloc(f->pose, 3 * cap, sizeof *f->pose);
+        f->thickness = bt_realloc(f->thickness, cap, sizeof *f->thickness);
+        f->area = bt_realloc(f->area, cap, sizeof *f->area);
+        f->cap = (bt_idx)cap;
+    }
+    if (n_vertices > f->cap_vertices) {
+        size_t cap = (size_t)bt_max((double)n_vertices, 2.0 * (double)f->cap_vertices);
+        f->vertices = bt_realloc(f->vertices, 2 * cap, sizeof *f->vertices);
+        f->cap_vertices = (int64_t)cap;
+    }
 }
 
 void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness)
 {
-    size_t cap;
     bt_idx i = f->n;
     int64_t at = f->offsets[i];
-    if (outgrows(i, 1, &cap)) {
-        f->pose = bt_realloc(f->pose, 3 * cap, sizeof *f->pose);
-        f->thickness = bt_realloc(f->thickness, cap, sizeof *f->thickness);
-        f->area = bt_realloc(f->area, cap, sizeof *f->area);
-    }
-    if (outgrows(i + 1, 1, &cap)) f->offsets = bt_realloc(f->offsets, cap, sizeof *f->offsets);
-    if (outgrows(at, nv, &cap)) f->vertices = bt_realloc(f->vertices, 2 * cap, sizeof *f->vertices);
+    reserve(f, i + 1, at + nv);
     double *own = f->vertices + 2 * at;
     memcpy(own, v, 2 * (size_t)nv * sizeof *own);
     bt_moments m = bt_shape_centre(nv, own);
@@ -128,11 +124,7 @@ void bt_field_sort(bt_field *f, const bt_yard *y)
     qsort(order, (size_t)f->n, sizeof *order, by_code);
     bt_field g;
     bt_field_init(&g);
-    g.offsets = bt_realloc(g.offsets, room_for(f->n + 1), sizeof *g.offsets);
-    g.vertices = bt_alloc(2 * room_for(f->offsets[f->n]), sizeof *g.vertices);
-    g.pose = bt_alloc(3 * room_for(f->n), sizeof *g.pose);
-    g.thickness = bt_alloc(room_for(f->n), sizeof *g.thickness);
-    g.area = bt_alloc(room_for(f->n), sizeof *g.area);
+    reserve(&g, f->n, f->offsets[f->n]);
     // Copied as they are: bt_field_add would centre once more and change last digits.
     for (bt_idx k = 0; k < f->n; k++) {
         bt_idx i = order[k].i;

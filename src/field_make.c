@@ -250,6 +250,7 @@ static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes,
 
 bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
 {
+    bt_field_free(f);
     bt_field_init(f);
     bt_sizes sizes;
     bt_status status = bt_sizes_init(&sizes, c, err);

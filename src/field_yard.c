@@ -6,10 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Names by enum, for bt_shape_named.
-static const char *const shape_names[] = {[BT_BODY_DISC] = "disc", [BT_BODY_SQUARE] = "square",
-                                          [BT_BODY_RECTANGLE] = "rectangle", [BT_BODY_SHIP] = "ship"};
-
 static void place(int n, double *v, double x, double y, double yaw)
 {
     double c = cos(yaw), s = sin(yaw);
@@ -69,6 +65,19 @@ static bool spans(double a0, double a1, double d0, double length)
     return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
 }
 
+static void add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+{
+    // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
+    int over_x = c->domain.ends == BT_BOUND_PERIODIC && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    for (int ix = -over_x; ix <= over_x; ix++)
+        for (int iy = -over_y; iy <= over_y; iy++) {
+            double v[2 * BT_MAX_VERTICES];
+            memcpy(v, own, 2 * (size_t)n * sizeof *v);
+            place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
+            add_obstacle(y, n, v);
+        }
+}
+
 bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err)
 {
     *y = (bt_yard){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
@@ -82,28 +91,12 @@ bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors
     y->ice_area = (y->x1 - y->x0) * (y->y1 - y->y0);
 
     double v[2 * BT_MAX_VERTICES];
-    if (c->body.shape != BT_BODY_ABSENT) {
-        int n = bt_case_waterline(c, v);
-        if (n >= 3) {
-            place(n, v, c->body.x, c->body.y, c->body.yaw);
-            add_obstacle(y, n, v);
-        }
-    }
+    int nv = bt_case_waterline(c, v);
+    if (nv >= 3) add_body(y, c, nv, v, c->body.x, c->body.y, c->body.yaw);
     for (bt_idx i = 0; i < c->n_floes; i++) {
         const bt_floe_def *d = &c->floes[i];
-        int n = 0;
-        if (d->shape == BT_BODY_POLYGON) {
-            n = d->n_vertices;
-            if (n > BT_MAX_VERTICES) n = 0;
-            if (n > 0) memcpy(v, d->vertices, 2 * (size_t)n * sizeof *v);
-        } else if (d->shape != BT_BODY_ABSENT) {
-            n = bt_shape_named(shape_names[d->shape], d->length, d->width, v);
-        }
-        if (n < 3) continue;
-        // A hand-given polygon lies with its centroid at x, y, like the towed body's.
-        bt_shape_centre(n, v);
-        place(n, v, d->x, d->y, d->yaw);
-        add_obstacle(y, n, v);
+        nv = bt_case_floe_outline(d, v);
+        if (nv >= 3) add_body(y, c, nv, v, d->x, d->y, d->yaw);
     }
     if (!(y->ice_area > 0)) {
         bt_errors_add(err, "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",

@@ -24,13 +24,13 @@ static void shape_piece(double *v, double area, double aspect)
         x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
         y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
     }
-    double l = x1 - x0, w = y1 - y0, cell = l * w;
-    double a = bt_min(1.03 * area, cell); // some room, for the common factor that makes up for floes that do not fit
+    bool along_x = x1 - x0 >= y1 - y0; // the long side along the cell's long side
+    double l = along_x ? x1 - x0 : y1 - y0, w = along_x ? y1 - y0 : x1 - x0;
+    double a = bt_min(1.03 * area, l * w); // some room, for the common factor that makes up for floes that do not fit
     double length = bt_min(bt_max(sqrt(a * aspect), a / w), l), width = a / length;
     double s = bt_min(l / length, w / width) / 2, cx = (x0 + x1) / 2, cy = (y0 + y1) / 2;
-    length *= s, width *= s;
-    memcpy(v, (double[8]){cx - length, cy - width, cx + length, cy - width, cx + length, cy + width, cx - length, cy + width},
-           8 * sizeof *v);
+    double hx = s * (along_x ? length : width), hy = s * (along_x ? width : length);
+    memcpy(v, (double[8]){cx - hx, cy - hy, cx + hx, cy - hy, cx + hx, cy + hy, cx - hx, cy + hy}, 8 * sizeof *v);
 }
 
 static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double y0, double y1, double target, double aspect,

@@ -1,0 +1,576 @@
+// SPDX-License-Identifier: MIT
+// The ice field: concentration, no overlap, randomness and size laws of every generator.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+#include <math.h>
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/field.h"
+#include "bergtow/shape.h"
+#include "field_make.h"
+
+// A basin of 36 m × 10 m with floes of 1 m and a disc of 2.5 m at (5, 0).
+static bt_case basin(void)
+{
+    bt_case c = {.path = (char *)"test.yml"};
+    c.domain.length = 36, c.domain.width = 10, c.domain.y0 = -5;
+    c.ice.x_max = 36, c.ice.y_min = -5, c.ice.y_max = 5;
+    c.ice.concentration = 0.8, c.ice.size = 1, c.ice.size_spread = 0.3, c.ice.size_exponent = 2;
+    c.ice.sides = 6, c.ice.aspect = 1.5, c.ice.thickness = 0.04, c.ice.seed = 7, c.ice.shake = 15;
+    c.body.shape = BT_BODY_DISC, c.body.length = c.body.width = 2.5, c.body.x = 5;
+    return c;
+}
+
+static bt_field made(const bt_case *c)
+{
+    bt_field f;
+    bt_errors err = {0};
+    bt_field_init(&f);
+    bt_status status = bt_field_generate(c, &f, &err);
+    if (status != BT_OK) fail_msg("status %d: %s", status, err.n ? err.text[0] : "");
+    assert_int_equal(err.n, 0);
+    bt_errors_free(&err);
+    return f;
+}
+
+// ---- an overlap test of its own: vertices in place, all pairs, all images ----
+
+typedef struct polygon {
+    int n;
+    double v[2 * BT_MAX_VERTICES];
+} polygon;
+
+static polygon in_place(const bt_field *f, bt_idx i)
+{
+    polygon p = {.n = (int)(f->offsets[i + 1] - f->offsets[i])};
+    double c = cos(f->pose[3 * i + 2]), s = sin(f->pose[3 * i + 2]);
+    for (int k = 0; k < p.n; k++) {
+        const double *v = f->vertices + 2 * (f->offsets[i] + k);
+        p.v[2 * k] = f->pose[3 * i] + c * v[0] - s * v[1];
+        p.v[2 * k + 1] = f->pose[3 * i + 1] + s * v[0] + c * v[1];
+    }
+    return p;
+}
+
+// Largest separation along the edge normals of a; < 0 if none separates.
+static double separation(const polygon *a, const polygon *b, double dx, double dy)
+{
+    double best = -INFINITY;
+    for (int i = 0; i < a->n; i++) {
+        const double *p = a->v + 2 * i, *q = a->v + 2 * ((i + 1) % a->n);
+        double l = hypot(q[0] - p[0], q[1] - p[1]), nx = (q[1] - p[1]) / l, ny = (p[0] - q[0]) / l, low = INFINITY;
+        for (int k = 0; k < b->n; k++) low = fmin(low, nx * (b->v[2 * k] + dx - p[0]) + ny * (b->v[2 * k + 1] + dy - p[1]));
+        best = fmax(best, low);
+    }
+    return best;
+}
+
+static double gap(const polygon *a, const polygon *b, double dx, double dy)
+{
+    return fmax(separation(a, b, dx, dy), separation(b, a, -dx, -dy));
+}
+
+static polygon *all_in_place(const bt_field *f)
+{
+    polygon *p = malloc((size_t)(f->n + 1) * sizeof *p);
+    for (bt_idx i = 0; i < f->n; i++) p[i] = in_place(f, i);
+    return p;
+}
+
+// Least gap of all pairs, and of each floe to its nearest neighbour if `nearest` is given.
+static double least_gap(const bt_case *c, const bt_field *f, double *nearest)
+{
+    polygon *p = all_in_place(f);
+    double least = INFINITY, far = 3 * c->ice.size;
+    int ix = c->domain.ends == BT_BOUND_PERIODIC, iy = c->domain.sides == BT_BOUND_PERIODIC;
+    for (bt_idx i = 0; nearest && i < f->n; i++) nearest[i] = INFINITY;
+    for (bt_idx i = 0; i < f->n; i++)
+        for (bt_idx j = i + 1; j < f->n; j++)
+            for (int kx = -ix; kx <= ix; kx++)
+                for (int ky = -iy; ky <= iy; ky++) {
+                    double dx = kx * c->domain.length, dy = ky * c->domain.width;
+                    double d = hypot(f->pose[3 * j] + dx - f->pose[3 * i], f->pose[3 * j + 1] + dy - f->pose[3 * i + 1]);
+                    if (d > 4 * far) continue;
+                    double g = gap(&p[i], &p[j], dx, dy);
+                    least = fmin(least, g);
+                    if (nearest) nearest[i] = fmin(nearest[i], g), nearest[j] = fmin(nearest[j], g);
+                }
+    free(p);
+    return least;
+}
+
+static polygon body_in_place(const bt_case *c)
+{
+    polygon b;
+    b.n = bt_case_waterline(c, b.v);
+    double cs = cos(c->body.yaw), sn = sin(c->body.yaw);
+    for (int k = 0; k < b.n; k++) {
+        double x = b.v[2 * k], y = b.v[2 * k + 1];
+        b.v[2 * k] = c->body.x + cs * x - sn * y;
+        b.v[2 * k + 1] = c->body.y + sn * x + cs * y;
+    }
+    return b;
+}
+
+// Everything a field must be, whatever made it.
+static void assert_sound(const bt_case *c, const bt_field *f, const char *what)
+{
+    double sum = 0, round_off = 1e-12 * c->domain.length;
+    polygon body = body_in_place(c);
+    for (bt_idx i = 0; i < f->n; i++) {
+        const char *fault = bt_shape_fault((int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
+        if (fault) fail_msg("%s: floe %d: %s", what, i, fault);
+        polygon p = in_place(f, i);
+        bt_moments m = bt_shape_moments(p.n, p.v);
+        sum += m.area;
+        assert_true(fabs(m.area - f->area[i]) < 1e-9 * m.area);
+        assert_true(hypot(m.cx - f->pose[3 * i], m.cy - f->pose[3 * i + 1]) < 1e-9 * c->domain.length);
+        for (int k = 0; k < p.n; k++) {
+            bool in_x = c->domain.ends == BT_BOUND_PERIODIC || (p.v[2 * k] >= c->ice.x_min - round_off && p.v[2 * k] <= c->ice.x_max + round_off);
+            bool in_y = c->domain.sides == BT_BOUND_PERIODIC || (p.v[2 * k + 1] >= c->ice.y_min - round_off && p.v[2 * k + 1] <= c->ice.y_max + round_off);
+            if (!in_x || !in_y) fail_msg("%s: floe %d sticks out at (%.17g, %.17g)", what, i, p.v[2 * k], p.v[2 * k + 1]);
+        }
+        for (int kx = -1; body.n && kx <= 1; kx++)
+            for (int ky = -1; ky <= 1; ky++) {
+                if ((kx && c->domain.ends != BT_BOUND_PERIODIC) || (ky && c->domain.sides != BT_BOUND_PERIODIC)) continue;
+                double g = gap(&p, &body, kx * c->domain.length, ky * c->domain.width);
+                if (g < 0) fail_msg("%s: floe %d is %g m inside the body", what, i, -g);
+            }
+    }
+    double least = least_gap(c, f, NULL);
+    if (least < -round_off) fail_msg("%s: floes overlap by %g m", what, -least);
+    if (bt_field_overlap(c, f) > round_off) fail_msg("%s: bt_field_overlap says %g m", what, bt_field_overlap(c, f));
+    double wanted = c->ice.concentration * f->ice_area;
+    if (!(fabs(sum - wanted) <= 1e-6 * wanted)) fail_msg("%s: concentration %.9f", what, sum / f->ice_area);
+    assert_true(fabs(f->concentration - sum / f->ice_area) < 1e-9);
+}
+
+static void assert_makes(bt_case c, bt_ice_shape shape, double concentration, const char *what)
+{
+    char name[100];
+    snprintf(name, sizeof name, "%s at %g", what, concentration);
+    c.ice.shape = shape;
+    c.ice.concentration = concentration;
+    bt_field f = made(&c);
+    assert_sound(&c, &f, name);
+    assert_true((f.n > 0) == (concentration > 0));
+    bt_field_free(&f);
+}
+
+static void test_voronoi(void **state)
+{
+    (void)state;
+    const double all[] = {0, 0.2, 0.5, 0.8, 0.95};
+    for (int k = 0; k < 5; k++) assert_makes(basin(), BT_ICE_VORONOI, all[k], "voronoi");
+}
+
+static void test_rectangles(void **state)
+{
+    (void)state;
+    const double all[] = {0, 0.2, 0.5, 0.8, 0.95};
+    for (int k = 0; k < 5; k++) assert_makes(basin(), BT_ICE_RECTANGLES, all[k], "rectangles");
+    // away from the body every floe is a rectangle, with the aspect asked for where there is room
+    bt_case c = basin();
+    c.body.shape = BT_BODY_ABSENT, c.ice.shape = BT_ICE_RECTANGLES, c.ice.concentration = 0.3, c.ice.aspect = 2;
+    bt_field f = made(&c);
+    for (bt_idx i = 0; i < f.n; i++) {
+        const double *v = f.vertices + 2 * f.offsets[i];
+        assert_int_equal(f.offsets[i + 1] - f.offsets[i], 4);
+        double a = hypot(v[2] - v[0], v[3] - v[1]), b = hypot(v[4] - v[2], v[5] - v[3]);
+        assert_true(fabs((v[2] - v[0]) * (v[4] - v[2]) + (v[3] - v[1]) * (v[5] - v[3])) < 1e-9);
+        assert_true(fabs(fmax(a, b) / fmin(a, b) - 2) < 1e-6);
+    }
+    bt_field_free(&f);
+}
+
+static void test_polygons(void **state)
+{
+    (void)state;
+    const double all[] = {0.2, 0.5, 0.7};
+    for (int sides = 4; sides <= 6; sides += 2)
+        for (int k = 0; k < 3; k++) {
+            bt_case c = basin();
+            c.ice.sides = sides, c.ice.size_spread = 0, c.domain.length = c.ice.x_max = 24;
+            assert_makes(c, BT_ICE_POLYGONS, all[k], sides == 4 ? "squares" : "hexagons");
+        }
+    bt_case c = basin();
+    c.ice.shape = BT_ICE_POLYGONS, c.ice.concentration = 0.6, c.ice.size_spread = 0;
+    bt_field f = made(&c);
+    double first = f.area[0];
+    for (bt_idx i = 0; i < f.n; i++) { // all alike and regular
+        assert_true(fabs(f.area[i] - first) < 0.005 * first);
+        bt_moments m = bt_shape_moments(6, f.vertices + 2 * f.offsets[i]);
+        assert_true(fabs(m.inradius / m.radius - sqrt(0.75)) < 1e-9);
+    }
+    bt_field_free(&f);
+}
+
+static void test_surroundings(void **state)
+{
+    (void)state;
+    // periodic both ways, the body over the edge
+    bt_case c = basin();
+    c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC;
+    c.body.x = 35.5, c.body.y = 4.5;
+    assert_makes(c, BT_ICE_VORONOI, 0.8, "periodic voronoi");
+    assert_makes(c, BT_ICE_RECTANGLES, 0.9, "periodic rectangles");
+    assert_makes(c, BT_ICE_POLYGONS, 0.6, "periodic hexagons");
+    c.ice.shake = 0;
+    assert_makes(c, BT_ICE_VORONOI, 0.9, "periodic tessellation");
+    bt_field f = made(&c);
+    assert_true(fabs(f.ice_area - (360 - BT_PI * 2.5 * 2.5 / 4)) < 1e-9); // with all four parts of the body
+    bt_field_free(&f);
+    // open ends, a turned square berg that stands half in the ice region
+    c = basin();
+    c.domain.ends = c.domain.sides = BT_BOUND_OPEN;
+    c.body.shape = BT_BODY_SQUARE, c.body.length = 3, c.body.x = 6, c.body.yaw = 0.6;
+    c.ice.x_min = 6;
+    assert_makes(c, BT_ICE_VORONOI, 0.9, "beside a berg");
+    f = made(&c);
+    assert_true(fabs(f.ice_area - (30 * 10 - 4.5)) < 1e-9);
+    bt_field_free(&f);
+    // many floes of very different size
+    c = basin();
+    c.ice.size_law = BT_SIZE_POWER, c.ice.size_min = 0.5, c.ice.size_max = 5;
+    assert_makes(c, BT_ICE_VORONOI, 0.85, "power law");
+    assert_makes(c, BT_ICE_RECTANGLES, 0.7, "power law rectangles");
+    // a floe given by hand keeps its place
+    c = basin();
+    bt_floe_def hand = {.shape = BT_BODY_RECTANGLE, .length = 4, .width = 2, .x = 20, .y = 1, .yaw = 0.4, .thickness = 0.1};
+    c.floes = &hand, c.n_floes = 1;
+    f = made(&c);
+    assert_sound(&c, &f, "hand-given floe");
+    bt_case without = c;
+    without.n_floes = 0;
+    bt_field g = made(&without);
+    assert_true(fabs(g.ice_area - f.ice_area - 8) < 1e-9);
+    assert_true(bt_field_overlap(&c, &g) > 0.1); // ice made without it lies under it
+    bt_field_free(&f);
+    bt_field_free(&g);
+}
+
+static bool same(const bt_field *f, const bt_field *g)
+{
+    return f->n == g->n && memcmp(f->offsets, g->offsets, ((size_t)f->n + 1) * sizeof *f->offsets) == 0 &&
+           memcmp(f->vertices, g->vertices, 2 * (size_t)f->offsets[f->n] * sizeof *f->vertices) == 0 &&
+           memcmp(f->pose, g->pose, 3 * (size_t)f->n * sizeof *f->pose) == 0 &&
+           memcmp(f->thickness, g->thickness, (size_t)f->n * sizeof *f->thickness) == 0 &&
+           memcmp(f->area, g->area, (size_t)f->n * sizeof *f->area) == 0;
+}
+
+static void test_seed(void **state)
+{
+    (void)state;
+    for (int shape = BT_ICE_VORONOI; shape <= BT_ICE_POLYGONS; shape++) {
+        bt_case c = basin();
+        c.ice.shape = (bt_ice_shape)shape, c.ice.concentration = 0.6, c.ice.thickness_law = BT_THICK_LOGNORMAL;
+        c.ice.thickness_spread = 0.3;
+        bt_field f = made(&c);
+        bt_field g = made(&c);
+        assert_true(same(&f, &g));
+        bt_field_free(&g);
+        c.ice.seed++;
+        g = made(&c);
+        assert_false(same(&f, &g));
+        bt_field_free(&f);
+        bt_field_free(&g);
+    }
+    // more floes than the threshold of the parallel loops: the number of threads does not matter
+    bt_case c = basin();
+    c.domain.length = c.ice.x_max = 220, c.ice.concentration = 0.9, c.ice.shake = 1;
+    bt_field f = made(&c);
+    assert_true(f.n > 2000);
+    omp_set_num_threads(2);
+    bt_field g = made(&c);
+    omp_set_num_threads(1);
+    assert_true(same(&f, &g));
+    bt_field_free(&f);
+    bt_field_free(&g);
+}
+
+// ---- size laws ----
+
+static void assert_law(const bt_case *c, double mean, double sd)
+{
+    bt_sizes s;
+    bt_errors err = {0};
+    assert_int_equal(bt_sizes_init(&s, c, &err), BT_OK);
+    enum { N = 40000 };
+    double sum = 0, sum2 = 0;
+    for (int i = 0; i < N; i++) {
+        double d = bt_sizes_draw(&s, 3, i);
+        assert_true(d > 0 && d >= c->ice.size_min && (c->ice.size_max == 0 || d <= c->ice.size_max));
+        sum += d / N;
+        sum2 += d * d / N;
+    }
+    if (fabs(sum - mean) > 0.01 * mean) fail_msg("mean %g, want %g", sum, mean);
+    if (sd >= 0 && fabs(sqrt(fmax(0, sum2 - sum * sum)) - sd) > 0.03 * mean) fail_msg("sd %g, want %g", sqrt(sum2 - sum * sum), sd);
+    assert_true(fabs(bt_sizes_mean(&s) - mean) < 0.001 * mean);
+    assert_true(fabs(bt_sizes_mean_area(&s) - BT_PI / 4 * sum2) < 0.03 * sum2);
+}
+
+static void test_size_laws(void **state)
+{
+    (void)state;
+    bt_case c = basin();
+    c.ice.size = 30;
+    c.ice.size_spread = 0;
+    assert_law(&c, 30, 0);
+    c.ice.size_spread = 0.3;
+    assert_law(&c, 30, 9);
+    c.ice.size_law = BT_SIZE_LOGNORMAL, c.ice.size_spread = 0.5;
+    assert_law(&c, 30, 15);
+    c.ice.size_min = 15, c.ice.size_max = 60; // cut, with the mean kept
+    assert_law(&c, 30, -1);
+    c.ice.size_law = BT_SIZE_POWER, c.ice.size_min = 10, c.ice.size_max = 100;
+    for (double a = 1.5; a < 2.6; a += 0.5) { // E[d] = a/(a−1) m (1 − q^(1−a))/(1 − q^−a), q = M/m
+        c.ice.size_exponent = a;
+        assert_law(&c, a / (a - 1) * 10 * (1 - pow(10, 1 - a)) / (1 - pow(10, -a)), -1);
+    }
+    c.ice.size_exponent = 1;
+    assert_law(&c, 10 * log(10) / 0.9, -1);
+}
+
+// Exponent of a power law cut at [m, M] by maximum likelihood:
+// n/a − n ln q q^−a/(1 − q^−a) − Σ ln(d/m) = 0, falling in a.
+static double likely_exponent(bt_idx n, const double *area, double m, double M)
+{
+    double sum = 0, low = 0.1, high = 6, q = M / m;
+    for (bt_idx i = 0; i < n; i++) sum += log(2 * sqrt(area[i] / BT_PI) / m);
+    for (int k = 0; k < 60; k++) {
+        double a = (low + high) / 2, z = pow(q, -a);
+        *(n / a - n * log(q) * z / (1 - z) - sum > 0 ? &low : &high) = a;
+    }
+    return low;
+}
+
+static void test_sizes_of_fields(void **state)
+{
+    (void)state;
+    for (int shape = BT_ICE_VORONOI; shape <= BT_ICE_RECTANGLES; shape++) {
+        bt_case c = basin();
+        c.ice.shape = (bt_ice_shape)shape, c.ice.shake = 0;
+        c.domain.length = c.ice.x_max = 1000, c.domain.width = 800, c.domain.y0 = c.ice.y_min = -400, c.ice.y_max = 400;
+        c.ice.size_law = BT_SIZE_POWER, c.ice.size_min = 10, c.ice.size_max = 100, c.ice.size_exponent = 1.8;
+        bt_field f = made(&c);
+        double a = likely_exponent(f.n, f.area, 10, 100); // standard error about a/√n = 0.05
+        if (fabs(a - 1.8) > 0.15) fail_msg("exponent %g of %d floes", a, f.n);
+        bt_field_free(&f);
+
+        c.ice.size_law = BT_SIZE_SINGLE, c.ice.size = 20, c.ice.size_spread = 0.25, c.ice.concentration = 0.95, c.ice.size_min = c.ice.size_max = 0;
+        f = made(&c);
+        double sum = 0, sum2 = 0;
+        for (bt_idx i = 0; i < f.n; i++) {
+            double d = 2 * sqrt(f.area[i] / BT_PI);
+            sum += d / f.n;
+            sum2 += d * d / f.n;
+        }
+        if (fabs(sum - 20) > 0.4) fail_msg("mean diameter %g", sum);
+        if (fabs(sqrt(sum2 - sum * sum) - 5) > 0.5) fail_msg("standard deviation %g", sqrt(sum2 - sum * sum));
+        bt_field_free(&f);
+    }
+}
+
+static void test_thickness(void **state)
+{
+    (void)state;
+    bt_case c = basin();
+    c.domain.length = c.ice.x_max = 120, c.ice.shake = 0;
+    bt_field f = made(&c);
+    for (bt_idx i = 0; i < f.n; i++) assert_true(f.thickness[i] == 0.04);
+    bt_field_free(&f);
+    c.ice.thickness_law = BT_THICK_LOGNORMAL, c.ice.thickness_spread = 0.25;
+    f = made(&c);
+    double sum = 0, sum2 = 0, log3 = 0, log2 = 0, log1 = 0;
+    for (bt_idx i = 0; i < f.n; i++) sum += f.thickness[i] / f.n, log1 += log(f.thickness[i]) / f.n;
+    for (bt_idx i = 0; i < f.n; i++) {
+        sum2 += pow(f.thickness[i] - sum, 2) / f.n;
+        log2 += pow(log(f.thickness[i]) - log1, 2) / f.n;
+        log3 += pow(log(f.thickness[i]) - log1, 3) / f.n;
+    }
+    if (fabs(sum - 0.04) > 0.04 * 0.03) fail_msg("mean thickness %g of %d", sum, f.n);
+    if (fabs(sqrt(sum2) - 0.01) > 0.01 * 0.1) fail_msg("spread of thickness %g", sqrt(sum2));
+    if (fabs(log3) > 0.3 * pow(log2, 1.5)) fail_msg("ln h is skewed"); // a lognormal is not, a normal law's ln h is
+    bt_field_free(&f);
+}
+
+// ---- randomness ----
+
+static double variation_of_gaps(const bt_case *c)
+{
+    bt_field f = made(c);
+    double *g = malloc((size_t)f.n * sizeof *g), sum = 0, sum2 = 0;
+    least_gap(c, &f, g);
+    for (bt_idx i = 0; i < f.n; i++) sum += g[i] / f.n, sum2 += g[i] * g[i] / f.n;
+    free(g);
+    bt_field_free(&f);
+    return sqrt(sum2 - sum * sum) / sum;
+}
+
+static void test_relaxed(void **state)
+{
+    (void)state;
+    // Gap to the nearest neighbour: nearly the same everywhere in a shrunken tessellation, close to exponential in a gas.
+    const double all[] = {0.3, 0.5, 0.8};
+    for (int k = 0; k < 3; k++) {
+        bt_case c = basin();
+        c.ice.concentration = all[k], c.body.shape = BT_BODY_ABSENT, c.ice.size_spread = 0.1;
+        c.ice.shake = 0;
+        double lattice = variation_of_gaps(&c);
+        c.ice.shake = 15;
+        double shaken = variation_of_gaps(&c);
+        if (!(shaken > 0.6 && shaken > 2.5 * lattice)) fail_msg("at %g: variation of gaps %g, before the shake %g", all[k], shaken, lattice);
+    }
+}
+
+static void test_orientation(void **state)
+{
+    (void)state;
+    bt_case c = basin();
+    c.ice.shape = BT_ICE_RECTANGLES, c.ice.concentration = 0.4, c.body.shape = BT_BODY_ABSENT;
+    c.domain.length = c.ice.x_max = 40, c.domain.width = 20, c.ice.y_max = 15;
+    c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC;
+    for (int shaken = 0; shaken < 2; shaken++) {
+        c.ice.shake = shaken ? 15 : 0;
+        bt_field f = made(&c);
+        double sum[4] = {0};
+        for (bt_idx i = 0; i < f.n; i++) {
+            const double *v = f.vertices + 2 * f.offsets[i];
+            double ax = v[2] - v[0], ay = v[3] - v[1], bx = v[4] - v[2], by = v[5] - v[3];
+            bool first = hypot(ax, ay) > hypot(bx, by);
+            double side = atan2(first ? ay : by, first ? ax : bx) + f.pose[3 * i + 2];
+            sum[0] += cos(2 * side) / f.n, sum[1] += sin(2 * side) / f.n;
+            sum[2] += cos(4 * side) / f.n, sum[3] += sin(4 * side) / f.n;
+        }
+        // of n random directions each of these is normal with standard deviation 1/√(2n)
+        double limit = 4 / sqrt(2.0 * f.n), worst = 0;
+        for (int k = 0; k < 4; k++) worst = fmax(worst, fabs(sum[k]));
+        if (shaken ? worst > limit : worst < 0.9) fail_msg("order parameters %g %g %g %g of %d floes", sum[0], sum[1], sum[2], sum[3], f.n);
+        bt_field_free(&f);
+    }
+}
+
+static void test_space_order(void **state)
+{
+    (void)state;
+    // along a space-filling curve the next floe is near: at random it would be 12 m away on average
+    bt_case c = basin();
+    bt_field f = made(&c);
+    double sum = 0;
+    for (bt_idx i = 1; i < f.n; i++) sum += hypot(f.pose[3 * i] - f.pose[3 * i - 3], f.pose[3 * i + 1] - f.pose[3 * i - 2]) / (f.n - 1);
+    assert_true(sum < 2.5);
+    bt_field_free(&f);
+}
+
+// ---- errors, and the overlap check itself ----
+
+static void assert_refused(const bt_case *c, bt_status want, const char *part)
+{
+    bt_field f;
+    bt_errors err = {0};
+    bt_field_init(&f);
+    assert_int_equal(bt_field_generate(c, &f, &err), want);
+    assert_true(err.n >= 1);
+    if (!strstr(err.text[0], part)) fail_msg("said \"%s\", expected \"...%s...\"", err.text[0], part);
+    assert_int_equal(f.n, 0);
+    assert_int_equal(f.offsets[0], 0);
+    bt_errors_free(&err);
+    bt_field_free(&f);
+}
+
+static void test_refusals(void **state)
+{
+    (void)state;
+    bt_case c = basin();
+    c.domain.length = c.ice.x_max = 8, c.ice.shape = BT_ICE_POLYGONS, c.ice.sides = 5, c.ice.concentration = 0.95;
+    assert_refused(&c, BT_ERR_CASE, "cannot pack regular polygons to 0.95 in this region; ask for at most about 0.");
+    c = basin();
+    c.ice.size = 100;
+    assert_refused(&c, BT_ERR_CASE, "larger than all the ice");
+    c.ice.size = 1e-4;
+    assert_refused(&c, BT_ERR_CASE, "larger floes");
+    c = basin();
+    c.body.length = c.body.width = 100;
+    assert_refused(&c, BT_ERR_CASE, "cover all");
+    c = basin();
+    c.ice.x_min = 40;
+    assert_refused(&c, BT_ERR_CASE, "is empty");
+    c = basin();
+    c.ice.size_law = BT_SIZE_POWER;
+    assert_refused(&c, BT_ERR_CASE, "ice.size_min");
+}
+
+static void test_overlap(void **state)
+{
+    (void)state;
+    bt_case c = basin();
+    const double square[] = {-0.5, -0.5, 0.5, -0.5, 0.5, 0.5, -0.5, 0.5};
+    const struct { double x, y, yaw, want; } second[] = {
+        {10.9, 0, 0, 0.1},   {10.9, 0.95, 0, 0.05}, {11.1, 0, 0, 0}, {10.5 + sqrt(0.5) - 0.02, 0, BT_PI / 4, 0.02},
+        {10, 0, 0, 1},       {35.7, 0, 0, 0.2},     {0.25, 0, 0, 0.25}, {20, 4.6, 0, 0.1}, {20, -4.9, 0, 0.4},
+        {5, 1.65, 0, 0.1},   {20, 0, 0, 0},
+    };
+    for (size_t k = 0; k < sizeof second / sizeof *second; k++) {
+        bt_field f;
+        bt_field_init(&f);
+        bt_field_add(&f, 4, square, 10, 0, 0, 1);
+        bt_field_add(&f, 4, square, second[k].x, second[k].y, second[k].yaw, 1);
+        double got = bt_field_overlap(&c, &f);
+        // the body is a polygon of 64 corners of the disc's area: its flats lie within 0.2 % of the radius
+        if (fabs(got - second[k].want) > (second[k].x == 5 ? 0.003 : 1e-12)) fail_msg("case %zu: overlap %g, want %g", k, got, second[k].want);
+        bt_field_free(&f);
+    }
+    c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC; // across the edges, walls gone
+    const double other[][3] = {{0.3, 4.7, 0.3}, {0.3, -4.9, 0.3}, {0.55, 4.7, 0.05}, {0.9, 4.7, 0}};
+    for (int k = 0; k < 4; k++) {
+        bt_field f;
+        bt_field_init(&f);
+        bt_field_add(&f, 4, square, 35.6, 4.7, 0, 1);
+        bt_field_add(&f, 4, square, other[k][0], other[k][1], 0, 1);
+        double got = bt_field_overlap(&c, &f);
+        if (fabs(got - other[k][2]) > 1e-12) fail_msg("periodic case %d: overlap %g, want %g", k, got, other[k][2]);
+        bt_field_free(&f);
+    }
+    // a field without floes
+    bt_field f;
+    bt_field_init(&f);
+    assert_true(bt_field_overlap(&c, &f) == 0);
+    bt_field_free(&f);
+}
+
+static void test_add(void **state)
+{
+    (void)state;
+    // a square given off its centroid and turned: the floe lies where its vertices were
+    bt_field f;
+    bt_field_init(&f);
+    const double v[] = {1, 1, 3, 1, 3, 3, 1, 3};
+    bt_field_add(&f, 4, v, 10, 20, BT_PI / 2, 0.5);
+    assert_true(fabs(f.pose[0] - 8) < 1e-12 && fabs(f.pose[1] - 22) < 1e-12 && f.pose[2] == BT_PI / 2);
+    assert_true(fabs(f.vertices[0] + 1) < 1e-12 && fabs(f.area[0] - 4) < 1e-12);
+    for (int i = 1; i < 1000; i++) bt_field_add(&f, 4, v, i, 0, 0, 0.5);
+    assert_int_equal(f.n, 1000);
+    assert_int_equal(f.offsets[1000], 4000);
+    assert_true(fabs(f.pose[3 * 700] - 702) < 1e-12);
+    bt_field_free(&f);
+}
+
+int main(void)
+{
+    omp_set_num_threads(1); // small fields: threads that wait for one another only cost
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_add),         cmocka_unit_test(test_overlap),         cmocka_unit_test(test_voronoi),
+        cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),        cmocka_unit_test(test_surroundings),
+        cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws),       cmocka_unit_test(test_sizes_of_fields),
+        cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),         cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
