@@ -87,12 +87,13 @@ static bt_cells make_cells(const bt_case *c, const bt_yard *y, bt_idx n, const d
     if (c->ice.shape != BT_ICE_RECTANGLES) return bt_cells_tessellate(y, n, target, c->ice.seed);
     double aspect = c->ice.aspect > 0 ? bt_max(c->ice.aspect, 1 / c->ice.aspect) : 1;
     // Around an obstacle rectangles stay rectangles, unless that wastes too much water.
-    bt_cells cells = bt_cells_saw(y, n, target, aspect, c->ice.seed, true);
-    double fill = 0;
-    for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
-    if (y->n_obstacles == 0 || fill > 1.01 * wanted) return cells;
-    bt_cells_free(&cells);
-    return bt_cells_saw(y, n, target, aspect, c->ice.seed, false);
+    for (int effort = 0;; effort++) {
+        bt_cells cells = bt_cells_saw(y, n, target, aspect, c->ice.seed, effort);
+        double fill = 0;
+        for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
+        if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
+        bt_cells_free(&cells);
+    }
 }
 
 // One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.

@@ -56,8 +56,9 @@ bt_cells bt_cells_create(bt_idx n);
 void bt_cells_free(bt_cells *c);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
 bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, int64_t seed);
-/// Rectangles sawn from strips along x with areas target[n] × a common factor; boxed as in bt_cell_clear.
-bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, bool boxed);
+/// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside obstacles: 0 keeps
+/// rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
+bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort);
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
 int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed);

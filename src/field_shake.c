@@ -10,6 +10,7 @@
 // A step moves a floe by `stride`, the whole shake by `length` on average. Collisions need not be solved to the last digit:
 // a few sweeps do, and what overlap that leaves is pushed out as it comes, and at rest at the end.
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +18,7 @@
 #include "field_make.h"
 #include "rng.h"
 
-enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40 };
+enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
 static const double LARGE = 4; // floes of more than this many mean diameters stay out of the contact grid, whose cells fit the rest
 
 static void add_static(bt_world *w, int n, double *v)
@@ -35,15 +36,14 @@ static void add_box(bt_world *w, double x0, double x1, double y0, double y1)
 
 static void add_surroundings(bt_world *w, const bt_yard *y, double thick)
 {
-    // A wall along a periodic direction spans one period, so that it stands against its own image.
-    double ex = y->periodic_x ? 0 : thick, ey = y->periodic_y ? 0 : thick;
+    // Walls reach past the corners, and past a periodic edge: a floe that lies across it meets the nearest image of the wall.
     if (!y->periodic_x) {
-        add_box(w, y->x0 - thick, y->x0, y->y0 - ey, y->y1 + ey);
-        add_box(w, y->x1, y->x1 + thick, y->y0 - ey, y->y1 + ey);
+        add_box(w, y->x0 - thick, y->x0, y->y0 - thick, y->y1 + thick);
+        add_box(w, y->x1, y->x1 + thick, y->y0 - thick, y->y1 + thick);
     }
     if (!y->periodic_y) {
-        add_box(w, y->x0 - ex, y->x1 + ex, y->y0 - thick, y->y0);
-        add_box(w, y->x0 - ex, y->x1 + ex, y->y1, y->y1 + thick);
+        add_box(w, y->x0 - thick, y->x1 + thick, y->y0 - thick, y->y0);
+        add_box(w, y->x0 - thick, y->x1 + thick, y->y1, y->y1 + thick);
     }
     for (int k = 0; k < y->n_obstacles; k++) {
         // The world makes its own periodic images: only the one at home is a body.
@@ -98,6 +98,10 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
     }
     add_surroundings(w, y, bt_max(4 * largest, size));
 
+    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a busy
+    // machine. The result does not depend on their number.
+    const int threads = omp_get_max_threads();
+    if (f->n < FEW) omp_set_num_threads(1);
     double energy = 0;
     for (int64_t k = 0; k < (int64_t)steps; k++) {
         bt_world_step(w);
@@ -119,6 +123,7 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         bt_world_step(w);
         if (w->stats.overlap <= 3 * par.slop) break;
     }
+    omp_set_num_threads(threads);
     bt_status status = BT_OK;
     for (bt_idx i = 0; i < f->n; i++) {
         const bt_pose *p = &w->bodies.pose[i];

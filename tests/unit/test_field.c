@@ -284,9 +284,9 @@ static void test_seed(void **state)
     }
     // more floes than the threshold of the parallel loops: the number of threads does not matter
     bt_case c = basin();
-    c.domain.length = c.ice.x_max = 220, c.ice.concentration = 0.9, c.ice.shake = 1;
+    c.domain.length = c.ice.x_max = 420, c.ice.concentration = 0.95, c.ice.shake = 1;
     bt_field f = made(&c);
-    assert_true(f.n > 2000);
+    assert_true(f.n > 4000);
     omp_set_num_threads(2);
     bt_field g = made(&c);
     omp_set_num_threads(1);
