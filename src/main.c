@@ -4,6 +4,7 @@
 #include "revision.h"
 #include "suggest.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -57,6 +58,7 @@ static bool several_ranks(void)
 int main(int argc, char **argv)
 {
     argp_err_exit_status = BT_ERR_USAGE;
+    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
     argp_program_version_hook = print_version;
     if (argc < 2) {
         print_help(stderr);
