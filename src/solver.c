@@ -100,10 +100,12 @@ static double bias_of(const bt_world *w, const bt_row *r, double restitution)
         // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
         // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
         // from the slop on, or rounding would decide which of two points of a square hit rebounds.
+        // Where drag takes part of the approach within the step, the law refers to what is left: the work of a row is
+        // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
         double approach = normal_velocity(r, &b->vel_start[r->a], &b->vel_start[r->b]);
         double closing = normal_velocity(r, &b->vel_free[r->a], &b->vel_free[r->b]);
         if (approach < -w->par.rest_speed && r->gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
-            return restitution * approach;
+            return restitution * bt_max(approach, bt_min(closing, 0));
     }
     return bt_max(r->gap, 0) / w->par.dt;
 }
