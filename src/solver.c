@@ -249,7 +249,11 @@ static void warm_start(bt_world *w)
         r->lt = clamp(r->lt, r->mu * r->ln);
         if (r->ln != 0) apply(r, r->ln, r->lt, v, inv);
     }
-    if (w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
+    if (!w->tow || w->tow->mode != BT_TOW_LINE) return;
+    bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
+    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first sweep. So
+    // the line has its exact update in every step, not only in steps with sweeps.
+    bt_tow_update(w->tow, &v[w->towed], inv[w->towed]);
 }
 
 static void move_unit(bt_solver *s, bt_idx u, const double *move, bt_vel *v, const bt_inv *inv)
