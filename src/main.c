@@ -4,6 +4,7 @@
 #include "revision.h"
 #include "suggest.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -58,6 +59,7 @@ int main(int argc, char **argv)
 {
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;
+    signal(SIGXFSZ, SIG_IGN); // past a file-size limit a write fails with a message, like on a full disk
     if (argc < 2) {
         print_help(stderr);
         return BT_ERR_USAGE;
