@@ -87,7 +87,9 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
 
 int bt_cmd_end(bt_status status, bt_errors *err)
 {
-    fflush(stdout);
+    const bool lost = fflush(stdout) != 0 || ferror(stdout);
+    if (lost) bt_errors_add(err, "standard output: cannot be written; give it a place with space, or use the files of the result");
+    if (lost && status == BT_OK) status = BT_ERR_IO;
     bt_errors_print(err);
     bt_errors_free(err);
     return status;

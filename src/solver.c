@@ -100,10 +100,12 @@ static double bias_of(const bt_world *w, const bt_row *r, double restitution)
         // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
         // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
         // from the slop on, or rounding would decide which of two points of a square hit rebounds.
+        // Where drag takes part of the approach within the step, the law refers to what is left: the work of a row is
+        // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
         double approach = normal_velocity(r, &b->vel_start[r->a], &b->vel_start[r->b]);
         double closing = normal_velocity(r, &b->vel_free[r->a], &b->vel_free[r->b]);
         if (approach < -w->par.rest_speed && r->gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
-            return restitution * approach;
+            return restitution * bt_max(approach, bt_min(closing, 0));
     }
     return bt_max(r->gap, 0) / w->par.dt;
 }
@@ -294,7 +296,11 @@ static void warm_start(bt_world *w)
         r->lt = clamp(r->lt, r->mu * r->ln);
         if (r->ln != 0) apply(r, r->ln, r->lt, v, inv);
     }
-    if (w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
+    if (!w->tow || w->tow->mode != BT_TOW_LINE) return;
+    bt_tow_warm_start(w->tow, &v[w->towed], inv[w->towed], w->par.warm_start);
+    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first sweep. So
+    // the line has its exact update in every step, not only in steps with sweeps.
+    bt_tow_update(w->tow, &v[w->towed], inv[w->towed]);
 }
 
 static void move_unit(bt_solver *s, bt_idx u, const double *move, bt_vel *v, const bt_inv *inv)

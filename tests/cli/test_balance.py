@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: MIT
+"""What must balance in every run: forces on the body, momentum, energy, floes; and where free bodies drift."""
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, TOW, changed, placed, run, warned, worst_overlap
+
+# Forces differ in kind: a prescribed speed leaves the tow force to the balance; on a line it is the line's own.
+BALANCES = {
+    "speed": TOW,
+    "speed askew, e = 0.5": changed(TOW, tow__direction=15, ice__restitution=0.5, body__shape="square"),
+    "line": changed(TOW, tow__mode="line"),
+    "slack line, e = 0.5": changed(TOW, tow={"mode": "line", "speed": 0.2, "direction": 10, "ramp": 1, "hull_y": 0.4, "hull_x": 0.8,
+                                             "line_length": 1.5, "line_stiffness": 300, "line_damping": 0}, ice__restitution=0.5),
+    "line, current, wind, Coriolis": changed(TOW, tow__mode="line", water={"latitude": 75, "current_y": 0.05}, air={"wind_x": -3}),
+    "speed, current, slope, Coriolis": changed(TOW, water={"latitude": 75, "current_y": 0.05, "tilt": "slope", "slope_x": 1e-5}),
+}
+
+
+@pytest.fixture(scope="module", params=BALANCES)
+def balanced(request, tmp_path_factory):
+    return BALANCES[request.param], run(tmp_path_factory.mktemp("balance"), BALANCES[request.param])
+
+
+def test_forces_on_the_body(balanced):
+    """tow = ice + drag + inertia in every sample, and in the means of the summary to 1e-6.
+
+    On a line this holds the spring's tension, the contact rows, the drag formulas and the velocities against each other.
+    """
+    case, r = balanced
+    tow, ice, drag, inertia = r.series("tow_force", "ice_resistance", "drag_force", "inertia_force")
+    scale = np.abs([tow, ice, drag, inertia]).max()
+    assert np.abs(ice).max() > 1 and np.abs(drag).max() > 0.1
+    assert np.abs(tow - ice - drag - inertia).max() <= 1e-9 * scale
+    s = r.summary
+    mean = s["mean_tow_force_n"] - s["mean_drag_force_n"] - s["mean_inertia_force_n"]
+    assert s["mean_ice_resistance_n"] == pytest.approx(mean, rel=1e-6)
+    assert s["budget"]["tow_minus_drag_minus_inertia_n"] == pytest.approx(mean, rel=1e-9)
+    assert not warned(r, "balance")
+
+
+def test_inertia_is_mass_times_acceleration(balanced):
+    """From the recorded velocities alone; the mass, added mass included, from the case's own numbers."""
+    case, r = balanced
+    vx, vy, inertia = r.series("body_vx", "body_vy", "inertia_force")
+    angle = np.radians(case["tow"].get("direction", 0))
+    v = np.concatenate([[0], vx * np.cos(angle) + vy * np.sin(angle)])
+    with h5py.File(r.dir / "result.h5") as f:
+        area, height = f["bodies/area"][0], f["bodies/height"][0]
+    mass = 1.5 * 900 * area * height
+    assert np.allclose(inertia, mass * np.diff(v) / 0.1, rtol=1e-7, atol=1e-6)
+
+
+def test_tension_is_the_spring_and_pulls_only(balanced):
+    case, r = balanced
+    if case["tow"].get("mode") != "line":
+        pytest.skip("no line")
+    tension, length, x, y = r.series("line_tension", "line_length", "carriage_x", "carriage_y")
+    tow = case["tow"]
+    assert tension.min() >= 0
+    if tow.get("line_stiffness") == 300:
+        # Soft for the step: T = k (l − L0) at the start of the step, and the line goes slack now and then.
+        k = 300 / 1.5
+        np.testing.assert_allclose(tension, np.maximum(0, k * (length - 1.5)), atol=1e-9 * tension.max())
+    # The carriage keeps to its ramp and its heading.
+    v = np.hypot(np.diff(x), np.diff(y)) / 0.1
+    assert v[-1] == pytest.approx(tow["speed"], rel=1e-9)
+    assert np.arctan2(y[-1] - y[0], x[-1] - x[0]) == pytest.approx(np.radians(tow.get("direction", 0)), abs=1e-9)
+
+
+def test_resistance_by_the_momentum_of_everything_else(balanced):
+    _, r = balanced
+    ice, budget = r.series("ice_resistance", "ice_resistance_budget")
+    assert np.abs(ice - budget).max() <= 1e-9 * np.abs(ice).max()
+    assert r.summary["mean_ice_resistance_n"] == pytest.approx(r.summary["mean_ice_resistance_budget_n"], rel=1e-6)
+
+
+def test_means_are_those_of_the_series(balanced):
+    _, r = balanced
+    time, ice, tow = r.series("time", "ice_resistance", "tow_force")
+    w = r.summary["window"]
+    inside = (time >= w["start_s"] - 1e-9) & (time <= w["end_s"] + 1e-9)
+    assert inside.sum() == w["n_samples"] > 100
+    assert r.summary["mean_ice_resistance_n"] == pytest.approx(ice[inside].mean(), rel=1e-12)
+    assert r.summary["mean_tow_force_n"] == pytest.approx(tow[inside].mean(), rel=1e-12)
+    assert r.summary["peak_ice_resistance_n"] == ice[inside].max()
+    # Correlated samples: never more certain than independent ones, and not off by more than the window allows.
+    assert r.summary["mean_ice_resistance_se_n"] > 0.7 * ice[inside].std() / np.sqrt(inside.sum())
+
+
+def test_momentum_every_step(balanced):
+    _, r = balanced
+    assert r.series("momentum_residual").max() <= 1e-10
+    assert r.summary["momentum_residual"] == r.series("momentum_residual").max()
+
+
+@pytest.mark.parametrize("mode", ["speed", "line"])
+@pytest.mark.parametrize("restitution, friction", [(0, 0), (0, 0.3), (0.5, 0), (0.5, 0.3), (1, 0)])
+def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
+    """With an exact solution λᵀ(w* + w2)/2 <= 0. A residual ε leaves up to Σλ ε: here 1.3e-8 m/s times some 100 N s.
+
+    Not for e = 1 with friction: Newton's law with Coulomb friction can gain energy in a single oblique hit (Kane & Levinson
+    1985, Dynamics, p. 348); such steps are counted, see below.
+    """
+    r = run(tmp_path, changed(TOW, tow__mode=mode, ice__restitution=restitution, ice__friction=friction, solver__tolerance=1e-7,
+                              ice__concentration=0.4, solver__max_sweeps=3000))
+    work = r.series("contact_work")
+    assert work.min() < -1e-3, "nothing collided"
+    assert work.max() <= 1e-5
+    assert r.summary["contact_work_j"] == pytest.approx(work.sum(), rel=1e-12)
+
+
+def test_work_that_is_positive_is_told(tmp_path):
+    r = run(tmp_path, changed(TOW, ice__restitution=1, solver__tolerance=1e-6))
+    work, energy = r.series("contact_work", "kinetic_energy")
+    gained = int(np.sum(work > 1e-10 * energy))
+    assert r.summary["positive_work_steps"] == gained
+    assert bool(warned(r, f"in {gained} of 300 steps the contacts added energy")) == (gained > 0)
+
+
+def test_unconverged_steps_are_told(tmp_path):
+    r = run(tmp_path, changed(TOW, solver__max_sweeps=2))
+    unconverged, residual, sweeps = r.series("unconverged", "residual", "sweeps")
+    n = r.summary["unconverged_steps"]
+    assert n == unconverged.sum() > 20
+    assert n == np.sum(residual > 0.13 * 1e-3) and sweeps.max() == 2
+    assert r.summary["max_residual_m_s"] == residual.max()
+    assert warned(r, rf"{n} of 300 steps met the sweep limit .*raise solver.max_sweeps")
+    assert "warning: " in r.result.stdout and f"{n} steps unconverged" in r.result.stdout
+    # Momentum holds all the same: every impulse acts on both bodies.
+    assert r.summary["momentum_residual"] <= 1e-10
+    good = run(tmp_path, changed(TOW, solver__max_sweeps=5000, solver__tolerance=1e-2), name="good")
+    assert good.summary["unconverged_steps"] == 0 and not warned(good, "sweep limit")
+
+
+def test_the_mean_does_not_hang_on_the_tolerance(tmp_path):
+    """Tenfold tighter: the mean over four fields moves by less than its standard error, each single one by less than two."""
+    change, error = [], []
+    for seed in (1, 2, 3, 4):
+        case = changed(TOW, ice__concentration=0.3, ice__seed=seed, run__duration=60, domain__length=16, solver__max_sweeps=2000)
+        a = run(tmp_path, case, name=f"a{seed}").summary
+        b = run(tmp_path, changed(case, solver__tolerance=1e-4), name=f"b{seed}").summary
+        change.append(b["mean_ice_resistance_n"] - a["mean_ice_resistance_n"])
+        error.append(a["mean_ice_resistance_se_n"])
+    assert np.all(np.abs(change) < 2 * np.array(error)), (change, error)
+    assert abs(np.mean(change)) < np.linalg.norm(error) / len(error), (change, error)
+
+
+# ---- boundaries ----
+
+def test_periodic_both_ways_keeps_every_floe(tmp_path):
+    case = changed(TOW, domain={"length": 12, "width": 7, "ends": "periodic", "sides": "periodic"}, run__duration=60,
+                   tow={"speed": 0.3, "direction": 30, "ramp": 1}, output={"frame_interval": 1})
+    r = run(tmp_path, case)
+    assert r.summary["floes_outside"] == 0
+    pose = r.dataset("/frames/pose")
+    assert pose.shape == (61, r.summary["n_floes"], 3) and np.isfinite(pose).all()
+    assert np.all((pose[:, :, 0] >= 0) & (pose[:, :, 0] < 12)) and np.all((pose[:, :, 1] >= -3.5) & (pose[:, :, 1] < 3.5))
+    # The body has been round: its series go on, its frames wrap.
+    x, y = r.series("body_x", "body_y")
+    way = 0.3 * (60 - 0.5) * np.array([np.cos(np.radians(30)), np.sin(np.radians(30))])
+    assert [x[-1] - 3, y[-1]] == pytest.approx(way, rel=2e-3)
+    body = r.dataset("/frames/body_pose")[:, 0]
+    assert body[:, 0].max() < 12 and np.any(np.diff(body[:, 0]) < -6)
+    # Contacts act across the seams: floes and their images stay apart.
+    with h5py.File(r.dir / "result.h5") as f:
+        v, o = f["floes/vertices"][:], f["floes/offsets"][:]
+    last = [placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose[-1])]
+    images = [p + np.array([i * 12, j * 7]) for i in (0, 1) for j in (-1, 0, 1) if (i, j) > (0, 0) for p in last]
+    assert worst_overlap(last + images) < 0.01
+
+
+def test_floes_that_leave_are_counted(tmp_path):
+    case = changed(TOW, domain__ends="open", domain__sides="open", water={"current_x": 0.3, "current_y": -0.1})
+    r = run(tmp_path, case)
+    last = r.dataset("/frames/pose")[-1]
+    out = np.sum((last[:, 0] < 0) | (last[:, 0] > 15) | (last[:, 1] < -4) | (last[:, 1] > 4))
+    assert r.summary["floes_outside"] == out > 20
+    assert warned(r, f"{out} floes left the open domain")
+
+
+def test_walls_keep_floes_in(tmp_path):
+    case = changed(TOW, water={"current_x": 0.3, "current_y": -0.1})
+    r = run(tmp_path, case)
+    pose = r.dataset("/frames/pose")
+    with h5py.File(r.dir / "result.h5") as f:
+        v, o = f["floes/vertices"][:], f["floes/offsets"][:]
+    world = np.concatenate([placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose[-1])])
+    assert r.summary["floes_outside"] == 0
+    assert world[:, 0].min() > -0.02 and world[:, 0].max() < 15.02 and np.abs(world[:, 1]).max() < 4.02
+
+
+# ---- floes by hand ----
+
+def test_floes_by_hand(tmp_path):
+    """A large floe is pushed by the body into small ones, and all against a fixed one."""
+    small = [{"shape": "square", "length": 0.5, "x": 7 + 0.7 * (i % 3), "y": -1.5 + 0.7 * (i // 3), "yaw": 11 * i} for i in range(15)]
+    case = {
+        "run": {"dt": 0.1, "duration": 11}, "domain": {"length": 14, "width": 8}, "ice": {"concentration": 0},
+        "body": {"shape": "disc", "length": 2, "x": 2}, "tow": {"speed": 0.3, "ramp": 0}, "output": {"frame_interval": 0.5},
+        "floes": [{"shape": "rectangle", "length": 2.4, "width": 5, "x": 5, "y": 0.2}] + small
+                 + [{"shape": "square", "length": 1, "x": 11, "y": 0, "yaw": 45, "fixed": True, "thickness": 1}],
+    }
+    r = run(tmp_path, case)
+    pose = r.dataset("/frames/pose")
+    assert pose.shape[1] == 17
+    assert np.ptp(pose[:, 16], axis=0).max() == 0, "the fixed one has moved"
+    assert pose[-1, 0, 0] > 5.5 and np.sum(pose[-1, 1:16, 0] > pose[0, 1:16, 0] + 0.3) > 5
+    with h5py.File(r.dir / "result.h5") as f:
+        v, o = f["floes/vertices"][:], f["floes/offsets"][:]
+        b, q = f["bodies/vertices"][:], f["bodies/offsets"][:]
+    for t in range(0, len(pose), 4):
+        every = [placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose[t])]
+        assert worst_overlap(every + [placed(b[q[0]:q[1]], r.dataset("/frames/body_pose")[t, 0])]) < 0.01, t
+    assert r.dataset("/floes/thickness")[16] == 1
+    ice, budget = r.series("ice_resistance", "ice_resistance_budget")
+    assert ice.max() > 0 and np.abs(ice - budget).max() < 1e-9 * ice.max()
+
+
+def test_floes_by_hand_beside_a_field(tmp_path):
+    """Made floes give way to those by hand, or the case is refused; it is never run with overlap."""
+    case = changed(TOW, floes=[{"shape": "disc", "length": 3, "x": 9, "y": 0.5}], run__duration=1)
+    r = run(tmp_path, case)
+    with h5py.File(r.dir / "result.h5") as f:
+        v, o, pose = f["floes/vertices"][:], f["floes/offsets"][:], f["frames/pose"][0]
+    assert worst_overlap([placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose)]) < 1e-3
+    assert pose[-1, 0] == 9
+    clash = changed(TOW, floes=[{"shape": "disc", "length": 3, "x": 9, "y": 0.5}, {"shape": "disc", "length": 1, "x": 10, "y": 0.5}],
+                    ice__concentration=0)
+    refused = run(tmp_path, clash, name="clash", code=CASE)
+    assert "overlap by" in refused.result.stderr
+
+
+# ---- free drift ----
+
+DRIFT = {
+    "run": {"dt": 5, "duration": 10000}, "domain": {"frame": "geographic", "length": 20000, "width": 20000, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "thickness": 1}, "body": {"shape": "disc", "length": 100, "draft": 50, "sail": 7}, "tow": {"mode": "none"},
+    "floes": [{"shape": "disc", "length": 40, "x": 300, "y": 300}],
+}
+
+
+def drift(folder, name, **changes):
+    r = run(folder, changed(DRIFT, **changes), name=name)
+    body = np.array(r.series("body_x", "body_y"))[:, -1]
+    pose = r.dataset("/frames/pose")
+    return body, (pose[-1, 0] - pose[0, 0])[:2], r
+
+
+@pytest.mark.parametrize("angle", [0, 60, 200])
+def test_bodies_drift_with_the_wind(tmp_path, angle):
+    """Without Coriolis exactly along the wind, at the speed at which air and water drag are equal: the square-root law."""
+    wind = 10 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
+    body, floe, r = drift(tmp_path, "out", air={"wind_x": wind[0], "wind_y": wind[1]})
+    along = wind / 10
+    for way in (body, floe):
+        assert way @ along > 100 and abs(way[0] * along[1] - way[1] * along[0]) < 1e-6 * (way @ along)
+    vx, vy = r.series("body_vx", "body_vy")
+    with h5py.File(r.dir / "result.h5") as f:
+        area, v = f["bodies/area"][0], f["bodies/vertices"][:]
+    width = np.ptp(v @ np.array([-along[1], along[0]]))
+    air = 0.5 * 1.29 * 0.4 * 7 * width + 1.29 * 2.5e-4 * area
+    water = 0.5 * 1027 * 0.85 * 50 * width + 1027 * 5e-4 * area
+    ratio = np.sqrt(air / water)
+    assert vx[-1] * along[0] + vy[-1] * along[1] == pytest.approx(10 * ratio / (1 + ratio), rel=1e-2)
+    assert r.series("tow_force").max() == 0
+
+
+def test_coriolis_turns_right_in_the_north_and_left_in_the_south(tmp_path):
+    """x is north, y is east: a wind to the north must drive the ice off to the east (right) at 75 deg N."""
+    north, floe_north, _ = drift(tmp_path, "north", air={"wind_x": 10}, water={"latitude": 75})
+    south, floe_south, _ = drift(tmp_path, "south", air={"wind_x": 10}, water={"latitude": -75})
+    for n, s in ((north, south), (floe_north, floe_south)):
+        assert n[0] > 0 and n[1] > 0.02 * n[0]
+        assert s == pytest.approx([n[0], -n[1]], rel=1e-9)
+
+
+def test_coriolis_in_the_basin_frame(tmp_path):
+    """There y is to the left of x, seen from above: right is −y."""
+    case = changed(DRIFT, domain__frame="basin", domain__x0=-10000, body__x=0, air={"wind_x": 10}, water={"latitude": 75})
+    r = run(tmp_path, case)
+    x, y = r.series("body_x", "body_y")
+    assert x[-1] > 0 and y[-1] < -0.02 * x[-1]
+
+
+def test_drift_with_the_current(tmp_path):
+    body, floe, r = drift(tmp_path, "out", water={"current_x": 0.2, "current_y": -0.4})
+    vx, vy = r.series("body_vx", "body_vy")
+    assert vy[-1] / vx[-1] == pytest.approx(-2, rel=1e-6)
+    assert 0.15 < vx[-1] < 0.2
+    assert floe[1] / floe[0] == pytest.approx(-2, rel=1e-6)

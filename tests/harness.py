@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: MIT
+"""What the run-level tests share: writing a case, running it, reading what it leaves, and plain polygon geometry."""
+import copy
+import json
+import os
+import pathlib
+import re
+import subprocess
+
+import h5py
+import numpy as np
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergtow"))
+DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
+
+# A tow through loose ice, some 140 floes, done in a fraction of a second.
+TOW = {
+    "run": {"dt": 0.1, "duration": 30},
+    "domain": {"length": 15, "width": 8},
+    "ice": {"concentration": 0.5, "size": 0.7, "friction": 0.3},
+    "body": {"x": 3, "length": 2},
+    "tow": {"speed": 0.13, "ramp": 2},
+}
+# Walls that close on dense ice: thousands of contacts at once, so that every loop that may run in parallel does.
+PRESS = {
+    "run": {"dt": 0.1, "duration": 2},
+    "domain": {"length": 66, "width": 40, "ends_closing": 0.1, "sides_closing": 0.1},
+    "ice": {"concentration": 0.85, "size": 0.9},
+    "body": {"shape": "none"},
+    "solver": {"max_sweeps": 60},
+    "output": {"frame_interval": 0.5},
+}
+
+
+def changed(base, **changes):
+    """A copy of a case with changes "section.key" written as section__key; None removes the key."""
+    case = copy.deepcopy(base)
+    for name, value in changes.items():
+        *path, key = name.split("__")
+        section = case
+        for part in path:
+            section = section.setdefault(part, {})
+        if value is None:
+            section.pop(key, None)
+        else:
+            section[key] = value
+    return case
+
+
+def write_case(folder, case, name="case.yml"):
+    """JSON is YAML, and its numbers read back to the same bits."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    path.write_text(json.dumps(case, indent=1))
+    return path
+
+
+def environment(**extra):
+    """The caller's, without what would tell the program how many threads or ranks to use.
+
+    Threads wait passively: on a machine that is busy with something else, threads that spin at a barrier take the very core
+    that the thread they wait for would need (20 times slower, seen with two threads on two cores).
+    """
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "OMP_"))}
+    return kept | {"OMP_WAIT_POLICY": "passive"} | {k: str(v) for k, v in extra.items()}
+
+
+def call(*arguments, cwd=None, env=None, timeout=120, **more):
+    return subprocess.run([BERGTOW, *map(str, arguments)], cwd=cwd, env=env or environment(OMP_NUM_THREADS=1),
+                          capture_output=True, text=True, timeout=timeout, **more)
+
+
+class Run:
+    """The folder a run has left, and what the call printed."""
+
+    def __init__(self, folder, result):
+        self.dir, self.result = folder, result
+        summary = folder / "summary.json"
+        self.summary = json.loads(summary.read_text()) if summary.exists() else None
+
+    @property
+    def hash(self):
+        return self.summary["state_hash"]
+
+    def series(self, *names):
+        with h5py.File(self.dir / "result.h5") as f:
+            values = [f["series"][n][:] for n in names]
+        return values[0] if len(values) == 1 else values
+
+    def dataset(self, name):
+        with h5py.File(self.dir / "result.h5") as f:
+            return f[name][()]
+
+
+def run(folder, case, *arguments, code=DONE, name="out", env=None, **more):
+    """Run a case (a dictionary, or the path of a file) in a folder of its own; the exit code must be as said."""
+    path = case if isinstance(case, pathlib.Path) else write_case(folder, case)
+    result = call("run", path, "-o", folder / name, *arguments, env=env, **more)
+    assert result.returncode == code, f"exit code {result.returncode}, wanted {code}:\n{result.stdout}\n{result.stderr}"
+    return Run(folder / name, result)
+
+
+def warned(r, pattern):
+    return [w for w in r.summary["warnings"] if re.search(pattern, w)]
+
+
+def datasets(path):
+    """Every dataset of an HDF5 file as name -> (type, shape, bytes)."""
+    found = {}
+
+    def take(name, item):
+        if isinstance(item, h5py.Dataset):
+            value = item[()]
+            raw = value.tobytes() if isinstance(value, (np.ndarray, np.generic)) and item.dtype.kind != "O" else repr(value).encode()
+            found["/" + name] = (str(item.dtype), item.shape, raw)
+
+    with h5py.File(path) as f:
+        f.visititems(take)
+    return found
+
+
+def differing(a, b, but=()):
+    """Names of the datasets, but for those named, that are not the same to the bit in both files."""
+    x, y = datasets(a), datasets(b)
+    assert len(x) > 1, f"{a} holds next to nothing: {sorted(x)}"
+    return sorted(n for n in x.keys() | y.keys() if x.get(n) != y.get(n) and n not in but)
+
+
+# ---- polygons, independent of the program ----
+
+def area(polygon):
+    x, y = polygon[:, 0], polygon[:, 1]
+    return 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
+
+
+def placed(vertices, pose):
+    """Vertices [n, 2] of the body frame at pose (x, y, yaw)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return vertices @ np.array([[c, s], [-s, c]]) + pose[:2]
+
+
+def overlap(p, q):
+    """Depth to which two convex anticlockwise polygons overlap along the best separating axis; negative: a gap."""
+    depth = np.inf
+    for one, other in ((p, q), (q, p)):
+        edge = np.roll(one, -1, axis=0) - one
+        normal = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.hypot(edge[:, 0], edge[:, 1])[:, None]
+        gap = np.min(normal @ other.T, axis=1) - np.sum(normal * one, axis=1)
+        depth = min(depth, -np.max(gap))
+    return depth
+
+
+def worst_overlap(polygons):
+    """Deepest overlap of any two of the polygons; pairs whose boxes are apart are left out."""
+    low = np.array([p.min(axis=0) for p in polygons])
+    high = np.array([p.max(axis=0) for p in polygons])
+    worst = -np.inf
+    for i in range(len(polygons)):
+        near = np.all((low[i + 1:] <= high[i]) & (high[i + 1:] >= low[i]), axis=1)
+        for j in np.nonzero(near)[0] + i + 1:
+            worst = max(worst, overlap(polygons[i], polygons[j]))
+    return worst
