@@ -100,7 +100,7 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
-	$(PYTHON) postproc/animate.py $(DEMO)
+	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
@@ -112,7 +112,7 @@ test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time s
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) tests/long
 
-lint: ## format, cppcheck, names of external symbols
+lint: all ## names of external symbols, licence lines, syntax
 	@tests/lint.sh
 
 asan: ## the unit and physics tests under AddressSanitizer and UBSan

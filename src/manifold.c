@@ -135,6 +135,8 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     struct { double t, gap; uint32_t id; } ends[2] = {
         {tp, gp, (uint32_t)facing << 1}, {tq, gq, (uint32_t)other << 1}};
     const double span = tp - tq;
+    int kept = 0;
+    double depth = INFINITY;
     for (int k = 0; k < 2; k++) {
         double t = ends[k].t, bound = k == 0 ? length : 0;
         bool beyond = k == 0 ? t > length : t < 0;
@@ -148,10 +150,14 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
             continue;
         }
         if (ends[k].gap > margin) continue;
-        double half = 0.5 * ends[k].gap;
-        set_point(m, r[0] + ends[k].t * tx + half * nx, r[1] + ends[k].t * ty + half * ny, ends[k].gap, dx, dy,
-                  base | ends[k].id);
+        depth = bt_min(depth, ends[k].gap);
+        ends[kept++] = ends[k];
     }
+    // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
+    // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
+    for (int k = 0; k < kept; k++)
+        set_point(m, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny, ends[k].gap, dx, dy,
+                  base | ends[k].id);
 }
 
 /// The deepest vertex of inc below reference edge i as the only point.

@@ -145,7 +145,7 @@ const bt_key bt_case_keys[] = {
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "sweeps after which a step is left and counted as not converged, assumed"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
     REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]", "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the projection]"),
-    INT("solver.position_sweeps", solver.position_sweeps, "50", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
+    INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),

@@ -202,6 +202,50 @@ static inline double update_row(bt_row *r, bt_vel *v, const bt_inv *inv, double 
     return bt_max(fabs(dn) / r->mn, fabs(dt) / r->mt);
 }
 
+/// Gauss–Seidel update of a manifold with two points: both normals together, then the friction of both. The normals are the
+/// exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them, none). Two
+/// points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
+/// times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points that coincide) the
+/// first of the single cases that holds is taken. The tangential rows of the points are the same (manifold.c), so only
+/// the sum of their friction has an effect, bounded by μ (λ1 + λ2); it is shared in proportion to the normals. Two
+/// separate unknowns would drift apart along their null space and eat up the friction cone.
+static inline double update_pair(bt_row *r, bt_vel *v, const bt_inv *inv, double *step)
+{
+    bt_row *p = r, *q = r + 1;
+    const bt_inv ia = inv[p->a], ib = inv[p->b];
+    const double w1 = 1 / p->mn, w2 = 1 / q->mn;
+    const double w12 = ia.m + ib.m + ia.i * p->ran * q->ran + ib.i * p->rbn * q->rbn;
+    const double u1 = normal_velocity(p, &v[p->a], &v[p->b]) + p->bias, u2 = normal_velocity(q, &v[q->a], &v[q->b]) + q->bias;
+    // Velocities with both impulses taken off.
+    const double b1 = u1 - w1 * p->ln - w12 * q->ln, b2 = u2 - w12 * p->ln - w2 * q->ln;
+    const double det = w1 * w2 - w12 * w12;
+    const double only1 = bt_max(0, -b1 * p->mn), only2 = bt_max(0, -b2 * q->mn);
+    double l1 = (w12 * b2 - w2 * b1) / det, l2 = (w12 * b1 - w1 * b2) / det;
+    if (!(det > 1e-9 * w1 * w2 && l1 >= 0 && l2 >= 0)) {
+        const bool first = b2 + w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
+        l1 = first ? only1 : 0;
+        l2 = first ? 0 : only2;
+    }
+    const double d1 = l1 - p->ln, d2 = l2 - q->ln;
+    p->ln = l1, q->ln = l2;
+    apply(p, d1, 0, v, inv);
+    apply(q, d2, 0, v, inv);
+    const double total = l1 + l2, t = p->lt + q->lt;
+    const double t2 = clamp(t - tangent_velocity(p, &v[p->a], &v[p->b]) * p->mt, p->mu * total);
+    apply(p, 0, t2 - t, v, inv);
+    const double share = total > 0 ? t2 * (l1 / total) : 0;
+    step[0] = d1, step[1] = share - p->lt, step[2] = d2, step[3] = t2 - share - q->lt;
+    p->lt = share, q->lt = t2 - share;
+    return bt_max(bt_max(fabs(d1) * w1, fabs(d2) * w2), fabs(t2 - t) / p->mt);
+}
+
+static inline double update_unit(bt_solver *s, bt_idx u, bt_vel *v, const bt_inv *inv)
+{
+    const bt_idx i = s->unit[u];
+    if (s->unit[u + 1] - i == 2) return update_pair(&s->rows[i], v, inv, s->step + 2 * i);
+    return update_row(&s->rows[i], v, inv, s->step + 2 * i);
+}
+
 static double sweep(bt_world *w, bool parallel)
 {
     bt_solver *s = w->solver;
@@ -211,12 +255,9 @@ static double sweep(bt_world *w, bool parallel)
 #pragma omp parallel if (parallel) reduction(max : change)
     for (int k = 0; k < s->n_colours; k++) {
 #pragma omp for schedule(static)
-        for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++)
-            for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
+        for (bt_idx u = s->start[k]; u < s->start[k + 1]; u++) change = bt_max(change, update_unit(s, u, v, inv));
     }
-    const bt_idx last = s->start[s->n_colours + 1];
-    for (bt_idx i = s->unit[s->start[s->n_colours]]; i < s->unit[last]; i++)
-        change = bt_max(change, update_row(&s->rows[i], v, inv, s->step + 2 * i));
+    for (bt_idx u = s->start[s->n_colours]; u < s->start[s->n_colours + 1]; u++) change = bt_max(change, update_unit(s, u, v, inv));
     if (w->tow && w->tow->mode == BT_TOW_LINE) change = bt_max(change, bt_tow_update(w->tow, &v[w->towed], inv[w->towed]));
     return change;
 }
@@ -225,15 +266,21 @@ double bt_solver_residual(const bt_world *w)
 {
     const bt_solver *s = w->solver;
     const bt_vel *v = w->bodies.vel;
+    const bt_idx n_units = w->contacts->n_man;
     double worst = 0;
 #pragma omp parallel for schedule(static) reduction(max : worst) if (s->n_rows > MIN_PARALLEL_ROWS)
-    for (bt_idx i = 0; i < s->n_rows; i++) {
-        const bt_row *r = &s->rows[i];
-        double wn = normal_velocity(r, &v[r->a], &v[r->b]) + r->bias;
-        double wt = tangent_velocity(r, &v[r->a], &v[r->b]);
-        double dn = bt_max(0, r->ln - wn * r->mn) - r->ln;
-        double dt = clamp(r->lt - wt * r->mt, r->mu * r->ln) - r->lt;
-        worst = bt_max(worst, bt_max(fabs(dn) / r->mn, fabs(dt) / r->mt));
+    for (bt_idx u = 0; u < n_units; u++) {
+        double normal = 0, tangent = 0;
+        const bt_row *r = &s->rows[s->unit[u]];
+        for (bt_idx i = s->unit[u]; i < s->unit[u + 1]; i++) {
+            const bt_row *p = &s->rows[i];
+            const double wn = normal_velocity(p, &v[p->a], &v[p->b]) + p->bias;
+            worst = bt_max(worst, fabs(bt_max(0, p->ln - wn * p->mn) - p->ln) / p->mn);
+            normal += p->ln;
+            tangent += p->lt;
+        }
+        const double wt = tangent_velocity(r, &v[r->a], &v[r->b]);
+        worst = bt_max(worst, fabs(clamp(tangent - wt * r->mt, r->mu * normal) - tangent) / r->mt);
     }
     if (w->tow && w->tow->mode == BT_TOW_LINE) worst = bt_max(worst, bt_tow_residual(w->tow, &v[w->towed]));
     return worst;

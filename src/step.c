@@ -65,11 +65,11 @@ static double momentum_residual(const bt_world *w)
     bt_sum gained[2] = {{0}, {0}}, applied[2] = {{0}, {0}}, exchanged = {0}, carried = {0};
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] != BT_DYNAMIC) continue;
+        if (b->vel[i].x != 0 || b->vel[i].y != 0) bt_sum_add(&carried, b->mass[i] * (fabs(b->vel[i].x) + fabs(b->vel[i].y)));
         double dx = b->vel[i].x - b->vel_free[i].x, dy = b->vel[i].y - b->vel_free[i].y;
         if (dx == 0 && dy == 0) continue;
         bt_sum_add(&gained[0], dx / b->inv[i].m);
         bt_sum_add(&gained[1], dy / b->inv[i].m);
-        bt_sum_add(&carried, b->mass[i] * (fabs(b->vel[i].x) + fabs(b->vel[i].y)));
     }
     for (bt_idx k = 0; k < s->n_rows; k++) {
         const bt_row *r = &s->rows[k];

@@ -13,8 +13,8 @@
 
 #include "bergtow/world.h"
 
-/// One contact point. Both arms end in the same point of space, half-way between the two surfaces, so that equal
-/// and opposite impulses conserve angular momentum exactly.
+/// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
+/// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.
 typedef struct bt_point {
     double gap;          ///< m, negative when the bodies overlap
     double ra[2], rb[2]; ///< contact point relative to the centroid of a, of b, m

@@ -15,6 +15,8 @@
 // berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration as the reference; both end
 // on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
 //
+// A manifold is one unit of the sweep: the normals of its two points are solved together, and their friction as one.
+//
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
 // which is zero exactly at a solution. The sweep's own largest update is the same quantity seen while velocities
