@@ -99,6 +99,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .momentum_residual = st->momentum_residual,
         .kinetic_energy = st->kinetic_energy,
         .contact_work = st->contact_work,
+        .restitution_cut = st->restitution_share < 1,
         .line_tension = NAN,
         .line_length = NAN,
         .carriage_x = NAN,
