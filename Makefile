@@ -113,7 +113,7 @@ test: deps ## every test: units, known answers, same bits, command line
 
 test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time step, tolerance cut tenfold
 	@$(AGAIN) all
-	BERGTOW=build/release/bergtow $(PYTEST) tests/long
+	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
 lint: all ## names of external symbols, licence lines, syntax
 	@tests/lint.sh
