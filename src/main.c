@@ -60,7 +60,6 @@ int main(int argc, char **argv)
     argp_err_exit_status = BT_ERR_USAGE;
     signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
     argp_program_version_hook = print_version;
-    signal(SIGXFSZ, SIG_IGN); // past a file-size limit a write fails with a message, like on a full disk
     if (argc < 2) {
         print_help(stderr);
         return BT_ERR_USAGE;

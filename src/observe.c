@@ -59,7 +59,7 @@ static void observe_body(const bt_world *w, bt_sample *s)
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
-    s->ice_resistance = -(ice[0] * dx + ice[1] * dy) / dt;
+    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
     s->ice_resistance_budget = -budget_impulse(w, dx, dy) / dt;
     s->drag_force = -(external[0] * dx + external[1] * dy) / dt;
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
@@ -99,6 +99,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .momentum_residual = st->momentum_residual,
         .kinetic_energy = st->kinetic_energy,
         .contact_work = st->contact_work,
+        .restitution_cut = st->restitution_share < 1,
         .line_tension = NAN,
         .line_length = NAN,
         .carriage_x = NAN,

@@ -35,6 +35,7 @@ const bt_series_field bt_series_fields[] = {
     ROW(momentum_residual, MAX, "1", "|momentum change - external impulse| / momentum exchanged in the step"),
     ROW(kinetic_energy, LAST, "J", "kinetic energy of all dynamic bodies, added mass included"),
     ROW(contact_work, SUM, "J", "work of the contact impulses"),
+    ROW(restitution_cut, SUM, "1", "steps whose restitution was lowered so that the contacts add no energy"),
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
 };
 

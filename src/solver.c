@@ -131,7 +131,7 @@ static void fill_row(const bt_world *w, const bt_manifold *m, const bt_point *p,
     };
     r->mn = 1 / (ia.m + ib.m + ia.i * r->ran * r->ran + ib.i * r->rbn * r->rbn);
     r->mt = 1 / (ia.m + ib.m + ia.i * r->rat * r->rat + ib.i * r->rbt * r->rbt);
-    r->bias = bias_of(w, r, b->restitution[m->b]);
+    r->bias = bias_of(w, r, w->solver->restitution_share * b->restitution[m->b]);
     if (!w->par.warm_start) r->ln = r->lt = 0;
 }
 
@@ -362,7 +362,7 @@ static void accelerate(bt_world *w, bool parallel)
     if (t) t->lambda += a->move[2 * s->n_rows] / line;
 }
 
-void bt_solver_solve(bt_world *w)
+static void sweep_to_tolerance(bt_world *w)
 {
     bt_solver *s = w->solver;
     bt_contacts *c = w->contacts;
@@ -370,18 +370,18 @@ void bt_solver_solve(bt_world *w)
     const bool parallel = s->n_rows > MIN_PARALLEL_ROWS;
     warm_start(w);
     bt_step_stats *st = &w->stats;
-    st->sweeps = 0;
     st->residual = bt_solver_residual(w);
     if (st->residual > tolerance) bt_anderson_start(s->anderson, 2 * (size_t)s->n_rows + 1);
-    while (st->residual > tolerance && st->sweeps < w->par.max_sweeps) {
+    const int64_t limit = st->sweeps + w->par.max_sweeps;
+    while (st->residual > tolerance && st->sweeps < limit) {
         double change = sweep(w, parallel);
         st->sweeps++;
-        if (change <= tolerance || st->sweeps == w->par.max_sweeps) {
+        if (change <= tolerance || st->sweeps == limit) {
             velocities_from_impulses(w);
             st->residual = bt_solver_residual(w);
             if (st->residual <= tolerance) break;
         }
-        if (!w->par.plain_sweeps && st->sweeps < w->par.max_sweeps) accelerate(w, parallel);
+        if (!w->par.plain_sweeps && st->sweeps < limit) accelerate(w, parallel);
     }
     st->converged = st->residual <= tolerance;
     for (bt_idx k = 0; k < c->n_man; k++) {
@@ -391,6 +391,38 @@ void bt_solver_solve(bt_world *w)
             c->man[k].p[i].lt = r[i].lt;
         }
     }
+}
+
+/// Work that rows solved to the tolerance may do: λ times the residual, and rounding.
+static double allowed_work(const bt_world *w)
+{
+    const bt_solver *s = w->solver;
+    bt_sum exchanged = {0};
+    for (bt_idx i = 0; i < s->n_rows; i++) bt_sum_add(&exchanged, s->rows[i].ln + fabs(s->rows[i].lt));
+    return bt_sum_value(&exchanged) * (w->stats.residual + 1e-12);
+}
+
+void bt_solver_solve(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    bt_bodies *b = &w->bodies;
+    bt_step_stats *st = &w->stats;
+    bool rebounds = false;
+    for (bt_idx k = 0; k < w->contacts->n_man && !rebounds; k++) rebounds = b->restitution[w->contacts->man[k].b] > 0;
+    s->restitution_share = 1;
+    s->prepare_s = 0;
+    st->sweeps = 0;
+    for (;;) {
+        const double t0 = bt_clock();
+        bt_solver_prepare(w);
+        s->prepare_s += bt_clock() - t0;
+        sweep_to_tolerance(w);
+        st->contact_work = bt_solver_work(w);
+        if (!rebounds || s->restitution_share == 0 || st->contact_work <= allowed_work(w)) break;
+        s->restitution_share = s->restitution_share > 0.2 ? 0.5 * s->restitution_share : 0;
+        for (bt_idx i = 0; i < b->n; i++) b->vel[i] = b->vel_free[i];
+    }
+    st->restitution_share = s->restitution_share;
 }
 
 double bt_solver_work(const bt_world *w)

@@ -114,12 +114,9 @@ void bt_world_step(bt_world *w)
     double t1 = bt_clock();
     bt_contacts_detect(w, bt_contacts_margin(w)); // gaps and J at X1
     double t2 = bt_clock();
-    bt_solver_prepare(w);
-    double t3 = bt_clock();
     bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
     bt_solver_project(w);
     st->momentum_residual = momentum_residual(w);
-    st->contact_work = bt_solver_work(w);
     double t4 = bt_clock();
     advance(w); // X2 = X1 + U2 Δt
     st->kinetic_energy = kinetic_energy(w);
@@ -129,7 +126,7 @@ void bt_world_step(bt_world *w)
     double t5 = bt_clock();
     st->forces_s = t1 - t0;
     st->detect_s = t2 - t1;
-    st->colour_s = t3 - t2;
-    st->solve_s = t4 - t3;
+    st->colour_s = w->solver->prepare_s;
+    st->solve_s = t4 - t2 - st->colour_s;
     st->advance_s = t5 - t4;
 }

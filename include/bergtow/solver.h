@@ -55,17 +55,21 @@ typedef struct bt_solver {
     struct bt_anderson *anderson;
     double *push;                ///< [n_rows] its multipliers, kg m
     bt_idx cap_bodies;
+    double restitution_share;    ///< factor on every restitution, see bt_solver_solve
+    double prepare_s;            ///< wall time of the colouring and packing in this step, s
     bool shifted;                ///< the projection did something this step
 } bt_solver;
 
 bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
-/// Colour the manifolds and pack the rows of this step.
+/// Colour the manifolds and pack the rows of this step; the first part of bt_solver_solve.
 void bt_solver_prepare(bt_world *w);
 
-/// Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes U2, the
-/// manifolds get their impulses, stats the counts.
+/// Colour, pack and sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
+/// U2, the manifolds get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// contacts of a body rebound at once, or slip (Kane & Levinson 1985); a step whose contact work comes out positive is
+/// solved again with all restitutions halved, and again, at last with none, where the work is never positive.
 void bt_solver_solve(bt_world *w);
 
 /// Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the same

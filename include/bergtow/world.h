@@ -107,6 +107,7 @@ typedef struct bt_step_stats {
     double residual;         ///< max-norm natural-map residual, m/s
     bool converged;
     double overlap;          ///< deepest overlap at the start of the step, m
+    double restitution_share;///< of e that was used, 1 unless rebounds would have added energy
     double contact_work;     ///< J
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
