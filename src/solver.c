@@ -11,7 +11,7 @@
 #include "bergtow/tow.h"
 
 #define SEQUENTIAL BT_MAX_COLOURS ///< colour of the manifolds done one after the other
-#define MIN_PARALLEL_ROWS 3000    ///< fewer rows than this are swept faster by one thread (barriers)
+#define MIN_PARALLEL_ROWS 6000    ///< fewer rows than this are swept faster by one thread (a barrier a colour)
 
 bt_solver *bt_solver_create(void)
 {
@@ -487,12 +487,20 @@ void bt_solver_solve(bt_world *w)
     }
 }
 
+/// Velocity without contacts: U*, and for the towed body what the line adds to it.
+static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
+{
+    bt_vel v = w->bodies.vel_free[i];
+    if (i == w->towed && w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_apply(w->tow, w->tow->lambda, &v, w->bodies.inv[i]);
+    return v;
+}
+
 static double row_work(const bt_world *w, const bt_row *r)
 {
-    const bt_bodies *b = &w->bodies;
-    const bt_vel *fa = &b->vel_free[r->a], *fb = &b->vel_free[r->b], *va = &b->vel[r->a], *vb = &b->vel[r->b];
-    return 0.5 * r->ln * (normal_velocity(r, fa, fb) + normal_velocity(r, va, vb)) +
-           0.5 * r->lt * (tangent_velocity(r, fa, fb) + tangent_velocity(r, va, vb));
+    const bt_vel fa = velocity_without_contacts(w, r->a), fb = velocity_without_contacts(w, r->b);
+    const bt_vel *va = &w->bodies.vel[r->a], *vb = &w->bodies.vel[r->b];
+    return 0.5 * r->ln * (normal_velocity(r, &fa, &fb) + normal_velocity(r, va, vb)) +
+           0.5 * r->lt * (tangent_velocity(r, &fa, &fb) + tangent_velocity(r, va, vb));
 }
 
 double bt_solver_work(const bt_world *w)

@@ -129,7 +129,7 @@ static void solve_contacts(bt_world *w)
         st->solve_s += t2 - t1 - w->solver->prepare_s;
         const double needed = bt_contacts_margin(w, b->vel);
         st->outrun = needed > margin;
-        if (!st->outrun || st->repeats == MAX_REPEATS) break;
+        if (!st->outrun || !st->converged || st->repeats == MAX_REPEATS) break;
         margin = needed;
         st->repeats++;
         for (bt_idx i = 0; i < b->n; i++) b->vel[i] = b->vel_free[i];

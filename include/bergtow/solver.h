@@ -86,7 +86,8 @@ void bt_solver_project(bt_world *w);
 double bt_solver_residual(const bt_world *w);
 
 /// Work of the contact impulses in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
-/// the work of prescribed motion.
+/// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of two impulses that
+/// act at once the line's comes first, or the pull of the line into the ice would count as work of the ice.
 double bt_solver_work(const bt_world *w);
 
 /// Sum of the contact impulses on body i (N s, N s, N m s about its centroid), order-free.
