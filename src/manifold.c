@@ -216,8 +216,10 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, cons
     // before, so that features, and with them impulses, persist. The tie is 1 % of the smaller floe's radius.
     const double tie = 0.01 * bt_min(w->bodies.radius[a], w->bodies.radius[b]);
     bool ref_b = sb > sa;
-    if (before && fabs(sa - sb) < tie) ref_b = before->p[0].feature >> 31;
-    else if (!before && sb < sa + tie) ref_b = false;
+    const bool square = pa.n[2 * ia] * pb.n[2 * ib] + pa.n[2 * ia + 1] * pb.n[2 * ib + 1] < -0.98;
+    if (square && before && fabs(sa - sb) < tie) ref_b = before->p[0].feature >> 31;
+    else if (square && !before && sb < sa + tie) ref_b = false;
+    if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b; // apart by one of them: the tie must not feign overlap
     *gap_out = bt_max(sa, sb);
     *axis_out = ref_b ? pa.count + ib : ia;
 

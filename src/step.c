@@ -115,6 +115,17 @@ void bt_world_step(bt_world *w)
     bt_contacts_detect(w, bt_contacts_margin(w)); // gaps and J at X1
     double t2 = bt_clock();
     bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+    for (int k = 0; k < 4; k++) {
+        double fastest = 0;
+        for (bt_idx i = 0; i < w->bodies.n; i++) {
+            const bt_vel *v = &w->bodies.vel[i];
+            fastest = bt_max(fastest, sqrt(v->x * v->x + v->y * v->y) + w->bodies.radius[i] * fabs(v->w));
+        }
+        if (2 * w->par.dt * fastest <= w->contacts->margin) break;
+        for (bt_idx i = 0; i < w->bodies.n; i++) w->bodies.vel[i] = w->bodies.vel_free[i];
+        bt_contacts_detect(w, 2 * w->par.dt * fastest);
+        bt_solver_solve(w);
+    }
     bt_solver_project(w);
     st->momentum_residual = momentum_residual(w);
     double t4 = bt_clock();
