@@ -487,12 +487,20 @@ void bt_solver_solve(bt_world *w)
     }
 }
 
+/// Velocity that body i would have without its contacts: U*, and what the tow line adds to it.
+static bt_vel without_contacts(const bt_world *w, bt_idx i)
+{
+    bt_vel v = w->bodies.vel_free[i];
+    if (i == w->towed && w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_apply(w->tow, w->tow->lambda, &v, w->bodies.inv[i]);
+    return v;
+}
+
 static double row_work(const bt_world *w, const bt_row *r)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_vel *fa = &b->vel_free[r->a], *fb = &b->vel_free[r->b], *va = &b->vel[r->a], *vb = &b->vel[r->b];
-    return 0.5 * r->ln * (normal_velocity(r, fa, fb) + normal_velocity(r, va, vb)) +
-           0.5 * r->lt * (tangent_velocity(r, fa, fb) + tangent_velocity(r, va, vb));
+    const bt_vel fa = without_contacts(w, r->a), fb = without_contacts(w, r->b), *va = &b->vel[r->a], *vb = &b->vel[r->b];
+    return 0.5 * r->ln * (normal_velocity(r, &fa, &fb) + normal_velocity(r, va, vb)) +
+           0.5 * r->lt * (tangent_velocity(r, &fa, &fb) + tangent_velocity(r, va, vb));
 }
 
 double bt_solver_work(const bt_world *w)
