@@ -119,7 +119,7 @@ def test_the_problem_is_worth_solving(solved):
     name, p, _ = solved
     assert p.n > 40
     pressed, friction = p.r[::2] > 1e-9, np.abs(p.r[1::2])
-    assert pressed.sum() > 8 and (~pressed).sum() > 8
+    assert pressed.sum() > 4 and (~pressed).sum() > 4
     if name in ("friction", "strong friction, loose"):
         limit = p.mu * p.r[::2]
         assert np.any(pressed & (friction > (1 - 1e-9) * limit)), "nothing slides"
@@ -167,7 +167,7 @@ def test_velocities_are_those_of_another_method(solved):
 
 def test_friction_from_scratch(tmp_path):
     """The same without knowing anything of the solution."""
-    p, r = dump(tmp_path, changed(CASES["friction"], domain__length=5, domain__width=4), 25)
+    p, r = dump(tmp_path, changed(CASES["friction"], domain__length=5, domain__width=4, ice__concentration=0.8), 20)
     assert r.series("unconverged")[-1] == 0 and np.sum(p.r[::2] > 0) > 10
     assert np.abs(from_scratch(p) - p.u).max() <= 1e-7 * SPEED
     # Friction matters: without it the velocities are others.
