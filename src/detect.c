@@ -18,19 +18,15 @@ void bt_contacts_free(bt_contacts *c)
     free(c);
 }
 
-double bt_contacts_margin(const bt_world *w)
+double bt_contacts_margin(const bt_world *w, const bt_vel *v)
 {
     const bt_bodies *b = &w->bodies;
     double fastest = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        const bt_vel *u = &b->vel_start[i], *v = &b->vel_free[i];
-        double s = bt_max(u->x * u->x + u->y * u->y, v->x * v->x + v->y * v->y);
-        double r = b->radius[i] * bt_max(fabs(u->w), fabs(v->w));
-        fastest = bt_max(fastest, sqrt(s) + r);
-    }
-    double least = 2 * w->par.dt * fastest;
-    if (!(least > 0)) return w->par.slop;
-    return bt_max(w->par.slop, exp2(0.5 * ceil(2 * log2(least))));
+    for (bt_idx i = 0; i < b->n; i++)
+        fastest = bt_max(fastest, sqrt(v[i].x * v[i].x + v[i].y * v[i].y) + b->radius[i] * fabs(v[i].w));
+    const double least = 2 * w->par.dt * fastest;
+    if (!(least > w->par.slop)) return w->par.slop;
+    return exp2(0.5 * ceil(2 * log2(least)));
 }
 
 static bt_manifold *next_manifold(bt_contacts *c)

@@ -18,7 +18,6 @@
 #include "progress.h"
 
 #define FRAMES_BY_DEFAULT 200
-#define STEPS_BETWEEN_CHECKS 100 // for poses that are not finite
 
 static volatile sig_atomic_t stop_signal;
 
@@ -132,10 +131,11 @@ static bt_status loop(run *r, bt_errors *err)
             status = record_frame(r, err);
             while ((double)frames * interval * (1 - 1e-12) <= s.time) frames++;
         }
-        if (status == BT_OK && (w->step % STEPS_BETWEEN_CHECKS == 0 || w->step == n_steps)) status = check_finite(r, err);
+        if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
         bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
         r->totals.phases.output += bt_clock() - t0;
     }
+    if (status == BT_OK) status = check_finite(r, err);
     return status;
 }
 

@@ -9,6 +9,7 @@
 #include "bergtow/contacts.h"
 #include "bergtow/forces.h"
 #include "bergtow/tow.h"
+#include "case_check.h"
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
@@ -181,6 +182,103 @@ static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
     return n;
 }
 
+/// Are a and b apart, also while a moves by (dx, dy) relative to b? Separating axes of the convex hull of both ends of the
+/// path: edge normals of a and of b, and the normal of the path.
+static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, double dx, double dy)
+{
+    const bt_bodies *bd = &w->bodies;
+    double d[2];
+    bt_world_offset(w, a, b, d);
+    const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
+    for (int64_t k = 0; k <= na + nb; k++) {
+        double nx = -dy, ny = dx;
+        if (k < na + nb) {
+            const double *n = bd->normal + 2 * (k < na ? bd->offset[a] + k : bd->offset[b] + k - na);
+            nx = n[0], ny = n[1];
+        }
+        double low_a = INFINITY, high_a = -INFINITY, low_b = INFINITY, high_b = -INFINITY;
+        const double along = nx * dx + ny * dy, offset = nx * d[0] + ny * d[1];
+        for (int64_t i = bd->offset[a]; i < bd->offset[a + 1]; i++) {
+            const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1];
+            low_a = bt_min(low_a, p + bt_min(along, 0));
+            high_a = bt_max(high_a, p + bt_max(along, 0));
+        }
+        for (int64_t i = bd->offset[b]; i < bd->offset[b + 1]; i++) {
+            const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1] + offset;
+            low_b = bt_min(low_b, p);
+            high_b = bt_max(high_b, p);
+        }
+        if (low_b >= high_a || low_a >= high_b) return true;
+    }
+    return false;
+}
+
+/// Two bodies of infinite mass pass through each other without a contact: no prescribed path may cross such a body.
+static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roster *r, bt_idx first_wall, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    bool sound = true;
+    for (bt_idx i = 0; i < b->n; i++)
+        for (bt_idx j = i + 1; j < b->n; j++) {
+            if (b->motion[i] == BT_DYNAMIC) break;
+            if (b->motion[j] == BT_DYNAMIC || i >= first_wall) continue;
+            const bool towed = i == w->towed || j == w->towed;
+            if (j == w->towed || j >= first_wall) {
+                // Relative displacement of j. Walls that stand may hold fixed bodies (piers) and were checked with the tow.
+                double way[2] = {0, 0};
+                const bt_idx moving[2] = {j, i};
+                for (int k = 0; k < 2; k++) {
+                    const double sign = k ? -1 : 1, reach = bt_case_tow_distance(c, c->run.duration);
+                    const bt_idx m = moving[k];
+                    way[0] += sign * (m == w->towed ? reach * cos(c->tow.direction) : b->vel[m].x * c->run.duration);
+                    way[1] += sign * (m == w->towed ? reach * sin(c->tow.direction) : b->vel[m].y * c->run.duration);
+                }
+                if (j >= first_wall && (b->motion[j] == BT_STATIC || (way[0] == 0 && way[1] == 0))) continue;
+                if (apart_on_path(w, j, i, way[0], way[1])) continue;
+                bt_errors_add(err, "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
+                              "fixed floe, or tow on a line", c->path ? c->path : "case", r->names[j - r->n_floes],
+                              towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");
+                sound = false;
+            }
+        }
+    return sound;
+}
+
+/// A pair has one contact, with the nearest image: across a period there must be room for both images apart.
+static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall, bt_errors *err)
+{
+    double first = 0, second = 0; // the two largest radii
+    for (bt_idx i = 0; i < first_wall; i++) {
+        const double r = w->bodies.radius[i];
+        if (r > first) second = first, first = r;
+        else if (r > second) second = r;
+    }
+    const double need = 2 * (first + second);
+    const double periods[2] = {w->par.period_x, w->par.period_y};
+    bool sound = true;
+    for (int k = 0; k < 2; k++)
+        if (periods[k] > 0 && need >= periods[k]) {
+            bt_errors_add(err, "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
+                          "turn, %.4g m; enlarge it or take smaller bodies", c->path ? c->path : "case", k ? "width" : "length",
+                          periods[k], need);
+            sound = false;
+        }
+    return sound;
+}
+
+/// Floes of a field that was read may belong to another domain.
+static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
+{
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double x = f->pose[3 * (size_t)i], y = f->pose[3 * (size_t)i + 1];
+        if (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length && y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width) continue;
+        bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
+                      c->ice.field ? c->ice.field : c->path ? c->path : "case", (int)i, x, y);
+        return false;
+    }
+    return true;
+}
+
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
 {
     double sum = 0, v[2 * BT_MAX_VERTICES];
@@ -191,6 +289,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
             sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&c->floes[i], v), v).area / BT_PI);
         size = sum / c->n_floes;
     }
+    if (!check_inside(c, f, err)) return BT_ERR_CASE;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
@@ -204,8 +303,11 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
         add_towed_body(c, w, r);
         r->names[n++] = "towed body";
     }
+    const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
     *out = w;
+    const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
+    if (!paths || !periods) return BT_ERR_CASE;
 
     // Generated fields are free of overlap by construction; a field that was read or floes given by hand may not be.
     const double overlap = bt_world_overlap(w);

@@ -24,7 +24,7 @@ void bt_solver_free(bt_solver *s)
 {
     if (!s) return;
     bt_anderson_free(s->anderson);
-    void *arrays[] = {s->rows, s->unit, s->row_of, s->used, s->colour, s->shift, s->push, s->step, s->scale, s->anderson};
+    void *arrays[] = {s->rows, s->unit, s->row_of, s->used, s->colour, s->shift, s->push, s->step, s->scale, s->anderson, s->island, s->share, s->surplus};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     free(s);
 }
@@ -110,6 +110,19 @@ static double bias_of(const bt_world *w, const bt_row *r, double restitution)
     return bt_max(r->gap, 0) / w->par.dt;
 }
 
+/// Least body that i is joined to (union-find with path halving).
+static bt_idx island_of(bt_solver *s, bt_idx i)
+{
+    while (s->island[i] != i) i = s->island[i] = s->island[s->island[i]];
+    return i;
+}
+
+static double island_share(const bt_world *w, const bt_manifold *m)
+{
+    if (!w->solver->rebounds) return 1;
+    return w->solver->share[island_of(w->solver, w->bodies.inv[m->a].m > 0 ? m->a : m->b)];
+}
+
 static void fill_row(const bt_world *w, const bt_manifold *m, const bt_point *p, bt_row *r)
 {
     const bt_bodies *b = &w->bodies;
@@ -131,7 +144,7 @@ static void fill_row(const bt_world *w, const bt_manifold *m, const bt_point *p,
     };
     r->mn = 1 / (ia.m + ib.m + ia.i * r->ran * r->ran + ib.i * r->rbn * r->rbn);
     r->mt = 1 / (ia.m + ib.m + ia.i * r->rat * r->rat + ib.i * r->rbt * r->rbt);
-    r->bias = bias_of(w, r, w->solver->restitution_share * b->restitution[m->b]);
+    r->bias = bias_of(w, r, island_share(w, m) * b->restitution[m->b]);
     if (!w->par.warm_start) r->ln = r->lt = 0;
 }
 
@@ -281,6 +294,7 @@ double bt_solver_residual(const bt_world *w)
         }
         const double wt = tangent_velocity(r, &v[r->a], &v[r->b]);
         worst = bt_max(worst, fabs(clamp(tangent - wt * r->mt, r->mu * normal) - tangent) / r->mt);
+        if (!isfinite(wt)) worst = INFINITY; // the maximum itself passes over a NaN
     }
     if (w->tow && w->tow->mode == BT_TOW_LINE) worst = bt_max(worst, bt_tow_residual(w->tow, &v[w->towed]));
     return worst;
@@ -371,8 +385,16 @@ static void sweep_to_tolerance(bt_world *w)
     warm_start(w);
     bt_step_stats *st = &w->stats;
     st->residual = bt_solver_residual(w);
-    if (st->residual > tolerance) bt_anderson_start(s->anderson, 2 * (size_t)s->n_rows + 1);
     const int64_t limit = st->sweeps + w->par.max_sweeps;
+    // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
+    bool pressed = false;
+    for (bt_idx i = 0; i < s->n_rows && !pressed; i++) pressed = s->rows[i].ln > 0;
+    if (pressed && st->residual <= tolerance) {
+        sweep(w, parallel);
+        st->sweeps++;
+        st->residual = bt_solver_residual(w);
+    }
+    if (st->residual > tolerance) bt_anderson_start(s->anderson, 2 * (size_t)s->n_rows + 1);
     while (st->residual > tolerance && st->sweeps < limit) {
         double change = sweep(w, parallel);
         st->sweeps++;
@@ -393,13 +415,53 @@ static void sweep_to_tolerance(bt_world *w)
     }
 }
 
-/// Work that rows solved to the tolerance may do: λ times the residual, and rounding.
-static double allowed_work(const bt_world *w)
+/// Join the movable bodies that touch into islands, named by their least body; full restitution for each.
+static void find_islands(bt_world *w)
 {
-    const bt_solver *s = w->solver;
-    bt_sum exchanged = {0};
-    for (bt_idx i = 0; i < s->n_rows; i++) bt_sum_add(&exchanged, s->rows[i].ln + fabs(s->rows[i].lt));
-    return bt_sum_value(&exchanged) * (w->stats.residual + 1e-12);
+    bt_solver *s = w->solver;
+    const bt_bodies *b = &w->bodies;
+    const bt_contacts *c = w->contacts;
+    if (b->n > s->cap_islands) {
+        s->cap_islands = b->n;
+        s->island = bt_realloc(s->island, (size_t)b->n, sizeof *s->island);
+        s->share = bt_realloc(s->share, (size_t)b->n, sizeof *s->share);
+        s->surplus = bt_realloc(s->surplus, (size_t)b->n, sizeof *s->surplus);
+    }
+    for (bt_idx i = 0; i < b->n; i++) {
+        s->island[i] = i;
+        s->share[i] = 1;
+    }
+    for (bt_idx k = 0; k < c->n_man; k++) {
+        if (b->inv[c->man[k].a].m == 0 || b->inv[c->man[k].b].m == 0) continue;
+        bt_idx i = island_of(s, c->man[k].a), j = island_of(s, c->man[k].b);
+        if (i < j) s->island[j] = i;
+        else s->island[i] = j;
+    }
+}
+
+static double row_work(const bt_world *w, const bt_row *r);
+
+/// Lower the restitution of every island whose contacts did positive work, beyond what rows solved to the residual may
+/// do (λ times the residual, and rounding). True when there was one.
+static bool lower_restitution(bt_world *w)
+{
+    bt_solver *s = w->solver;
+    const bt_bodies *b = &w->bodies;
+    const double allowed = w->stats.residual + 1e-12;
+    for (bt_idx i = 0; i < b->n; i++) s->surplus[i] = (bt_sum){0};
+    for (bt_idx i = 0; i < s->n_rows; i++) {
+        const bt_row *r = &s->rows[i];
+        if (r->ln == 0) continue;
+        const bt_idx own = island_of(s, b->inv[r->a].m > 0 ? r->a : r->b);
+        bt_sum_add(&s->surplus[own], row_work(w, r) - allowed * (r->ln + fabs(r->lt)));
+    }
+    bool any = false;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (s->island[i] != i || s->share[i] == 0 || !(bt_sum_value(&s->surplus[i]) > 0)) continue;
+        s->share[i] = s->share[i] > 0.2 ? 0.5 * s->share[i] : 0;
+        any = true;
+    }
+    return any;
 }
 
 void bt_solver_solve(bt_world *w)
@@ -407,9 +469,10 @@ void bt_solver_solve(bt_world *w)
     bt_solver *s = w->solver;
     bt_bodies *b = &w->bodies;
     bt_step_stats *st = &w->stats;
-    bool rebounds = false;
-    for (bt_idx k = 0; k < w->contacts->n_man && !rebounds; k++) rebounds = b->restitution[w->contacts->man[k].b] > 0;
-    s->restitution_share = 1;
+    s->rebounds = false;
+    for (bt_idx k = 0; k < w->contacts->n_man && !s->rebounds; k++) s->rebounds = b->restitution[w->contacts->man[k].b] > 0;
+    if (s->rebounds) find_islands(w);
+    st->restitution_cut = false;
     s->prepare_s = 0;
     st->sweeps = 0;
     for (;;) {
@@ -418,25 +481,34 @@ void bt_solver_solve(bt_world *w)
         s->prepare_s += bt_clock() - t0;
         sweep_to_tolerance(w);
         st->contact_work = bt_solver_work(w);
-        if (!rebounds || s->restitution_share == 0 || st->contact_work <= allowed_work(w)) break;
-        s->restitution_share = s->restitution_share > 0.2 ? 0.5 * s->restitution_share : 0;
+        if (!s->rebounds || !lower_restitution(w)) break;
+        st->restitution_cut = true;
         for (bt_idx i = 0; i < b->n; i++) b->vel[i] = b->vel_free[i];
     }
-    st->restitution_share = s->restitution_share;
+}
+
+/// Velocity that body i would have without its contacts: U*, and what the tow line adds to it.
+static bt_vel without_contacts(const bt_world *w, bt_idx i)
+{
+    bt_vel v = w->bodies.vel_free[i];
+    if (i == w->towed && w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_apply(w->tow, w->tow->lambda, &v, w->bodies.inv[i]);
+    return v;
+}
+
+static double row_work(const bt_world *w, const bt_row *r)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_vel fa = without_contacts(w, r->a), fb = without_contacts(w, r->b), *va = &b->vel[r->a], *vb = &b->vel[r->b];
+    return 0.5 * r->ln * (normal_velocity(r, &fa, &fb) + normal_velocity(r, va, vb)) +
+           0.5 * r->lt * (tangent_velocity(r, &fa, &fb) + tangent_velocity(r, va, vb));
 }
 
 double bt_solver_work(const bt_world *w)
 {
     const bt_solver *s = w->solver;
-    const bt_bodies *b = &w->bodies;
     bt_sum work = {0};
-    for (bt_idx i = 0; i < s->n_rows; i++) {
-        const bt_row *r = &s->rows[i];
-        if (r->ln == 0) continue;
-        const bt_vel *fa = &b->vel_free[r->a], *fb = &b->vel_free[r->b], *va = &b->vel[r->a], *vb = &b->vel[r->b];
-        bt_sum_add(&work, 0.5 * r->ln * (normal_velocity(r, fa, fb) + normal_velocity(r, va, vb)) +
-                              0.5 * r->lt * (tangent_velocity(r, fa, fb) + tangent_velocity(r, va, vb)));
-    }
+    for (bt_idx i = 0; i < s->n_rows; i++)
+        if (s->rows[i].ln != 0) bt_sum_add(&work, row_work(w, &s->rows[i]));
     return bt_sum_value(&work);
 }
 

@@ -49,6 +49,8 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     if (!isnan(s->line_tension)) h->peak_tension = isnan(h->peak_tension) ? s->line_tension
                                                                           : bt_max(h->peak_tension, s->line_tension);
     h->unconverged += s->unconverged != 0;
+    h->repeats += (int64_t)s->repeats;
+    h->outrun += s->outrun != 0;
     h->restitution_cut += s->restitution_cut != 0;
     h->positive_work += s->contact_work > WORK_ROUNDING * s->kinetic_energy;
 }
@@ -179,6 +181,9 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         bt_errors_add(&s->warnings, "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
                       "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",
                       (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance);
+    if (h->outrun)
+        bt_errors_add(&s->warnings, "in %lld of %lld steps floes became too fast for the contact detection, which may have missed "
+                      "contacts; lower run.dt", (long long)h->outrun, (long long)h->n);
     if (h->restitution_cut)
         bt_errors_add(&s->warnings, "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
                       (long long)h->restitution_cut, (long long)h->n);

@@ -14,7 +14,7 @@ typedef struct bt_history {
     double sum_contacts, sum_sweeps, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double peak_tension;             ///< NaN until there is a line
-    int64_t unconverged, positive_work, restitution_cut;
+    int64_t unconverged, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.

@@ -84,6 +84,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "contacts_mean", s->contacts);
     bt_json_number(&j, "contact_work_j", h->contact_work);
     bt_json_int(&j, "positive_work_steps", h->positive_work);
+    bt_json_int(&j, "repeated_solves", h->repeats);
+    bt_json_int(&j, "outrun_steps", h->outrun);
     bt_json_int(&j, "restitution_cut_steps", h->restitution_cut);
     bt_json_number(&j, "momentum_residual", h->max_momentum_residual);
     bt_json_int(&j, "floes_outside", t->floes_outside);

@@ -79,7 +79,7 @@ static inline bt_sample sample(int step)
     s.momentum_residual = 1e-15;
     s.kinetic_energy = 100;
     s.contact_work = -2;
-    s.restitution_cut = 0;
+    s.repeats = s.outrun = s.restitution_cut = 0;
     return s;
 }
 

