@@ -8,7 +8,9 @@
 //
 // The contact problem is only piecewise smooth, so: when |f|² has grown tenfold over its best, the columns
 // describe another piece and are dropped; when it has grown a million-fold, x also goes back to the best g. A γ beyond
-// 10⁶ (columns nearly dependent) drops the columns as well. After each drop a few sweeps stay plain, 0, 1, 3, 7, 15.
+// 10⁶ (columns nearly dependent) drops the columns as well. And where |f| has not halved in 60 iterations, extrapolation may undo
+// what sweeps achieve, for ever (seen: two points of an edge, one of them about to let go, which plain sweeps settle in 300): a
+// long rest follows, 60, 120, 240... sweeps. After each drop a few sweeps stay plain, 0, 1, 3, 7, 15.
 //
 // Order-free sums: the scalar products steer the solver, so they must have the same bits in any order of
 // summation. Each term is first rounded to a multiple of one quantum, chosen from bounds (max-norms, order-free
@@ -24,6 +26,7 @@
 #define DROP_COLUMNS 10.0
 #define MAX_REST 15
 #define GO_BACK 1e12
+#define STALL 60      // iterations without halving |f|
 #define MAX_GAMMA 1e6
 #define RIDGE 1e-11 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
 
@@ -42,7 +45,9 @@ void bt_anderson_start(bt_anderson *a, size_t n)
     a->depth = a->head = 0;
     a->rest = a->next_rest = 0;
     a->started = false;
-    a->best = INFINITY;
+    a->best = a->mark = INFINITY;
+    a->stalled = 0;
+    a->long_rest = STALL;
 }
 
 void bt_anderson_free(bt_anderson *a)
@@ -143,6 +148,16 @@ bool bt_anderson_advance(bt_anderson *a)
     if (norm <= a->best) {
         a->best = norm;
         memcpy(a->best_g, a->g, n * sizeof *a->g);
+    }
+    if (norm < 0.25 * a->mark) {
+        a->mark = norm;
+        a->stalled = 0;
+    } else if (a->rest == 0 && ++a->stalled > STALL) {
+        drop(a);
+        a->rest = a->long_rest;
+        a->long_rest *= 2;
+        a->mark = norm;
+        a->stalled = 0;
     }
     if (a->rest > 0) {
         a->rest--;

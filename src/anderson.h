@@ -11,6 +11,8 @@ typedef struct bt_anderson {
     size_t n, cap;
     int depth, head;           ///< columns in use, next to be replaced
     int rest, next_rest;       ///< plain iterations left now, and after the next drop
+    int stalled, long_rest;    ///< iterations since |f| was halved, plain iterations when that takes too long
+    double mark;               ///< |f|² at the last halving
     bool started;              ///< f_before, g_before are valid
     double best;               ///< least |f|² since the start
     double *g, *f;             ///< [n] caller fills: g(x_k) and f = g(x_k) − x_k, scaled to one unit
