@@ -8,9 +8,9 @@
 //
 // The contact problem is only piecewise smooth, so: when |f|² has grown tenfold over its best, the columns
 // describe another piece and are dropped; when it has grown a million-fold, x also goes back to the best g. A γ beyond
-// 10⁶ (columns nearly dependent) drops the columns as well. And where |f| has not halved in 60 iterations, extrapolation may undo
+// 10⁶ (columns nearly dependent) drops the columns as well. And where |f| has not halved in 150 iterations, extrapolation may undo
 // what sweeps achieve, for ever (seen: two points of an edge, one of them about to let go, which plain sweeps settle in 300): a
-// long rest follows, 60, 120, 240... sweeps. After each drop a few sweeps stay plain, 0, 1, 3, 7, 15.
+// long rest follows, 150, 300, 600... sweeps. After each drop a few sweeps stay plain, 0, 1, 3, 7, 15.
 //
 // Order-free sums: the scalar products steer the solver, so they must have the same bits in any order of
 // summation. Each term is first rounded to a multiple of one quantum, chosen from bounds (max-norms, order-free
@@ -26,7 +26,7 @@
 #define DROP_COLUMNS 10.0
 #define MAX_REST 15
 #define GO_BACK 1e12
-#define STALL 60      // iterations without halving |f|
+#define STALL 150      // iterations without halving |f|
 #define MAX_GAMMA 1e6
 #define RIDGE 1e-11 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
 
