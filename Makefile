@@ -48,6 +48,7 @@ help: ## this list
 # The stamp changes when the flags do, so that a new flag rebuilds everything.
 STAMP := $(BUILD)/flags
 $(STAMP): FORCE
+	@[ -n "$(HDF5_LIBS)" ] && command -v $(firstword $(CC)) >/dev/null || { echo "the compiler or a library is missing; run: make deps"; exit 1; }
 	@mkdir -p $(BUILD)
 	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@
 FORCE:
@@ -82,13 +83,13 @@ tests: $(TEST_BIN) ## build the test programs
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
 DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev \
-        libmetis-dev libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
+        libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-pytest ffmpeg
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages:" $$missing; \
+	echo "bergtow needs these Debian packages (on a bare system 360 MB to fetch, some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \

@@ -323,7 +323,8 @@ static void check_tow(const check *k)
 static void check_path(const check *k, int n, const double *v)
 {
     const bt_case *c = k->c;
-    if (c->tow.mode != BT_TOW_SPEED || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp")) return;
+    // On a line the body follows the carriage, on the average at its speed, and would end up drawn against the wall.
+    if (c->tow.mode == BT_TOW_NONE || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp")) return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);

@@ -38,7 +38,7 @@ static void draw(bt_progress *p, int64_t step, double time, double now)
     if (p->terminal) fputs("\r", p->out);
     fprintf(p->out, "%5.1f %%  t = %.6g s  %.4g steps/s  %s left", percent, time, rate,
             duration(left, (double)(p->n_steps - step) / rate));
-    if (p->n_force > 0) fprintf(p->out, "  mean ice resistance %.4g N", p->force_sum / (double)p->n_force);
+    if (p->n_force > 0) fprintf(p->out, "  mean ice resistance so far %.4g N", p->force_sum / (double)p->n_force);
     fputs(p->terminal ? CLEAR_TO_END : "\n", p->out);
     fflush(p->out);
     p->last = now;

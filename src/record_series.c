@@ -36,7 +36,7 @@ const bt_series_field bt_series_fields[] = {
     ROW(kinetic_energy, LAST, "J", "kinetic energy of all dynamic bodies, added mass included"),
     ROW(contact_work, SUM, "J", "work of the contact impulses"),
     ROW(repeats, SUM, "1", "times a step was detected and solved again because its solution outran the contact margin"),
-    ROW(outrun, SUM, "1", "steps whose last solution still outran the margin: a contact may have been missed"),
+    ROW(outrun, SUM, "1", "steps whose last solution still outran the margin: a contact may have been met a step late"),
     ROW(restitution_cut, SUM, "1", "steps whose restitution was lowered so that the contacts add no energy"),
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
 };

@@ -182,8 +182,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
                       "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",
                       (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance);
     if (h->outrun)
-        bt_errors_add(&s->warnings, "in %lld of %lld steps floes became too fast for the contact detection, which may have missed "
-                      "contacts; lower run.dt", (long long)h->outrun, (long long)h->n);
+        bt_errors_add(&s->warnings, "in %lld of %lld steps, mostly unconverged ones, a floe moved farther than the contact detection looks "
+                      "ahead: a contact may have been met a step late, as overlap; lower run.dt", (long long)h->outrun, (long long)h->n);
     if (h->restitution_cut)
         bt_errors_add(&s->warnings, "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
                       (long long)h->restitution_cut, (long long)h->n);

@@ -50,9 +50,9 @@ static void plain_lines_come_at_the_interval(void **state)
     assert_int_equal(count(text, '\n'), 10);
     assert_int_equal(count(text, '\r'), 0);
     // The mean of 2, 4, ... 20 is 11.
-    const char *first = "  2.5 %  t = 5 s  1 steps/s  6 min 30 s left  mean ice resistance 11 N\n";
+    const char *first = "  2.5 %  t = 5 s  1 steps/s  6 min 30 s left  mean ice resistance so far 11 N\n";
     assert_int_equal(strncmp(text, first, strlen(first)), 0);
-    assert_non_null(strstr(text, " 25.0 %  t = 50 s  1 steps/s  5 min 00 s left  mean ice resistance 101 N\n"));
+    assert_non_null(strstr(text, " 25.0 %  t = 50 s  1 steps/s  5 min 00 s left  mean ice resistance so far 101 N\n"));
 }
 
 static void a_resumed_run_counts_its_own_steps(void **state)
