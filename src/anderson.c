@@ -4,7 +4,7 @@
 //     f_k = g(x_k) − x_k,   γ = argmin |f_k − ΔF γ|,   x_{k+1} = g(x_k) − ΔG γ
 // with the last m differences of f and g as columns of ΔF and ΔG. On a linear problem this is GMRES on
 // the fixed-point map, whether or not that map is symmetric (a Gauss–Seidel sweep is not; conjugate gradients around
-// it need 10 to 100 times the sweeps on long chains and on heavy bodies, measured in tests/physics/test_convergence.c).
+// it need 10 to 100 times the sweeps on long chains and on heavy bodies, see heavy_body_squeezes_a_row in tests/physics).
 //
 // The contact problem is only piecewise smooth, so: when |f|² has grown tenfold over its best, the columns
 // describe another piece and are dropped; when it has grown a million-fold, x also goes back to the best g. A γ beyond
