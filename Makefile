@@ -20,8 +20,8 @@ ifeq ($(CI),true)
 BASE   += -Werror
 endif
 OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
-OPT_debug   := -O1 -g3 -DBT_VALIDATE
-OPT_asan    := -O1 -g3 -DBT_VALIDATE -fsanitize=address,undefined -fno-sanitize-recover=undefined
+OPT_debug   := -O1 -g3
+OPT_asan    := -O1 -g3 -fsanitize=address,undefined -fno-sanitize-recover=undefined
 ifeq ($(filter $(CONFIG),release debug asan),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug or asan)
 endif

@@ -148,7 +148,8 @@ static void fill_row(const bt_world *w, const bt_manifold *m, const bt_point *p,
     if (!w->par.warm_start) r->ln = r->lt = 0;
 }
 
-void bt_solver_prepare(bt_world *w)
+/// Colour the manifolds and pack the rows of this step.
+static void prepare(bt_world *w)
 {
     bt_solver *s = w->solver;
     const bt_contacts *c = w->contacts;
@@ -477,7 +478,7 @@ void bt_solver_solve(bt_world *w)
     st->sweeps = 0;
     for (;;) {
         const double t0 = bt_clock();
-        bt_solver_prepare(w);
+        prepare(w);
         s->prepare_s += bt_clock() - t0;
         sweep_to_tolerance(w);
         st->contact_work = bt_solver_work(w);

@@ -116,7 +116,6 @@ bt_idx bt_world_add(bt_world *w, const bt_body_def *d)
     b->drag[i] = d->drag;
     b->motion[i] = (uint8_t)d->motion;
     b->large[i] = d->large;
-    b->n_large += d->large;
     bt_world_turn_outline(w, i);
     w->contacts->built = false;
     return i;

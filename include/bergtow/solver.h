@@ -68,9 +68,6 @@ typedef struct bt_solver {
 bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
-/// Colour the manifolds and pack the rows of this step; the first part of bt_solver_solve.
-void bt_solver_prepare(bt_world *w);
-
 /// Colour, pack and sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
 /// U2, the manifolds get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that

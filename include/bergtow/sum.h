@@ -27,12 +27,6 @@ static inline void bt_sum_add(bt_sum *s, double x)
     s->v += (bt_int128)(x * 0x1p64);
 }
 
-static inline void bt_sum_join(bt_sum *s, const bt_sum *o)
-{
-    s->v += o->v;
-    s->bad |= o->bad;
-}
-
 static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
 
 #endif

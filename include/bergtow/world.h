@@ -50,7 +50,6 @@ typedef struct bt_body_def {
 
 typedef struct bt_bodies {
     bt_idx n, cap;
-    bt_idx n_large;
     // hot
     bt_vel *vel;          ///< [n] U1 before the solve, U2 after
     bt_inv *inv;          ///< [n]
