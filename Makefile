@@ -14,7 +14,7 @@ HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
 
 # -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler.
-BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -MMD -MP -ffp-contract=off -fno-math-errno \
+BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -Ipartition -MMD -MP -ffp-contract=off -fno-math-errno \
           -Wall -Wextra -Wpedantic -Wshadow $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror

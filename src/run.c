@@ -7,6 +7,7 @@
 #include <omp.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bergtow/field.h"
 #include "bergtow/observe.h"
@@ -42,30 +43,48 @@ static bt_status make_field(const bt_case *c, bt_field *f, bt_errors *err)
 
 static bt_status open_record(run *r, bt_errors *err)
 {
+    // The record names bodies by their gids; storage has another order.
     const bt_bodies *b = &r->w->bodies;
+    int64_t *offsets = bt_alloc((size_t)b->n + 1, sizeof *offsets);
+    double *vertices = bt_alloc(2 * (size_t)b->offset[b->n], sizeof *vertices), *area = bt_alloc((size_t)b->n, sizeof *area);
+    for (bt_gid g = 0; g < b->n; g++) {
+        const bt_idx i = bt_world_index(r->w, g);
+        const int64_t n = b->offset[i + 1] - b->offset[i];
+        offsets[g + 1] = offsets[g] + n;
+        memcpy(vertices + 2 * offsets[g], b->vertices + 2 * b->offset[i], 2 * (size_t)n * sizeof *vertices);
+        area[g] = b->area[i];
+    }
     const bt_record_bodies bodies = {
         .n_floes = r->roster.n_floes,
         .n_bodies = b->n,
-        .offsets = b->offset,
-        .vertices = b->vertices,
+        .offsets = offsets,
+        .vertices = vertices,
         .thickness = r->roster.thickness,
-        .area = b->area,
+        .area = area,
         .names = r->roster.names,
-        .towed = r->w->towed,
+        .towed = (bt_idx)r->w->towed,
     };
-    return bt_record_open(&r->record, r->o->dir, r->c, &bodies, r->o->command_line, err);
+    const bt_status status = bt_record_open(&r->record, r->o->dir, r->c, &bodies, r->o->command_line, err);
+    free(offsets);
+    free(vertices);
+    free(area);
+    return status;
 }
 
 static bt_status record_frame(run *r, bt_errors *err)
 {
     const bt_bodies *b = &r->w->bodies;
-    for (bt_idx i = 0; i < b->n; i++) {
-        r->pose[3 * (size_t)i] = b->pose[i].x;
-        r->pose[3 * (size_t)i + 1] = b->pose[i].y;
-        r->pose[3 * (size_t)i + 2] = b->pose[i].yaw;
-        r->speed[i] = hypot(b->vel[i].x, b->vel[i].y);
+    double *force = bt_alloc((size_t)b->n, sizeof *force);
+    bt_observe_contact_force(r->w, force);
+    for (bt_gid g = 0; g < b->n; g++) {
+        const bt_idx i = bt_world_index(r->w, g);
+        r->pose[3 * (size_t)g] = b->pose[i].x;
+        r->pose[3 * (size_t)g + 1] = b->pose[i].y;
+        r->pose[3 * (size_t)g + 2] = b->pose[i].yaw;
+        r->speed[g] = hypot(b->vel[i].x, b->vel[i].y);
+        r->force[g] = force[i];
     }
-    bt_observe_contact_force(r->w, r->roster.n_floes, r->force);
+    free(force);
     return bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, r->pose, r->force, r->speed, err);
 }
 
@@ -86,7 +105,8 @@ static int64_t count_outside(const run *r)
     const bt_bodies *b = &r->w->bodies;
     const bt_case *c = r->c;
     int64_t n = 0;
-    for (bt_idx i = 0; i < r->roster.n_floes; i++) {
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->gid[i] >= r->roster.n_floes) continue;
         const bool x_out = b->pose[i].x < c->domain.x0 || b->pose[i].x > c->domain.x0 + c->domain.length;
         const bool y_out = b->pose[i].y < c->domain.y0 || b->pose[i].y > c->domain.y0 + c->domain.width;
         n += (x_out && r->w->par.period_x == 0) || (y_out && r->w->par.period_y == 0);
