@@ -26,7 +26,7 @@ ifeq ($(filter $(CONFIG),release debug asan),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug or asan)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lm
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lmetis -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -82,7 +82,7 @@ tests: $(TEST_BIN) ## build the test programs
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev \
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-pytest ffmpeg
 
