@@ -11,7 +11,9 @@
 #include <string.h>
 #include <time.h>
 
-static bt_comm world = {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1};
+#define ALONE {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1}
+const bt_comm bt_comm_alone = ALONE;
+static bt_comm world = ALONE;
 static bool running; // between start and end, with MPI
 static MPI_Datatype item_type;
 static MPI_Op item_op;
@@ -118,7 +120,7 @@ int bt_comm_end(int code)
     MPI_Op_free(&item_op);
     MPI_Type_free(&item_type);
     MPI_Finalize();
-    world = (bt_comm){.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1};
+    world = (bt_comm)ALONE;
     return code;
 }
 

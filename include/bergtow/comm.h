@@ -20,6 +20,9 @@ typedef struct bt_comm {
 /// All ranks of the program. Before bt_comm_start, and after bt_comm_end: rank 0 of 1.
 const bt_comm *bt_comm_world(void);
 
+/// One rank, whatever else runs: for work of a rank by itself.
+extern const bt_comm bt_comm_alone;
+
 /// Collective. Start MPI if a launcher (mpirun, srun) started this process: a plain start must neither pay for MPI_Init nor
 /// need a network. From here on an MPI error, and an exit() of one rank alone, end all ranks; an exit(0) or
 /// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line.
