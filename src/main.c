@@ -85,9 +85,9 @@ static int bergtow(int argc, char **argv)
 int main(int argc, char **argv)
 {
     wait_briefly_at_barriers(argv);
+    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
     bt_comm_start(&argc, &argv);
     argp_err_exit_status = BT_ERR_USAGE;
-    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
     argp_program_version_hook = print_version;
     return bt_comm_end(bergtow(argc, argv));
 }
