@@ -51,10 +51,15 @@ bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     bool set = bt_h5driver_select(access, h->errnum) >= 0;
-    // Metadata stays in memory between flushes, so that a reader, or an interrupted run, finds the state of the last flush.
+    // Metadata stay in memory between flushes, so that a reader, or an interrupted run, finds the state of the last flush. The
+    // cache has room for far more than changes between two flushes, so what leaves it is old and unchanged; and a bound,
+    // since a flush looks at all of it: without one 3,000 frames of 142 floes took 7 s to write and 10,000 took 89 s, with it 2 s and 8 s.
+    const size_t room = (size_t)1 << 21;
     H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
     set = set && H5Pget_mdc_config(access, &cache) >= 0;
-    cache.evictions_enabled = 0;
+    cache.set_initial_size = 1;
+    cache.initial_size = cache.min_size = cache.max_size = room;
+    cache.min_clean_fraction = 0.01;
     cache.incr_mode = H5C_incr__off;
     cache.flash_incr_mode = H5C_flash_incr__off;
     cache.decr_mode = H5C_decr__off;
