@@ -3,13 +3,36 @@
 #ifndef BERGTOW_DOMAIN_H
 #define BERGTOW_DOMAIN_H
 
+#include "bergtow/comm.h"
 #include "bergtow/tiles.h"
 #include "bergtow/world.h"
 #include "phases.h"
 
 typedef struct bt_domain bt_domain;
 
+/// What the division costs.
+typedef struct bt_domain_stats {
+    int64_t divisions;       ///< times tiles were dealt anew
+    double imbalance;        ///< work of the busiest rank / mean − 1 over the checks, mean of those after the first division
+    double worst_imbalance;  ///< largest of them
+    int64_t checks;
+    double cut;              ///< share of neighbouring tile pairs that lie on different ranks, last division
+    double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
+    int64_t moved;           ///< bodies that went to another rank
+} bt_domain_stats;
+
+/// Collective. Deal a world that all ranks hold in full, before its first step or between steps. Nothing for one rank.
+void bt_domain_create(bt_world *w, const bt_comm *comm);
 void bt_domain_free(bt_domain *d);
+
+/// What the division has cost so far; zeros for one rank.
+bt_domain_stats bt_domain_get_stats(const bt_world *w);
+/// Collective. Account for the work of the step just done.
+void bt_domain_note(bt_world *w);
+/// Wall time spent waiting for other ranks since the last call, s.
+double bt_domain_exchange_time(const bt_world *w);
+/// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what its tiles need?
+bool bt_domain_is_valid(bt_world *w);
 
 /// Does this rank answer for the contacts of tile (x, y); for the large movable bodies; for body i?
 bool bt_domain_owns_tile(const bt_world *w, int32_t x, int32_t y);

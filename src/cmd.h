@@ -4,6 +4,7 @@
 #define BERGTOW_CMD_H
 
 #include "bergtow/case.h"
+#include "bergtow/comm.h"
 
 #include <argp.h>
 
@@ -19,7 +20,7 @@ typedef struct bt_cmd_case {
     int n_set;
 } bt_cmd_case;
 
-/// Parse the arguments of a command: unknown options end the program with code 2 and a suggestion.
+/// Parse the arguments of a command: unknown options end the program with code 2 and a suggestion, from rank 0.
 void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input);
 
 /// The argp parser of CASE.yml and --set; put it first among the children. Its input is a bt_cmd_case.
@@ -28,7 +29,7 @@ extern const struct argp bt_cmd_case_argp;
 /// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
 int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
 
-/// Print the messages, release them, and return the status as exit code.
-int bt_cmd_end(bt_status status, bt_errors *err);
+/// Collective over c. Print all ranks' messages once, release them, and return the worst status as exit code.
+int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err);
 
 #endif

@@ -139,5 +139,5 @@ int bt_cmd_check(int argc, char **argv)
     bt_field_free(&f);
     bt_case_free(&c);
     free(file.set);
-    return bt_cmd_end(status, &err);
+    return bt_cmd_end(&bt_comm_alone, status, &err);
 }

@@ -53,5 +53,5 @@ int bt_cmd_field(int argc, char **argv)
     bt_field_free(&f);
     bt_case_free(&c);
     free(o.file.set);
-    return bt_cmd_end(status, &err);
+    return bt_cmd_end(&bt_comm_alone, status, &err);
 }

@@ -4,9 +4,11 @@
 #include "suggest.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 // Long names of a parser and its children.
 static int collect(const struct argp *argp, const char **names, int n, int cap)
@@ -40,7 +42,8 @@ static void check_options(const struct argp *argp, int argc, char **argv)
     }
 }
 
-void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
+// All ranks have the same command line, so they find the same errors in it and leave with the same code; one says why.
+static void parse_aloud(const struct argp *argp, int argc, char **argv, void *input)
 {
     check_options(argp, argc, argv);
     // argp and getopt begin their messages with argv[0]
@@ -48,6 +51,23 @@ void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
     snprintf(name, sizeof name, "bergtow %.20s", argv[0]);
     argv[0] = name;
     argp_parse(argp, argc, argv, 0, NULL, input);
+}
+
+void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
+{
+    if (bt_comm_world()->rank == 0) {
+        parse_aloud(argp, argc, argv, input);
+        return;
+    }
+    // getopt writes to stderr whatever argp is told.
+    int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)}, nowhere = open("/dev/null", O_WRONLY);
+    for (int k = 0; k < 2; k++) dup2(nowhere, STDOUT_FILENO + k);
+    parse_aloud(argp, argc, argv, input);
+    for (int k = 0; k < 2; k++) {
+        dup2(kept[k], STDOUT_FILENO + k);
+        close(kept[k]);
+    }
+    close(nowhere);
 }
 
 static error_t parse_case(int key, char *arg, struct argp_state *state)
@@ -85,11 +105,13 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
     return v;
 }
 
-int bt_cmd_end(bt_status status, bt_errors *err)
+int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
 {
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
     if (lost) bt_errors_add(err, "standard output: cannot be written; give it a place with space, or use the files of the result");
     if (lost && status == BT_OK) status = BT_ERR_IO;
+    status = bt_comm_agree(c, status);
+    bt_comm_errors(c, err);
     bt_errors_print(err);
     bt_errors_free(err);
     return status;

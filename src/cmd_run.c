@@ -47,7 +47,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option run_options[] = {
     {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
-    {"threads", 't', "N", 0, "OpenMP threads, default run.threads of the case, or all cores; the result does not depend on it", 0},
+    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or all cores; the result does not depend on it", 0},
     {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
     {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
@@ -106,17 +106,20 @@ int bt_cmd_run(int argc, char **argv)
     char *command_line = join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &o);
+    const bt_comm *comm = bt_comm_world();
+    if (comm->rank != 0) o.run.quiet = true;
     char *folder = o.run.dir ? NULL : default_folder(o.file.path);
     if (folder) o.run.dir = folder;
 
     bt_case c;
     bt_errors err = {0};
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK) status = check_folder(o.run.dir, o.force, &err);
-    if (status == BT_OK) status = bt_run(&c, &o.run, &err);
+    if (status == BT_OK && comm->rank == 0) status = check_folder(o.run.dir, o.force, &err);
+    status = bt_comm_agree(comm, status);
+    if (status == BT_OK) status = bt_run(comm, &c, &o.run, &err);
     bt_case_free(&c);
     free(o.file.set);
     free(folder);
     free(command_line);
-    return bt_cmd_end(status, &err);
+    return bt_cmd_end(comm, status, &err);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The program bergtow: options that need no command, and the way to the commands.
+#include "bergtow/comm.h"
 #include "cmd.h"
 #include "revision.h"
 #include "suggest.h"
@@ -13,10 +14,11 @@
 static const struct {
     const char *name, *summary;
     int (*run)(int argc, char **argv);
+    bool parallel; ///< all ranks take part; otherwise rank 0 alone
 } commands[] = {
-    {"run", "tow the body through the ice and write a result folder", bt_cmd_run},
-    {"check", "validate a case and print the numbers that follow from it", bt_cmd_check},
-    {"field", "make the ice field of a case only", bt_cmd_field},
+    {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
+    {"check", "validate a case and print the numbers that follow from it", bt_cmd_check, false},
+    {"field", "make the ice field of a case only", bt_cmd_field, false},
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
 
@@ -46,16 +48,6 @@ static int refuse_word(const char *kind, const char *word, const char *const *kn
     return BT_ERR_USAGE;
 }
 
-// Ranks that each run the whole case and write the same folder would spoil it.
-static bool several_ranks(void)
-{
-    const char *size = getenv("OMPI_COMM_WORLD_SIZE"), *rank = getenv("OMPI_COMM_WORLD_RANK");
-    if (!size || atoi(size) <= 1) return false;
-    if (!rank || atoi(rank) == 0)
-        fprintf(stderr, "bergtow: started on %s ranks, but this version runs on one; start it without mpirun and use --threads N\n", size);
-    return true;
-}
-
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
 // microseconds, then sleep. libgomp reads its settings before main, hence the second start; the user's own win.
@@ -65,17 +57,19 @@ static void wait_briefly_at_barriers(char **argv)
     if (setenv("GOMP_SPINCOUNT", "5000", 0) == 0) execv("/proc/self/exe", argv);
 }
 
-int main(int argc, char **argv)
+// Exit code of this rank.
+static int bergtow(int argc, char **argv)
 {
-    wait_briefly_at_barriers(argv);
-    argp_err_exit_status = BT_ERR_USAGE;
-    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
-    argp_program_version_hook = print_version;
+    const bool first = bt_comm_world()->rank == 0;
     if (argc < 2) {
-        print_help(stderr);
+        if (first) print_help(stderr);
         return BT_ERR_USAGE;
     }
     const char *word = argv[1];
+    for (int i = 0; i < N_COMMANDS; i++)
+        if (!strcmp(word, commands[i].name)) return first || commands[i].parallel ? commands[i].run(argc - 1, argv + 1) : BT_OK;
+    if (!first) return BT_OK; // what follows concerns the console
+
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
     if (help) print_help(stdout);
     else if (version) print_version(stdout, NULL);
@@ -84,9 +78,16 @@ int main(int argc, char **argv)
 
     if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
     const char *names[N_COMMANDS + 1] = {NULL};
-    for (int i = 0; i < N_COMMANDS; i++) {
-        names[i] = commands[i].name;
-        if (!strcmp(word, names[i])) return several_ranks() ? BT_ERR_USAGE : commands[i].run(argc - 1, argv + 1);
-    }
+    for (int i = 0; i < N_COMMANDS; i++) names[i] = commands[i].name;
     return refuse_word("command", word, names);
+}
+
+int main(int argc, char **argv)
+{
+    wait_briefly_at_barriers(argv);
+    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
+    bt_comm_start(&argc, &argv);
+    argp_err_exit_status = BT_ERR_USAGE;
+    argp_program_version_hook = print_version;
+    return bt_comm_end(bergtow(argc, argv));
 }

@@ -2,7 +2,6 @@
 // Where a file comes from: version, build, machine, command and time, as attributes of its root.
 #include "provenance.h"
 
-#include <mpi.h>
 #include <omp.h>
 #include <stdio.h>
 #include <time.h>
@@ -20,11 +19,6 @@ void bt_provenance_write(bt_h5 *h, const char *command_line)
     char start[40] = "unknown";
     if (gmtime_r(&now, &utc)) strftime(start, sizeof start, "%Y-%m-%dT%H:%M:%SZ", &utc);
 
-    int parallel = 0, ended = 0, ranks = 1;
-    MPI_Initialized(&parallel);
-    MPI_Finalized(&ended);
-    if (parallel && !ended) MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-
     unsigned major = 0, minor = 0, release = 0;
     H5get_libversion(&major, &minor, &release);
     snprintf(text, sizeof text, "HDF5 %u.%u.%u, MPI %d.%d", major, minor, release, MPI_VERSION, MPI_SUBVERSION);
@@ -38,6 +32,6 @@ void bt_provenance_write(bt_h5 *h, const char *command_line)
     bt_h5_attr_text(h, "/", "command_line", command_line ? command_line : "");
     bt_h5_attr_text(h, "/", "host", host);
     bt_h5_attr_text(h, "/", "start_time", start);
-    bt_h5_attr_int(h, "/", "ranks", ranks);
+    bt_h5_attr_int(h, "/", "ranks", bt_comm_world()->size);
     bt_h5_attr_int(h, "/", "threads", omp_get_max_threads());
 }

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One run: field, world, step loop, record.
+//
+// Ranks. Whatever can differ between ranks (an error, a signal) is agreed on once a step, after the sample and before the
+// frame, so that all leave the loop after the same step; every other collective call is made with an agreed status.
 #include "bergtow/run.h"
 
 #include <inttypes.h>
@@ -7,15 +10,18 @@
 #include <omp.h>
 #include <signal.h>
 #include <stdlib.h>
-#include <string.h>
+#include <unistd.h>
 
 #include "bergtow/field.h"
 #include "bergtow/observe.h"
 #include "bergtow/record.h"
 #include "bergtow/setup.h"
 #include "bergtow/solver.h"
+#include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "bergtow/world.h"
+#include "domain.h"
+#include "handover.h"
 #include "progress.h"
 
 #define FRAMES_BY_DEFAULT 200
@@ -25,67 +31,59 @@ static volatile sig_atomic_t stop_signal;
 static void on_signal(int number) { stop_signal = number; }
 
 typedef struct {
+    const bt_comm *comm;
     const bt_case *c;
     const bt_run_options *o;
     bt_world *w;
     bt_roster roster;
     bt_record *record;
     bt_progress progress;
-    double *pose, *speed, *force; ///< of a frame
+    int stop;               ///< signal that some rank has met, 0 = none
     double reference_speed;
     bt_run_totals totals;
 } run;
 
-static bt_status make_field(const bt_case *c, bt_field *f, bt_errors *err)
+/// Collective. Rank 0 makes or reads the field, with all its threads; then every rank has it.
+static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_errors *err)
 {
-    return c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    bt_status status = BT_OK;
+    if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    bt_comm_rest(comm);
+    status = bt_comm_agree(comm, status);
+    if (status == BT_OK) bt_field_share(comm, f);
+    return status;
 }
 
 static bt_status open_record(run *r, bt_errors *err)
 {
-    // The record names bodies by their gids; storage has another order.
-    const bt_bodies *b = &r->w->bodies;
-    int64_t *offsets = bt_alloc((size_t)b->n + 1, sizeof *offsets);
-    double *vertices = bt_alloc(2 * (size_t)b->offset[b->n], sizeof *vertices), *area = bt_alloc((size_t)b->n, sizeof *area);
-    for (bt_gid g = 0; g < b->n; g++) {
-        const bt_idx i = bt_world_index(r->w, g);
-        const int64_t n = b->offset[i + 1] - b->offset[i];
-        offsets[g + 1] = offsets[g] + n;
-        memcpy(vertices + 2 * offsets[g], b->vertices + 2 * b->offset[i], 2 * (size_t)n * sizeof *vertices);
-        area[g] = b->area[i];
-    }
-    const bt_record_bodies bodies = {
-        .n_floes = r->roster.n_floes,
-        .n_bodies = b->n,
-        .offsets = offsets,
-        .vertices = vertices,
-        .thickness = r->roster.thickness,
-        .area = area,
-        .names = r->roster.names,
-        .towed = (bt_idx)r->w->towed,
-    };
-    const bt_status status = bt_record_open(&r->record, r->o->dir, r->c, &bodies, r->o->command_line, err);
-    free(offsets);
-    free(vertices);
-    free(area);
+    bt_record_bodies b;
+    bt_status status = bt_handover_bodies(r->comm, r->w, &r->roster, &b, err);
+    if (status != BT_OK) return status;
+    status = bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
+    bt_handover_free(&b);
     return status;
 }
 
 static bt_status record_frame(run *r, bt_errors *err)
 {
-    const bt_bodies *b = &r->w->bodies;
-    double *force = bt_alloc((size_t)b->n, sizeof *force);
-    bt_observe_contact_force(r->w, force);
-    for (bt_gid g = 0; g < b->n; g++) {
-        const bt_idx i = bt_world_index(r->w, g);
-        r->pose[3 * (size_t)g] = b->pose[i].x;
-        r->pose[3 * (size_t)g + 1] = b->pose[i].y;
-        r->pose[3 * (size_t)g + 2] = b->pose[i].yaw;
-        r->speed[g] = hypot(b->vel[i].x, b->vel[i].y);
-        r->force[g] = force[i];
+    bt_frame_row *rows;
+    bt_status status = bt_handover_frame(r->comm, r->w, &r->roster, &rows, err);
+    if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, err);
+    free(rows);
+    return status;
+}
+
+/// Collective, once a step. The worst status of all ranks, and whether one of them was told to stop.
+static bt_status agree(run *r, bt_status status)
+{
+    if (r->comm->size == 1) {
+        r->stop = stop_signal;
+        return status;
     }
-    free(force);
-    return bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, r->pose, r->force, r->speed, err);
+    uint64_t bits = (status != BT_OK ? 1 : 0) | (stop_signal ? (uint64_t)1 << stop_signal : 0);
+    bt_comm_reduce(r->comm, NULL, 0, NULL, 0, &bits, 1);
+    r->stop = bits >> 1 ? __builtin_ctzll(bits & ~UINT64_C(1)) : 0;
+    return bits & 1 ? bt_comm_agree(r->comm, status) : BT_OK;
 }
 
 static bt_status check_finite(const run *r, bt_errors *err)
@@ -99,19 +97,20 @@ static bt_status check_finite(const run *r, bt_errors *err)
     return BT_ERR_NUMERIC;
 }
 
-/// Floes whose centroid has left the domain where it is not periodic.
+/// Collective. Floes whose centroid has left the domain where it is not periodic.
 static int64_t count_outside(const run *r)
 {
     const bt_bodies *b = &r->w->bodies;
     const bt_case *c = r->c;
-    int64_t n = 0;
+    int64_t n = 0, all;
     for (bt_idx i = 0; i < b->n; i++) {
-        if (b->gid[i] >= r->roster.n_floes) continue;
+        if (b->gid[i] >= r->roster.n_floes || !bt_domain_owns(r->w, i)) continue;
         const bool x_out = b->pose[i].x < c->domain.x0 || b->pose[i].x > c->domain.x0 + c->domain.length;
         const bool y_out = b->pose[i].y < c->domain.y0 || b->pose[i].y > c->domain.y0 + c->domain.width;
         n += (x_out && r->w->par.period_x == 0) || (y_out && r->w->par.period_y == 0);
     }
-    return n;
+    bt_comm_before(r->comm, n, &all);
+    return all;
 }
 
 static void add_phases(bt_phases *p, const bt_step_stats *st)
@@ -121,6 +120,7 @@ static void add_phases(bt_phases *p, const bt_step_stats *st)
     p->forces += st->forces_s;
     p->solve += st->solve_s;
     p->advance += st->advance_s;
+    p->exchange += st->exchange_s;
 }
 
 static int64_t steps_to_do(const run *r)
@@ -137,64 +137,63 @@ static bt_status loop(run *r, bt_errors *err)
     bt_world *w = r->w;
     int64_t frames = 1;
     bt_status status = record_frame(r, err);
-    while (status == BT_OK && w->step < n_steps && !stop_signal) {
+    while (status == BT_OK && w->step < n_steps && !r->stop) {
         bt_world_step(w);
         add_phases(&r->totals.phases, &w->stats);
         const double t0 = bt_clock();
-        if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
+        if (w->step == r->o->dump_step && r->comm->rank == 0) status = bt_solver_dump(w, r->o->dump_path, err);
         bt_sample s;
         bt_observe(w, r->reference_speed, &s);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
+        if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
+        status = agree(r, status);
         // A frame at the first step at or after each multiple of the interval, and at the end.
         const bool due = s.time >= (double)frames * interval * (1 - 1e-12) || w->step == n_steps;
         if (status == BT_OK && due) {
             status = record_frame(r, err);
             while ((double)frames * interval * (1 - 1e-12) <= s.time) frames++;
         }
-        if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
         bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
         r->totals.phases.output += bt_clock() - t0;
     }
-    if (status == BT_OK) status = check_finite(r, err);
+    if (status == BT_OK) status = bt_comm_agree(r->comm, check_finite(r, err));
     return status;
 }
 
+// mpirun hands on SIGUSR1; at SIGINT and SIGTERM it kills the ranks a second later.
+static const int caught[] = {SIGINT, SIGTERM, SIGUSR1};
+enum { N_CAUGHT = sizeof caught / sizeof *caught };
+
 /// From here on a signal ends the loop after the step at hand; the handlers of before come back at the end.
-static void catch_signals(struct sigaction before[2])
+static void catch_signals(struct sigaction before[N_CAUGHT])
 {
     struct sigaction act = {.sa_handler = on_signal};
     sigemptyset(&act.sa_mask);
     stop_signal = 0;
-    sigaction(SIGINT, &act, &before[0]);
-    sigaction(SIGTERM, &act, &before[1]);
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
 }
 
 static bt_status run_world(run *r, bt_errors *err)
 {
     bt_status status = open_record(r, err);
     if (status != BT_OK) return status;
-    const size_t n = (size_t)r->w->bodies.n;
-    r->pose = bt_alloc(3 * n, sizeof *r->pose);
-    r->speed = bt_alloc(n, sizeof *r->speed);
-    r->force = bt_alloc(n, sizeof *r->force);
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = steps_to_do(r), .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
 
-    struct sigaction before[2];
+    struct sigaction before[N_CAUGHT];
     catch_signals(before);
     const double t0 = bt_clock();
     status = loop(r, err);
     r->totals.wall_time = bt_clock() - t0;
-    sigaction(SIGINT, &before[0], NULL);
-    sigaction(SIGTERM, &before[1], NULL);
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
     r->totals.floes_outside = count_outside(r);
     r->totals.state_hash = bt_world_hash(r->w);
     char stopped[64] = "";
-    if (stop_signal) {
-        snprintf(stopped, sizeof stopped, "signal %d after step %" PRId64, (int)stop_signal, r->w->step);
+    if (r->stop) {
+        snprintf(stopped, sizeof stopped, "signal %d after step %" PRId64, r->stop, r->w->step);
         r->totals.stopped = stopped;
     }
     bt_status closed;
@@ -205,37 +204,48 @@ static bt_status run_world(run *r, bt_errors *err)
         closed = bt_record_close(r->record, NULL, err);
     }
     if (status == BT_OK) status = closed;
-    if (status == BT_OK && stop_signal) {
+    if (status == BT_OK && r->stop) {
         bt_errors_add(err, "stopped by %s; %s holds everything up to there", stopped, r->o->dir);
         status = BT_ERR_SIGNAL;
     }
     return status;
 }
 
-bt_status bt_run(const bt_case *c, const bt_run_options *o, bt_errors *err)
+/// As the user says; otherwise the cores of the node, or those that mpirun has bound this rank to, for the ranks there.
+static int choose_threads(const bt_comm *comm, const bt_case *c, const bt_run_options *o)
 {
-    const int threads = o->threads > 0 ? o->threads : c->run.threads > 0 ? (int)c->run.threads : omp_get_max_threads();
+    if (o->threads > 0) return o->threads;
+    if (c->run.threads > 0) return (int)c->run.threads;
+    if (comm->size == 1 || getenv("OMP_NUM_THREADS")) return omp_get_max_threads();
+    const int bound = omp_get_num_procs(), share = (int)sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here;
+    const int n = bound < share ? bound : share;
+    return n > 1 ? n : 1;
+}
+
+bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
+{
+    const int threads = choose_threads(comm, c, o);
     omp_set_num_threads(threads);
-    run r = {.c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
+    run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     bt_field f;
     bt_field_init(&f);
-    bt_status status = make_field(c, &f, err);
-    if (status == BT_OK) status = bt_setup_world(c, &f, &r.w, &r.roster, err);
+    bt_status status = make_field(comm, c, &f, err);
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
+    const double concentration = f.concentration;
+    bt_field_free(&f);
     if (status == BT_OK) {
+        bt_domain_create(r.w, comm);
+        bt_tiles_begin(r.w);
         r.totals = (bt_run_totals){
-            .ranks = 1,
+            .ranks = comm->size,
             .threads = threads,
             .dt = c->run.dt,
             .mean_size = r.roster.mean_size,
-            .concentration = f.concentration,
+            .concentration = concentration,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);
     }
-    bt_field_free(&f);
-    free(r.pose);
-    free(r.speed);
-    free(r.force);
     bt_roster_free(&r.roster);
     bt_world_free(r.w);
     return status;

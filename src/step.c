@@ -227,7 +227,9 @@ void bt_world_step(bt_world *w)
     balance(w);
     const double t3 = bt_clock();
     advance(w); // X2 = X1 + U2 Δt + D
+    bt_domain_note(w);
     w->step++;
+    st->exchange_s = bt_domain_exchange_time(w);
     st->detect_s += t1 - t0;
     st->solve_s += t3 - t2;
     st->advance_s = bt_clock() - t3;

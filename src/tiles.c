@@ -203,7 +203,6 @@ static void permute(bt_bodies *b, const sort_key *key)
     }
     free(b->offset);
     b->offset = offset;
-    for (bt_idx i = 0; i < b->n; i++) b->index_of[b->gid[i]] = i;
 }
 
 static void sort_bodies(bt_world *w)
@@ -225,6 +224,7 @@ static void sort_bodies(bt_world *w)
         qsort(key, (size_t)b->n, sizeof *key, by_tile);
         permute(b, key);
     }
+    for (bt_idx i = 0; i < b->n; i++) b->index_of[b->gid[i]] = i;
     free(key);
 }
 

@@ -13,23 +13,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-#define XDMF_POLYGON 3
-
-int64_t bt_xdmf_topology(int64_t n, const int64_t *offsets, int32_t *out)
-{
-    int64_t k = 0;
-    for (int64_t i = 0; i < n; i++) {
-        const int64_t first = offsets[i] - offsets[0], count = offsets[i + 1] - offsets[i];
-        if (out) {
-            out[k] = XDMF_POLYGON;
-            out[k + 1] = (int32_t)count;
-            for (int64_t v = 0; v < count; v++) out[k + 2 + v] = (int32_t)(first + v);
-        }
-        k += 2 + count;
-    }
-    return k;
-}
-
 static void data_item(FILE *f, int64_t n, int width, const char *type, const char *dataset)
 {
     fprintf(f, "<DataItem Dimensions=\"%" PRId64 "%s\" NumberType=\"%s\" Precision=\"4\" Format=\"HDF\">result.h5:%s</DataItem>",

@@ -13,9 +13,8 @@ typedef struct bt_xdmf {
     int64_t n_frames;
 } bt_xdmf;
 
-/// The polygons of n bodies in XDMF's mixed form (type, number of vertices, vertices): fills out, if not NULL, and
-/// returns its length. offsets: [n+1], counted from the first of these bodies' vertices.
-int64_t bt_xdmf_topology(int64_t n, const int64_t *offsets, int32_t *out);
+/// What stands before each polygon in XDMF's mixed topology: this, the number of its vertices, then the vertices.
+#define BT_XDMF_POLYGON 3
 
 /// frames.xdmf as text; the caller frees it.
 char *bt_xdmf_text(const bt_xdmf *x);

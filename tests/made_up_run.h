@@ -104,8 +104,11 @@ static inline void frame(int k, double pose[BODIES][3], double force[FLOES], dou
 static inline bt_status record_frame(bt_record *r, int k, bt_errors *err)
 {
     double pose[BODIES][3], force[FLOES], speed[BODIES];
+    bt_frame_row rows[BODIES] = {0};
     frame(k, pose, force, speed);
-    return bt_record_frame(r, 0.5 * k, &pose[0][0], force, speed, err);
+    for (int i = 0; i < BODIES; i++)
+        rows[i] = (bt_frame_row){.x = pose[i][0], .y = pose[i][1], .yaw = pose[i][2], .contact_force = i < FLOES ? force[i] : -1, .speed = speed[i]};
+    return bt_record_frame(r, 0.5 * k, rows, err);
 }
 
 static bool print_summary;
@@ -114,7 +117,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
 {
     const bt_record_bodies b = bodies();
     bt_record *r;
-    bt_status status = bt_record_open(&r, dir, c, &b, "bergtow run x.yml", err);
+    bt_status status = bt_record_open(&r, &bt_comm_alone, dir, c, &b, "bergtow run x.yml", err);
     if (status != BT_OK) return status;
     for (int i = 0; i < steps; i++) {
         const bt_sample s = sample(i);

@@ -34,6 +34,9 @@ typedef struct bt_manifold {
 /// returns the largest of all, m/s. Collective.
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
 
+/// Speed s of tile (x, y) into the bounds of the tiles it matters to.
+void bt_contacts_spread(struct bt_tiles *t, int32_t x, int32_t y, double s);
+
 /// Has the bound grown beyond what the last detection was made for? Collective.
 bool bt_contacts_outrun(const bt_world *w);
 

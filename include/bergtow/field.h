@@ -5,6 +5,7 @@
 
 #include "bergtow/base.h"
 #include "bergtow/case.h"
+#include "bergtow/comm.h"
 
 typedef struct bt_field {
     bt_idx n;              ///< floes
@@ -28,6 +29,9 @@ void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, doub
 /// Make the field of a case from its seed: tessellate, shrink to the asked concentration, shake to a random state,
 /// check. Reproducible from the case alone. f has been initialised; what it held is released. Errors: BT_ERR_CASE (impossible packing, named), BT_ERR_NUMERIC.
 bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err);
+
+/// Collective. The field of rank 0 to all ranks; f has been initialised.
+void bt_field_share(const bt_comm *c, bt_field *f);
 
 /// Write to / read from an HDF5 file: /floes/{vertices,offsets,pose,thickness,area}, attributes on /floes.
 /// The writer leaves a complete file or none. The reader checks every value (finite, convex, sizes, offsets) and names file

@@ -5,6 +5,7 @@
 
 #include "bergtow/base.h"
 #include "bergtow/case.h"
+#include "bergtow/comm.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that tow = ice + drag + inertia.
@@ -53,16 +54,28 @@ typedef struct bt_phases {
     double detect, colour, forces, solve, advance, exchange, output;
 } bt_phases;
 
-/// Bodies as the recorder needs them; the arrays belong to the caller and hold floes first, then other bodies.
+/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order of their
+/// ids; the other bodies are the last rank's. first: [size + 1].
+void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
+
+/// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes first,
+/// then (on the last rank) other bodies. Without MPI the block is everything.
 typedef struct bt_record_bodies {
-    bt_idx n_floes, n_bodies;    ///< bodies = floes + hand-made fixed bodies + towed body + walls
-    const int64_t *offsets;      ///< [n_bodies+1]
-    const double *vertices;      ///< [offsets[n_bodies]][2] m, body frame
-    const double *thickness;     ///< [n_bodies] m (draft + sail of the towed body, 0 for walls)
-    const double *area;          ///< [n_bodies] m²
-    const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...
-    bt_idx towed;                ///< index of the towed body, −1 = none
+    bt_idx n_floes, n_bodies;    ///< of all ranks; bodies = floes + hand-made fixed bodies + towed body + walls
+    const int64_t *offsets;      ///< [bodies of the block + 1]
+    const double *vertices;      ///< [offsets[end] − offsets[0]][2] m, body frame, from the block's first
+    const double *thickness;     ///< [bodies of the block] m (draft + sail of the towed body, 0 for walls)
+    const double *area;          ///< [bodies of the block] m²
+    const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
+    bt_idx towed;                ///< index of the towed body among all, −1 = none
 } bt_record_bodies;
+
+/// A body in a frame.
+typedef struct bt_frame_row {
+    double x, y, yaw;        ///< m, m, rad
+    double contact_force;    ///< largest normal force on the floe in this step, N; of other bodies not recorded
+    double speed;            ///< of the centroid, m/s
+} bt_frame_row;
 
 /// Numbers of the end of the run that the series do not hold.
 typedef struct bt_run_totals {
@@ -80,30 +93,30 @@ typedef struct bt_run_totals {
 
 typedef struct bt_record bt_record;
 
-/// Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies; the summary and
-/// frames.xdmf of an earlier run in dir are removed. c must stay valid until the record is closed; b is copied.
-/// Errors: BT_ERR_IO with path and remedy.
-bt_status bt_record_open(bt_record **r, const char *dir, const bt_case *c, const bt_record_bodies *b,
+/// Collective. Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies; the summary and
+/// frames.xdmf of an earlier run in dir are removed. c and comm must stay valid until the record is closed; b is copied.
+/// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
+bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
                          const char *command_line, bt_errors *err);
 
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
 /// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, so that a
 /// running or interrupted result.h5 can be read. After a failure the record takes nothing more, and every call
-/// returns BT_ERR_IO; only the first adds a message.
+/// returns BT_ERR_IO; only the first adds a message. Rank 0 records; on others nothing is done, and the status is not
+/// that of rank 0: agree on it.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
 
-/// Take one frame: pose [n_bodies][3] m, m, rad; floe contact force [n_floes] N (largest normal force on the floe in this
-/// step); speed of the centroid [n_bodies] m/s. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
+/// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
 /// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies]; and
-/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/xdmf.c).
-bt_status bt_record_frame(bt_record *r, double time, const double *pose, const double *contact_force,
-                          const double *speed, bt_errors *err);
+/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/xdmf.c). The status is the same on all
+/// ranks.
+bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err);
 
-/// Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t = NULL closes a run
+/// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t = NULL closes a run
 /// that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no summary.
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
-/// Print the end-of-run table (summary and phases) on stdout. Call it before the record is closed.
+/// Print the end-of-run table (summary and phases) on stdout. On rank 0. Call it before the record is closed.
 void bt_record_print_summary(const bt_record *r, const bt_run_totals *t);
 
 #endif

@@ -278,15 +278,6 @@ def test_set(folder, kind):
     refused(call("check", "good.yml", "--set", override, cwd=folder), CASE, fragment)
 
 
-@pytest.mark.parametrize("command", ["run", "check"])
-def test_several_ranks_are_refused_once(folder, command):
-    for rank in (0, 1):
-        result = call(command, "good.yml", cwd=folder, env={"OMPI_COMM_WORLD_SIZE": "2", "OMPI_COMM_WORLD_RANK": str(rank)})
-        assert result.returncode == USAGE
-        assert bool(result.stderr) == (rank == 0), result.stderr
-    assert not (folder / "out").exists()
-
-
 # ---- what must work ----
 
 @pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "), (["--list-keys"], b"ice.concentration"),

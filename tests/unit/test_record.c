@@ -142,7 +142,7 @@ static void samples_merge_by_the_rule_of_their_field(void **state)
     c.output.sample_every = 4;
     const bt_record_bodies b = bodies();
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, in_folder("merge"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("merge"), &c, &b, NULL, &err), BT_OK);
     for (int i = 0; i < 10; i++) { // 4 + 4 + 2
         bt_sample s = sample(i);
         s.ice_resistance = i;
@@ -229,9 +229,9 @@ static void an_empty_field_can_be_recorded(void **state)
     const bt_record_bodies b = {.n_floes = 0, .n_bodies = 1, .offsets = o, .vertices = vertices[12], .thickness = thickness,
                                 .area = area, .names = names, .towed = 0};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, in_folder("empty"), &c, &b, NULL, &err), BT_OK);
-    const double pose[3] = {1, 2, 3}, speed = 1;
-    assert_int_equal(bt_record_frame(r, 0, pose, NULL, &speed, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, &err), BT_OK);
+    const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
+    assert_int_equal(bt_record_frame(r, 0, &row, &err), BT_OK);
     const bt_run_totals t = totals(0);
     assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
     assert_int_equal(err.n, 0);
@@ -245,22 +245,23 @@ static void many_floes_are_packed(void **state)
 {
     (void)state;
     enum { MANY = 3000 };
-    static double v[4 * MANY][2], pose[MANY][3], ones[MANY];
+    static double v[4 * MANY][2], ones[MANY];
+    static bt_frame_row rows[MANY];
     static int64_t o[MANY + 1];
     static float points[4 * MANY][2], speed[MANY];
     for (int i = 0; i < MANY; i++) {
         o[i + 1] = 4 * (i + 1);
         for (int k = 0; k < 4; k++) v[4 * i + k][0] = (k == 0) - (k == 2), v[4 * i + k][1] = (k == 1) - (k == 3);
-        pose[i][0] = i;
         ones[i] = 1 + i;
+        rows[i] = (bt_frame_row){.x = i, .contact_force = ones[i], .speed = ones[i]};
     }
     bt_errors err = {0};
     const bt_case c = made_up_case();
     const bt_record_bodies b = {.n_floes = MANY, .n_bodies = MANY, .offsets = o, .vertices = &v[0][0], .thickness = ones,
                                 .area = ones, .towed = -1};
     bt_record *r;
-    assert_int_equal(bt_record_open(&r, in_folder("many"), &c, &b, NULL, &err), BT_OK);
-    assert_int_equal(bt_record_frame(r, 0, &pose[0][0], ones, ones, &err), BT_OK);
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_frame(r, 0, rows, &err), BT_OK);
     const bt_run_totals t = totals(0);
     assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
     const hid_t f = H5Fopen(in_folder("many/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// The struct behind domain.h (private to partition/).
+#ifndef BERGTOW_DIVISION_H
+#define BERGTOW_DIVISION_H
+
+#include "bergtow/comm.h"
+#include "bergtow/contacts.h"
+#include "bergtow/solver.h"
+#include "domain.h"
+#include "pairs.h"
+
+/// What is exchanged with one other rank.
+typedef struct bt_link {
+    int rank;
+    // bodies that this rank's tiles of a phase may change and the other holds, and the reverse; both sides list them in the same order
+    bt_idx *send[BT_PHASES], *receive[BT_PHASES];   ///< [n_...] indices of bodies
+    bt_idx n_send[BT_PHASES], n_receive[BT_PHASES];
+    // of these, the ones that units of this step touch: at the front of chosen lists
+    bt_idx *send_now[BT_PHASES], *receive_now[BT_PHASES];
+    bt_idx n_send_now[BT_PHASES], n_receive_now[BT_PHASES];
+    double *out, *in;                               ///< [3 × longest list] values on the way
+    uint8_t *flags_out, *flags_in;                  ///< [sum of the lists] touched or not
+    bt_idx n_flags_out, n_flags_in;
+    // tiles whose speed the other must know, and the reverse
+    bt_idx *speed_send;                             ///< [n_speed_send] tiles here
+    int32_t (*speed_receive)[2];                    ///< [n_speed_receive] coordinates of tiles there
+    bt_idx n_speed_send, n_speed_receive;
+    double *speed_out, *speed_in;
+} bt_link;
+
+struct bt_domain {
+    const bt_comm *comm;
+    bool dealt;              ///< bodies are where the map says; before that every rank holds all
+    bool due;                ///< a new division is due
+    // the map: owner of every tile of the box
+    int *owner;              ///< [n_y][n_x] rank
+    uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the tile too
+    int32_t low_x, low_y, n_x, n_y;
+    double side_x, side_y;   ///< of the tiles it was made for, m
+    int large_owner;         ///< rank that owns the large movable bodies
+    double large_path;       ///< path of the large movable bodies when the division was made, m
+    uint8_t *owned;          ///< [n bodies] this rank answers for the body
+    bt_idx cap_owned;
+    // links
+    bt_link *link;
+    int n_links;
+    MPI_Request *request;    ///< [2 n_links]
+    int n_requests;
+    uint8_t *touched;        ///< [n bodies] bit p: a unit of phase p touches it
+    bt_idx cap_touched;
+    // work since the last check
+    double *work;            ///< [n_y][n_x] of this rank's tiles, s, modelled
+    int64_t steps;           ///< since then
+    double exchange_s;       ///< wall time in exchanges since asked
+    bt_domain_stats stats;
+};
+
+/// Rank that owns tile (x, y) of the map; −1 outside.
+int bt_division_owner(const bt_world *w, int32_t x, int32_t y);
+
+enum { BT_MAX_HOLDERS = 5 };
+/// Ranks that hold the bodies of tile (x, y), each once; returns their number.
+int bt_division_holders(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_HOLDERS]);
+
+/// Tile of the phase that touches the bodies of tile (x, y); false when there is none.
+bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int32_t out[2]);
+
+/// Collective. The links for the tiles as they are now.
+void bt_halo_connect(bt_world *w);
+void bt_halo_free(bt_domain *d);
+
+/// Collective. Ends the run when bodies are lost or doubled.
+void bt_domain_check(bt_world *w);
+
+/// Collective. A map for the tiles as they are now: renewed from the one before, or cut anew.
+void bt_division_map(bt_world *w, bool cut);
+
+#endif

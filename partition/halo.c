@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: MIT
+// What ranks exchange: velocities of shared bodies after each phase, speeds of tiles, and what only some of them know.
+//
+// Lists. A body of tile t is touched in phase p by one tile, T_p(t), whose rank sends its velocity to all others that hold t. Both sides
+// go through the tiles they hold in the same order, so they make the same lists without a word. Of these bodies few have a
+// contact in a given step: after the detection the sender says which (one byte each), and only those travel in the sweeps.
+#include <stdlib.h>
+#include <string.h>
+
+#include "division.h"
+#include "domain.h"
+
+enum { TAG_FLAGS = 10, TAG_SPEEDS = 11, TAG_VELOCITIES = 20 };
+
+void bt_halo_free(bt_domain *d)
+{
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        for (int p = 0; p < BT_PHASES; p++) {
+            free(l->send[p]);
+            free(l->receive[p]);
+            free(l->send_now[p]);
+            free(l->receive_now[p]);
+        }
+        void *arrays[] = {l->out, l->in, l->flags_out, l->flags_in, l->speed_send, l->speed_receive, l->speed_out, l->speed_in};
+        for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    }
+    free(d->link);
+    free(d->request);
+    d->link = NULL;
+    d->request = NULL;
+    d->n_links = 0;
+}
+
+static bt_link *link_to(bt_domain *d, int rank)
+{
+    for (int k = 0; k < d->n_links; k++)
+        if (d->link[k].rank == rank) return &d->link[k];
+    d->link = bt_realloc(d->link, (size_t)d->n_links + 1, sizeof *d->link);
+    d->link[d->n_links] = (bt_link){.rank = rank};
+    return &d->link[d->n_links++];
+}
+
+/// Append the movable bodies of a tile to a list whose capacity is the power of two above its length.
+static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_tile *t)
+{
+    for (bt_idx i = t->first; i < t->end; i++) {
+        if (w->bodies.motion[i] != BT_DYNAMIC) continue;
+        if ((*n & (*n - 1)) == 0) *list = bt_realloc(*list, *n ? 2 * (size_t)*n : 1, sizeof **list);
+        (*list)[(*n)++] = i;
+    }
+}
+
+/// Lists of bodies for the tiles that this rank holds.
+static void list_bodies(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    const bt_tiles *t = w->tiles;
+    const int me = d->comm->rank;
+    for (bt_idx k = 0; k < t->n - 1; k++) {
+        const bt_tile *tile = &t->tile[k];
+        if (tile->end == tile->first) continue;
+        int holder[BT_MAX_HOLDERS];
+        const int n = bt_division_holders(w, tile->x, tile->y, holder);
+        for (int p = 0; p < BT_PHASES; p++) {
+            int32_t at[2];
+            int solver = -1;
+            if (p == BT_COLOURS) solver = d->under[(int64_t)(tile->y - d->low_y) * d->n_x + tile->x - d->low_x] ? d->large_owner : -1;
+            else if (bt_division_toucher(w, p, tile->x, tile->y, at)) solver = bt_division_owner(w, at[0], at[1]);
+            if (solver < 0) continue;
+            for (int h = 0; h < n; h++) {
+                if (holder[h] == me && solver != me) {
+                    bt_link *l = link_to(d, solver);
+                    append(&l->receive[p], &l->n_receive[p], w, tile);
+                } else if (holder[h] != me && solver == me) {
+                    bt_link *l = link_to(d, holder[h]);
+                    append(&l->send[p], &l->n_send[p], w, tile);
+                }
+            }
+        }
+    }
+}
+
+/// Does rank r hold a tile within two of (x, y)? Its bounds depend on the speed there.
+static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
+{
+    const bt_tiles *t = w->tiles;
+    memset(near, 0, (size_t)w->domain->comm->size);
+    for (int32_t dy = -2; dy <= 2; dy++)
+        for (int32_t dx = -2; dx <= 2; dx++) {
+            if ((t->wrap_x == 1 && dx) || (t->wrap_y == 1 && dy)) continue;
+            int holder[BT_MAX_HOLDERS];
+            const int n = bt_division_holders(w, x + dx, y + dy, holder);
+            for (int h = 0; h < n; h++) near[holder[h]] = 1;
+        }
+}
+
+/// Lists of tiles whose speeds are told: at the border of the map's parts only.
+static void list_speeds(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    const bt_tiles *t = w->tiles;
+    const int me = d->comm->rank;
+    uint8_t *near = bt_alloc((size_t)d->comm->size, 1);
+    for (int32_t y = d->low_y; y < d->low_y + d->n_y; y++)
+        for (int32_t x = d->low_x; x < d->low_x + d->n_x; x++) {
+            const int owner = bt_division_owner(w, x, y);
+            near_ranks(w, x, y, near);
+            if (owner != me && near[me]) {
+                bt_link *l = link_to(d, owner);
+                l->speed_receive = bt_realloc(l->speed_receive, (size_t)l->n_speed_receive + 1, sizeof *l->speed_receive);
+                l->speed_receive[l->n_speed_receive][0] = x;
+                l->speed_receive[l->n_speed_receive++][1] = y;
+            } else if (owner == me) {
+                for (int r = 0; r < d->comm->size; r++) {
+                    if (r == me || !near[r]) continue;
+                    bt_link *l = link_to(d, r);
+                    l->speed_send = bt_realloc(l->speed_send, (size_t)l->n_speed_send + 1, sizeof *l->speed_send);
+                    l->speed_send[l->n_speed_send++] = bt_tiles_at(t, x, y);
+                }
+            }
+        }
+    free(near);
+}
+
+static void mark_owned(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    bt_tiles *t = w->tiles;
+    const bt_bodies *b = &w->bodies;
+    if (b->n > d->cap_owned) {
+        d->cap_owned = b->n;
+        d->owned = bt_realloc(d->owned, (size_t)b->n, 1);
+        d->touched = bt_realloc(d->touched, (size_t)b->n, 1);
+    }
+    double held[2] = {0, 0};
+    for (bt_idx k = 0; k < t->n; k++) {
+        bt_tile *tile = &t->tile[k];
+        const bool own = k < t->n - 1 ? tile->own : d->comm->rank == 0;
+        for (bt_idx i = tile->first; i < tile->end; i++) d->owned[i] = own;
+        if (k < t->n - 1) held[own] += tile->end - tile->first;
+        // Whoever holds a body of the block waits for what the tile does to it.
+        const bt_idx block[4] = {k, tile->right, tile->above, tile->diagonal};
+        tile->border = k == t->n - 1;
+        for (int j = 0; j < 4 && tile->own && !tile->border; j++) {
+            int holder[BT_MAX_HOLDERS];
+            tile->border = block[j] >= 0 && bt_division_holders(w, t->tile[block[j]].x, t->tile[block[j]].y, holder) > 1;
+        }
+    }
+    bt_sum sums[2] = {{0}, {0}};
+    for (int k = 0; k < 2; k++) bt_sum_add(&sums[k], held[k]);
+    bt_comm_reduce(d->comm, sums, 2, NULL, 0, NULL, 0);
+    d->stats.halo = bt_sum_value(&sums[1]) > 0 ? bt_sum_value(&sums[0]) / bt_sum_value(&sums[1]) : 0;
+}
+
+void bt_halo_connect(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    bt_halo_free(d);
+    list_bodies(w);
+    list_speeds(w);
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        bt_idx most_out = 0, most_in = 0;
+        for (int p = 0; p < BT_PHASES; p++) {
+            l->send_now[p] = bt_alloc((size_t)l->n_send[p], sizeof(bt_idx));
+            l->receive_now[p] = bt_alloc((size_t)l->n_receive[p], sizeof(bt_idx));
+            l->n_flags_out += l->n_send[p];
+            l->n_flags_in += l->n_receive[p];
+            most_out = most_out > l->n_send[p] ? most_out : l->n_send[p];
+            most_in = most_in > l->n_receive[p] ? most_in : l->n_receive[p];
+        }
+        l->out = bt_alloc(3 * (size_t)most_out, sizeof *l->out);
+        l->in = bt_alloc(3 * (size_t)most_in, sizeof *l->in);
+        l->flags_out = bt_alloc((size_t)l->n_flags_out, 1);
+        l->flags_in = bt_alloc((size_t)l->n_flags_in, 1);
+        l->speed_out = bt_alloc((size_t)l->n_speed_send, sizeof *l->speed_out);
+        l->speed_in = bt_alloc((size_t)l->n_speed_receive, sizeof *l->speed_in);
+    }
+    d->request = bt_alloc(2 * (size_t)d->n_links, sizeof *d->request);
+}
+
+void bt_domain_connect(bt_world *w)
+{
+    if (!w->domain) return;
+    mark_owned(w);
+    bt_halo_connect(w);
+    bt_domain_check(w);
+}
+
+static void wait_all(bt_domain *d)
+{
+    const double t0 = bt_clock();
+    MPI_Waitall(d->n_requests, d->request, MPI_STATUSES_IGNORE);
+    d->exchange_s += bt_clock() - t0;
+    d->n_requests = 0;
+}
+
+void bt_domain_share_speeds(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    if (!d) return;
+    bt_tiles *t = w->tiles;
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        for (bt_idx i = 0; i < l->n_speed_send; i++) l->speed_out[i] = t->speed[l->speed_send[i]];
+        if (l->n_speed_receive) MPI_Irecv(l->speed_in, l->n_speed_receive, MPI_DOUBLE, l->rank, TAG_SPEEDS, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_speed_send) MPI_Isend(l->speed_out, l->n_speed_send, MPI_DOUBLE, l->rank, TAG_SPEEDS, d->comm->mpi, &d->request[d->n_requests++]);
+    }
+    wait_all(d);
+    for (int k = 0; k < d->n_links; k++) {
+        const bt_link *l = &d->link[k];
+        for (bt_idx i = 0; i < l->n_speed_receive; i++)
+            if (l->speed_in[i] > 0) bt_contacts_spread(t, l->speed_receive[i][0], l->speed_receive[i][1], l->speed_in[i]);
+    }
+}
+
+void bt_domain_select(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    if (!d) return;
+    const bt_tiles *t = w->tiles;
+    memset(d->touched, 0, (size_t)w->bodies.n);
+    for (bt_idx i = 0; i < t->phase_start[BT_PHASES]; i++) {
+        const bt_tile *tile = &t->tile[t->phase_tile[i]];
+        if (!tile->border) continue;
+        for (bt_idx j = 0; j < tile->n_units; j++) {
+            d->touched[tile->units[j].a] |= (uint8_t)(1 << tile->phase);
+            d->touched[tile->units[j].b] |= (uint8_t)(1 << tile->phase);
+        }
+    }
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        bt_idx n = 0;
+        for (int p = 0; p < BT_PHASES; p++) {
+            l->n_send_now[p] = 0;
+            for (bt_idx i = 0; i < l->n_send[p]; i++) {
+                const bool now = d->touched[l->send[p][i]] >> p & 1;
+                l->flags_out[n++] = now;
+                if (now) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];
+            }
+        }
+        if (l->n_flags_in) MPI_Irecv(l->flags_in, l->n_flags_in, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_flags_out) MPI_Isend(l->flags_out, l->n_flags_out, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
+    }
+    wait_all(d);
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        bt_idx n = 0;
+        for (int p = 0; p < BT_PHASES; p++) {
+            l->n_receive_now[p] = 0;
+            for (bt_idx i = 0; i < l->n_receive[p]; i++)
+                if (l->flags_in[n++]) l->receive_now[p][l->n_receive_now[p]++] = l->receive[p][i];
+        }
+    }
+}
+
+void bt_domain_send(bt_world *w, int phase, bt_vel *v)
+{
+    bt_domain *d = w->domain;
+    for (int k = 0; k < d->n_links; k++) {
+        bt_link *l = &d->link[k];
+        const bt_idx n_in = l->n_receive_now[phase], n_out = l->n_send_now[phase];
+        if (n_in) MPI_Irecv(l->in, 3 * n_in, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+        for (bt_idx i = 0; i < n_out; i++) {
+            const bt_vel *x = &v[l->send_now[phase][i]];
+            l->out[3 * i] = x->x, l->out[3 * i + 1] = x->y, l->out[3 * i + 2] = x->w;
+        }
+        if (n_out) MPI_Isend(l->out, 3 * n_out, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+    }
+}
+
+void bt_domain_receive(bt_world *w, int phase, bt_vel *v)
+{
+    bt_domain *d = w->domain;
+    wait_all(d);
+    for (int k = 0; k < d->n_links; k++) {
+        const bt_link *l = &d->link[k];
+        for (bt_idx i = 0; i < l->n_receive_now[phase]; i++) {
+            bt_vel *x = &v[l->receive_now[phase][i]];
+            x->x = l->in[3 * i], x->y = l->in[3 * i + 1], x->w = l->in[3 * i + 2];
+        }
+    }
+}

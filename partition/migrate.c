@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// Bodies and traces of contacts to the ranks that own or hold them.
+//
+// Every owned body is sent, complete, to all ranks that hold its tile under the new map; ghosts are dropped first and come back the
+// same way. So after a migration every copy of a body is that of its owner.
+#include <stdlib.h>
+#include <string.h>
+
+#include "division.h"
+#include "domain.h"
+
+/// Bytes for every rank.
+typedef struct {
+    char **data;  ///< [size]
+    size_t *n, *cap;
+    int size;
+} parcels;
+
+static parcels new_parcels(int size)
+{
+    return (parcels){bt_alloc((size_t)size, sizeof(char *)), bt_alloc((size_t)size, sizeof(size_t)), bt_alloc((size_t)size, sizeof(size_t)), size};
+}
+
+static void add(parcels *p, int rank, const void *data, size_t n)
+{
+    if (p->n[rank] + n > p->cap[rank]) {
+        p->cap[rank] = 2 * (p->n[rank] + n);
+        p->data[rank] = bt_realloc(p->data[rank], p->cap[rank], 1);
+    }
+    memcpy(p->data[rank] + p->n[rank], data, n);
+    p->n[rank] += n;
+}
+
+static void free_parcels(parcels *p)
+{
+    for (int r = 0; r < p->size; r++) free(p->data[r]);
+    free(p->data);
+    free(p->n);
+    free(p->cap);
+}
+
+enum { PIECE = 1 << 30 };
+
+/// Collective. What all others have for this rank, one after the other; the caller frees.
+static char *deliver(const bt_comm *c, parcels *p, int tag, size_t *n_in)
+{
+    uint64_t *out = bt_alloc((size_t)c->size, sizeof *out), *in = bt_alloc((size_t)c->size, sizeof *in);
+    for (int r = 0; r < c->size; r++) out[r] = p->n[r];
+    MPI_Alltoall(out, 1, MPI_UINT64_T, in, 1, MPI_UINT64_T, c->mpi);
+    size_t n_requests = 0;
+    *n_in = 0;
+    for (int r = 0; r < c->size; r++) {
+        *n_in += in[r];
+        n_requests += out[r] / PIECE + in[r] / PIECE + 2;
+    }
+    char *all = bt_realloc(NULL, *n_in ? *n_in : 1, 1);
+    MPI_Request *request = bt_alloc(n_requests, sizeof *request);
+    int n = 0;
+    size_t at = 0;
+    for (int r = 0; r < c->size; r++)
+        for (uint64_t done = 0; done < in[r]; done += PIECE) {
+            const int piece = (int)(in[r] - done < PIECE ? in[r] - done : PIECE);
+            MPI_Irecv(all + at, piece, MPI_BYTE, r, tag, c->mpi, &request[n++]);
+            at += (size_t)piece;
+        }
+    for (int r = 0; r < c->size; r++)
+        for (uint64_t done = 0; done < out[r]; done += PIECE)
+            MPI_Isend(p->data[r] + done, (int)(out[r] - done < PIECE ? out[r] - done : PIECE), MPI_BYTE, r, tag, c->mpi, &request[n++]);
+    MPI_Waitall(n, request, MPI_STATUSES_IGNORE);
+    free(request);
+    free(out);
+    free(in);
+    return all;
+}
+
+// --- bodies ----------------------------------------------------------------------------------------------------------
+
+static char *field_of(const bt_bodies *b, int k, bt_idx i)
+{
+    return *(char **)((char *)b + bt_body_fields[k].array) + (size_t)i * bt_body_fields[k].size;
+}
+
+static void pack(const bt_bodies *b, bt_idx i, parcels *p, int rank)
+{
+    for (int k = 0; k < bt_n_body_fields; k++) add(p, rank, field_of(b, k, i), bt_body_fields[k].size);
+    const int64_t first = b->offset[i], n = b->offset[i + 1] - first;
+    add(p, rank, &n, sizeof n);
+    add(p, rank, b->vertices + 2 * first, 2 * (size_t)n * sizeof(double));
+    add(p, rank, b->outline + 2 * first, 2 * (size_t)n * sizeof(double));
+    add(p, rank, b->per_length + first, (size_t)n * sizeof(double));
+}
+
+/// Append the bodies of a delivery.
+static void unpack(bt_bodies *b, const char *data, size_t n_bytes)
+{
+    size_t at = 0;
+    while (at < n_bytes) {
+        int64_t n;
+        size_t record = 0;
+        for (int k = 0; k < bt_n_body_fields; k++) record += bt_body_fields[k].size;
+        memcpy(&n, data + at + record, sizeof n);
+        const int64_t first = b->offset[b->n];
+        bt_world_reserve(b, b->n + 1, first + n);
+        const bt_idx i = b->n++;
+        for (int k = 0; k < bt_n_body_fields; k++) {
+            memcpy(field_of(b, k, i), data + at, bt_body_fields[k].size);
+            at += bt_body_fields[k].size;
+        }
+        at += sizeof n;
+        b->offset[i + 1] = first + n;
+        memcpy(b->vertices + 2 * first, data + at, 2 * (size_t)n * sizeof(double));
+        at += 2 * (size_t)n * sizeof(double);
+        memcpy(b->outline + 2 * first, data + at, 2 * (size_t)n * sizeof(double));
+        at += 2 * (size_t)n * sizeof(double);
+        memcpy(b->per_length + first, data + at, (size_t)n * sizeof(double));
+        at += (size_t)n * sizeof(double);
+    }
+}
+
+/// Keep only the bodies that `keep` says, in their order.
+static void compact(bt_bodies *b, const uint8_t *keep)
+{
+    bt_idx n = 0;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!keep[i]) continue;
+        if (n != i) {
+            for (int k = 0; k < bt_n_body_fields; k++) memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
+            const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
+            memmove(b->vertices + 2 * to, b->vertices + 2 * from, 2 * (size_t)m * sizeof(double));
+            memmove(b->outline + 2 * to, b->outline + 2 * from, 2 * (size_t)m * sizeof(double));
+            memmove(b->per_length + to, b->per_length + from, (size_t)m * sizeof(double));
+            b->offset[n + 1] = to + m;
+        }
+        n++;
+    }
+    b->n = n;
+}
+
+/// Give back the memory of bodies that have gone.
+static void shrink(bt_bodies *b)
+{
+    const bt_idx cap = b->n + b->n / 8 + 16;
+    if (b->cap <= cap + cap / 4) return;
+    for (int k = 0; k < bt_n_body_fields; k++) {
+        void **array = (void **)((char *)b + bt_body_fields[k].array), *small = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
+        memcpy(small, *array, (size_t)b->n * bt_body_fields[k].size);
+        free(*array);
+        *array = small;
+    }
+    b->offset = bt_realloc(b->offset, (size_t)cap + 1, sizeof *b->offset);
+    b->cap = cap;
+    const int64_t vertices = b->offset[b->n] + b->offset[b->n] / 8 + 64;
+    b->vertices = bt_realloc(b->vertices, 2 * (size_t)vertices, sizeof(double));
+    b->outline = bt_realloc(b->outline, 2 * (size_t)vertices, sizeof(double));
+    b->per_length = bt_realloc(b->per_length, (size_t)vertices, sizeof(double));
+    b->cap_vertices = vertices;
+}
+
+static void move_bodies(bt_world *w)
+{
+    bt_bodies *b = &w->bodies;
+    bt_domain *d = w->domain;
+    const int me = d->comm->rank;
+    parcels p = new_parcels(d->comm->size);
+    uint8_t *keep = bt_alloc((size_t)b->n, 1);
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->large[i]) {
+            keep[i] = 1; // on every rank
+            continue;
+        }
+        if (d->dealt && !d->owned[i]) continue;
+        int rank[BT_MAX_HOLDERS];
+        const int n = bt_division_holders(w, b->tile[i][0], b->tile[i][1], rank);
+        for (int k = 0; k < n; k++) {
+            if (rank[k] == me) keep[i] = 1;
+            else if (d->dealt) pack(b, i, &p, rank[k]); // at first every rank has all
+        }
+        d->stats.moved += d->dealt && bt_division_owner(w, b->tile[i][0], b->tile[i][1]) != me;
+    }
+    for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;
+    compact(b, keep);
+    free(keep);
+    size_t n_in;
+    char *in = deliver(d->comm, &p, 1, &n_in);
+    free_parcels(&p);
+    unpack(b, in, n_in);
+    free(in);
+    shrink(b);
+}
+
+// --- traces ----------------------------------------------------------------------------------------------------------
+
+/// Rank that solves the contacts of a and b, both held here, under the new map and labels.
+static int solver_of(const bt_world *w, bt_idx a, bt_idx b)
+{
+    const bt_bodies *s = &w->bodies;
+    if ((s->large[a] && s->motion[a] == BT_DYNAMIC) || (s->large[b] && s->motion[b] == BT_DYNAMIC)) return w->domain->large_owner;
+    int32_t at[2];
+    bt_tiles_owner(w->tiles, s->tile[s->large[a] ? b : a], s->tile[s->large[b] ? a : b], at);
+    return bt_division_owner(w, at[0], at[1]);
+}
+
+/// Traces by the rank they go to; those that stay are kept in trace [*n].
+static void sort_traces(const bt_world *w, bt_trace *trace, int64_t *n, parcels *p)
+{
+    const bt_domain *d = w->domain;
+    int64_t kept = 0;
+    for (int64_t k = 0; k < *n; k++) {
+        const int to = solver_of(w, bt_world_index(w, trace[k].a), bt_world_index(w, trace[k].b));
+        if (to == d->comm->rank) trace[kept++] = trace[k];
+        else if (d->dealt) add(p, to, &trace[k], sizeof *trace);
+    }
+    *n = kept;
+}
+
+bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n)
+{
+    bt_domain *d = w->domain;
+    if (!d) return trace;
+    bt_division_map(w, d->due);
+    parcels p = new_parcels(d->comm->size);
+    sort_traces(w, trace, n, &p);
+    move_bodies(w);
+    size_t n_in;
+    char *in = deliver(d->comm, &p, 2, &n_in);
+    free_parcels(&p);
+    const int64_t more = (int64_t)(n_in / sizeof *trace);
+    trace = bt_realloc(trace, (size_t)(*n + more) + 1, sizeof *trace);
+    if (more) memcpy(trace + *n, in, n_in);
+    *n += more;
+    free(in);
+    d->dealt = true;
+    return trace;
+}

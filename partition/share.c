@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MIT
+// What one rank knows and all must: large bodies after the solve, islands over ranks, largest values; and the checks of a division.
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/tow.h"
+#include "division.h"
+#include "domain.h"
+
+void bt_domain_settle(bt_world *w)
+{
+    bt_domain *d = w->domain;
+    if (!d) return;
+    bt_bodies *b = &w->bodies;
+    const bt_tiles *t = w->tiles;
+    bt_vel *shift = w->solver->shifted ? w->solver->shift : NULL;
+    const size_t most = 6 * (size_t)(b->n - t->n_tiled) + 1;
+    double *x = bt_alloc(most, sizeof *x);
+    for (int pass = 0; pass < 2; pass++) {
+        size_t n = 0;
+        for (bt_idx i = t->n_tiled; i < b->n; i++) {
+            if (b->motion[i] != BT_DYNAMIC) continue;
+            double *from[6] = {&b->vel[i].x, &b->vel[i].y, &b->vel[i].w, NULL, NULL, NULL};
+            if (shift) from[3] = &shift[i].x, from[4] = &shift[i].y, from[5] = &shift[i].w;
+            for (int c = 0; c < (shift ? 6 : 3); c++, n++) {
+                if (pass == 0) x[n] = *from[c];
+                else *from[c] = x[n];
+            }
+        }
+        if (n == 0) break; // no large body can be moved: nothing that one rank knows alone
+        if (w->tow && pass == 0) x[n] = w->tow->lambda;
+        else if (w->tow) w->tow->lambda = x[n];
+        if (pass == 0) MPI_Bcast(x, (int)n + (w->tow ? 1 : 0), MPI_DOUBLE, d->large_owner, d->comm->mpi);
+    }
+    free(x);
+}
+
+/// Collective. Records of `size` bytes from all ranks; the caller frees.
+static void *gather(const bt_comm *c, const void *mine, size_t n, size_t size, size_t *n_all)
+{
+    int *count = bt_alloc((size_t)c->size, sizeof *count), *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    const int bytes = (int)(n * size);
+    MPI_Allgather(&bytes, 1, MPI_INT, count, 1, MPI_INT, c->mpi);
+    for (int r = 0; r < c->size; r++) first[r + 1] = first[r] + count[r];
+    char *all = bt_realloc(NULL, (size_t)first[c->size] + 1, 1);
+    MPI_Allgatherv(mine, bytes, MPI_BYTE, all, count, first, MPI_BYTE, c->mpi);
+    *n_all = (size_t)first[c->size] / size;
+    free(count);
+    free(first);
+    return all;
+}
+
+/// Is body i held by another rank too?
+static bool shared(const bt_world *w, bt_idx i)
+{
+    int holder[BT_MAX_HOLDERS];
+    return w->bodies.large[i] || bt_division_holders(w, w->bodies.tile[i][0], w->bodies.tile[i][1], holder) > 1;
+}
+
+typedef struct { bt_gid gid; double x; } value;
+
+void bt_domain_largest(const bt_world *w, double *x)
+{
+    if (!w->domain) return;
+    const bt_bodies *b = &w->bodies;
+    value *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    size_t n = 0, n_all;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (x[i] != 0 && shared(w, i)) mine[n++] = (value){b->gid[i], x[i]};
+    value *all = gather(w->domain->comm, mine, n, sizeof *mine, &n_all);
+    for (size_t k = 0; k < n_all; k++) {
+        const bt_idx i = bt_world_index(w, all[k].gid);
+        if (i >= 0) x[i] = bt_max(x[i], all[k].x);
+    }
+    free(mine);
+    free(all);
+}
+
+// --- islands ---------------------------------------------------------------------------------------------------------
+
+/// An island here and the body that may join it to one elsewhere.
+typedef struct { bt_gid body, name; } membership;
+
+static int by_body(const void *p, const void *q)
+{
+    const membership *a = p, *b = q;
+    if (a->body != b->body) return a->body < b->body ? -1 : 1;
+    return (a->name > b->name) - (a->name < b->name);
+}
+
+static int by_gid(const void *p, const void *q)
+{
+    const bt_gid *a = p, *b = q;
+    return (*a > *b) - (*a < *b);
+}
+
+static size_t find(const bt_gid *names, size_t n, bt_gid name)
+{
+    const bt_gid *p = bsearch(&name, names, n, sizeof *names, by_gid);
+    return p ? (size_t)(p - names) : n;
+}
+
+static size_t root(size_t *up, size_t i)
+{
+    while (up[i] != i) i = up[i] = up[up[i]];
+    return i;
+}
+
+void bt_domain_join_names(const bt_world *w, bt_gid *name)
+{
+    if (!w->domain) return;
+    const bt_bodies *b = &w->bodies;
+    membership *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    size_t n = 0, n_all;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->motion[i] == BT_DYNAMIC && shared(w, i)) mine[n++] = (membership){b->gid[i], name[i]};
+    membership *all = gather(w->domain->comm, mine, n, sizeof *mine, &n_all);
+    free(mine);
+    if (n_all) qsort(all, n_all, sizeof *all, by_body);
+    bt_gid *names = bt_alloc(n_all, sizeof *names);
+    for (size_t k = 0; k < n_all; k++) names[k] = all[k].name;
+    if (n_all) qsort(names, n_all, sizeof *names, by_gid);
+    size_t m = 0;
+    for (size_t k = 0; k < n_all; k++)
+        if (m == 0 || names[m - 1] != names[k]) names[m++] = names[k];
+    size_t *up = bt_alloc(m, sizeof *up);
+    for (size_t k = 0; k < m; k++) up[k] = k;
+    for (size_t k = 1; k < n_all; k++) {
+        if (all[k].body != all[k - 1].body) continue;
+        const size_t p = root(up, find(names, m, all[k - 1].name)), q = root(up, find(names, m, all[k].name));
+        up[p > q ? p : q] = p < q ? p : q; // the least name is the island's
+    }
+    for (bt_idx i = 0; i < b->n; i++) {
+        const size_t k = find(names, m, name[i]);
+        if (k < m) name[i] = names[root(up, k)];
+    }
+    free(all);
+    free(names);
+    free(up);
+}
+
+typedef struct { bt_gid name; bt_sum sum; } named_sum;
+
+static int by_name(const void *p, const void *q)
+{
+    const named_sum *a = p, *b = q;
+    return (a->name > b->name) - (a->name < b->name);
+}
+
+void bt_domain_add_by_name(const bt_world *w, const bt_idx *up, const bt_gid *name, bt_sum *sum)
+{
+    if (!w->domain) return;
+    const bt_bodies *b = &w->bodies;
+    // Islands that may have a part elsewhere: those with a shared body.
+    uint8_t *reaches = bt_alloc((size_t)b->n, 1);
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (b->motion[i] != BT_DYNAMIC || !shared(w, i)) continue;
+        bt_idx r = i;
+        while (up[r] != r) r = up[r];
+        reaches[r] = 1;
+    }
+    // Two islands here may be one through another rank: a name can stand twice in one rank's list.
+    named_sum *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    size_t n = 0, n_all;
+    for (bt_idx i = 0; i < b->n; i++)
+        if (up[i] == i && reaches[i]) mine[n++] = (named_sum){name[i], sum[i]};
+    named_sum *all = gather(w->domain->comm, mine, n, sizeof *mine, &n_all);
+    free(mine);
+    if (n_all) qsort(all, n_all, sizeof *all, by_name);
+    size_t m = 0;
+    for (size_t k = 0; k < n_all; k++) {
+        if (m == 0 || all[m - 1].name != all[k].name) {
+            all[m++] = all[k];
+        } else {
+            all[m - 1].sum.v += all[k].sum.v;
+            all[m - 1].sum.bad = all[m - 1].sum.bad || all[k].sum.bad;
+        }
+    }
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (up[i] != i || !reaches[i]) continue;
+        const named_sum *s = bsearch(&(named_sum){.name = name[i]}, all, m, sizeof *all, by_name);
+        if (s) sum[i] = s->sum;
+    }
+    free(reaches);
+    free(all);
+}
+
+// --- checks ----------------------------------------------------------------------------------------------------------
+
+/// Every body owned once: by their number and the sum of their mixed gids; when that fails, by name.
+void bt_domain_check(bt_world *w)
+{
+    const bt_domain *d = w->domain;
+    const bt_bodies *b = &w->bodies;
+    bt_idx n = 0;
+    uint64_t mixed = 0, wanted = 0;
+    bt_gid *gid = bt_alloc((size_t)b->n, sizeof *gid);
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!d->owned[i]) continue;
+        gid[n++] = b->gid[i];
+        mixed += ((uint64_t)b->gid[i] + 1) * UINT64_C(0x9e3779b97f4a7c15) >> 7;
+    }
+    for (bt_gid g = 0; g < b->n_global; g++) wanted += ((uint64_t)g + 1) * UINT64_C(0x9e3779b97f4a7c15) >> 7;
+    bt_sum sums[2] = {{.v = n}, {.v = (bt_int128)mixed}};
+    bt_comm_reduce(d->comm, sums, 2, NULL, 0, NULL, 0);
+    if ((bt_gid)sums[0].v != b->n_global || (uint64_t)sums[1].v != wanted) {
+        int64_t *first = bt_alloc((size_t)d->comm->size + 1, sizeof *first);
+        for (int r = 0; r <= d->comm->size; r++) first[r] = bt_comm_first(d->comm, r, b->n_global);
+        double *rows = bt_alloc((size_t)n, sizeof *rows), *block = bt_alloc((size_t)(first[d->comm->rank + 1] - first[d->comm->rank]), sizeof *block);
+        bt_errors err = {0};
+        bt_comm_rows_by_gid(d->comm, first, n, gid, 1, rows, block, &err);
+        bt_errors_add(&err, "step %" PRId64 ": after a migration %" PRId64 " of %" PRId64 " bodies are owned; this is an error of the program: report the case, and go on with another number of ranks",
+                      w->step, (int64_t)sums[0].v, b->n_global);
+        bt_comm_errors(d->comm, &err);
+        bt_errors_print(&err);
+        bt_comm_abort(BT_ERR_NUMERIC);
+    }
+    free(gid);
+#ifdef BT_VALIDATE
+    if (!bt_domain_is_valid(w)) {
+        fprintf(stderr, "bergtow: step %" PRId64 ": the ranks disagree on bodies they share; this is an error of the program\n", w->step);
+        bt_comm_abort(BT_ERR_NUMERIC);
+    }
+#endif
+}
+
+typedef struct { bt_gid gid; uint64_t state; } copy;
+
+static int by_copy(const void *p, const void *q)
+{
+    const copy *a = p, *b = q;
+    if (a->gid != b->gid) return a->gid < b->gid ? -1 : 1;
+    return (a->state > b->state) - (a->state < b->state);
+}
+
+bool bt_domain_is_valid(bt_world *w)
+{
+    const bt_domain *d = w->domain;
+    if (!d) return true;
+    const bt_bodies *b = &w->bodies;
+    const bt_tiles *t = w->tiles;
+    bool sound = true;
+    for (bt_idx k = 0; k < t->n - 1; k++) // what a tile may touch is here, and nothing stands where it does not belong
+        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++)
+            sound = sound && b->tile[i][0] == t->tile[k].x && b->tile[i][1] == t->tile[k].y && bt_world_index(w, b->gid[i]) == i;
+    copy *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    size_t n = 0, n_all;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!shared(w, i)) continue;
+        const bt_vel *v = &b->vel[i];
+        const bt_pose *p = &b->pose[i];
+        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i]};
+        uint64_t h = 0;
+        for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
+            uint64_t u;
+            const double x = state[k] + 0.0;
+            memcpy(&u, &x, sizeof u);
+            h = (h ^ u) * UINT64_C(0x9e3779b97f4a7c15);
+            h ^= h >> 29;
+        }
+        mine[n++] = (copy){b->gid[i], h};
+    }
+    copy *all = gather(d->comm, mine, n, sizeof *mine, &n_all);
+    if (n_all) qsort(all, n_all, sizeof *all, by_copy);
+    for (size_t k = 1; k < n_all; k++) sound = sound && (all[k].gid != all[k - 1].gid || all[k].state == all[k - 1].state);
+    free(mine);
+    free(all);
+    return !bt_comm_any(d->comm, !sound);
+}

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: MIT
+// The ranks of the program: start, end, agreement, and rows in the order of global ids.
+//
+// Reduction. MPI's own sums of doubles depend on how the ranks are combined, and MPI knows no 128-bit integers. So every
+// number travels as an item of 32 bytes {kind, two words, bad} with one operation for all kinds: items are combined one by one, so
+// that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one message.
+#include "bergtow/comm.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define ALONE {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1}
+const bt_comm bt_comm_alone = ALONE;
+static bt_comm world = ALONE;
+static bool running; // between start and end, with MPI
+static MPI_Datatype item_type;
+static MPI_Op item_op;
+
+enum kind { SUM, MAX, OR };
+typedef struct item { uint64_t kind, low, high, bad; } item;
+
+static double as_double(uint64_t u)
+{
+    double x;
+    memcpy(&x, &u, sizeof x);
+    return x;
+}
+
+static uint64_t as_word(double x)
+{
+    uint64_t u;
+    memcpy(&u, &x, sizeof u);
+    return u;
+}
+
+// The larger of two; NaN above all, +0 above −0: the same bits in any order of combination.
+static double larger(double a, double b)
+{
+    if (isnan(a) || isnan(b)) return (double)NAN;
+    if (a == b) return signbit(a) ? b : a;
+    return a > b ? a : b;
+}
+
+static void combine(void *in, void *inout, int *n, MPI_Datatype *type)
+{
+    (void)type;
+    const item *a = in;
+    item *b = inout;
+    for (int i = 0; i < *n; i++) {
+        switch ((enum kind)a[i].kind) {
+        case SUM: {
+            const uint64_t low = a[i].low + b[i].low;
+            b[i].high += a[i].high + (low < b[i].low);
+            b[i].low = low;
+            break;
+        }
+        case MAX: b[i].low = as_word(larger(as_double(a[i].low), as_double(b[i].low))); break;
+        case OR: b[i].low |= a[i].low; break;
+        }
+        b[i].bad |= a[i].bad;
+    }
+}
+
+const bt_comm *bt_comm_world(void) { return &world; }
+
+static void on_mpi_error(MPI_Comm *mpi, int *code, ...)
+{
+    (void)mpi;
+    char text[MPI_MAX_ERROR_STRING] = "unknown error";
+    int length;
+    MPI_Error_string(*code, text, &length);
+    fprintf(stderr, "bergtow: rank %d: MPI: %s; the other ranks are ended; start the run again\n", world.rank, text);
+    bt_comm_abort(BT_ERR_NUMERIC);
+}
+
+static void on_leaving(int code, void *unused)
+{
+    (void)unused;
+    if (!running) return;
+    if (code == BT_OK || code == BT_ERR_USAGE) bt_comm_end(code);
+    else bt_comm_abort(code);
+}
+
+void bt_comm_start(int *argc, char ***argv)
+{
+    if (running || (!getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK"))) return;
+    int provided;
+    if (MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided) != MPI_SUCCESS) {
+        fprintf(stderr, "bergtow: MPI cannot be started; check the mpirun call, or start bergtow without it\n");
+        exit(BT_ERR_USAGE);
+    }
+    running = true;
+    world.mpi = MPI_COMM_WORLD;
+    MPI_Comm_rank(world.mpi, &world.rank);
+    MPI_Comm_size(world.mpi, &world.size);
+    MPI_Errhandler handler;
+    MPI_Comm_create_errhandler(on_mpi_error, &handler);
+    MPI_Comm_set_errhandler(world.mpi, handler);
+    MPI_Errhandler_free(&handler);
+    MPI_Comm node;
+    MPI_Comm_split_type(world.mpi, MPI_COMM_TYPE_SHARED, world.rank, MPI_INFO_NULL, &node);
+    MPI_Comm_size(node, &world.ranks_here);
+    MPI_Comm_free(&node);
+    MPI_Type_contiguous(4, MPI_UINT64_T, &item_type);
+    MPI_Type_commit(&item_type);
+    MPI_Op_create(combine, 1, &item_op);
+    on_exit(on_leaving, NULL);
+}
+
+int bt_comm_end(int code)
+{
+    if (!running) return code;
+    // Only now: a launcher that sees one rank leave with an error ends the others, in the middle of their message.
+    fflush(NULL);
+    bt_comm_rest(&world);
+    code = (int)bt_comm_agree(&world, (bt_status)code);
+    running = false;
+    MPI_Op_free(&item_op);
+    MPI_Type_free(&item_type);
+    MPI_Finalize();
+    world = (bt_comm)ALONE;
+    return code;
+}
+
+_Noreturn void bt_comm_abort(int code)
+{
+    fflush(NULL);
+    if (running) {
+        running = false;
+        MPI_Abort(MPI_COMM_WORLD, code);
+    }
+    _Exit(code);
+}
+
+bt_status bt_comm_agree(const bt_comm *c, bt_status status)
+{
+    if (c->size == 1) return status;
+    static const bt_status order[] = {BT_OK, BT_ERR_SIGNAL, BT_ERR_USAGE, BT_ERR_CASE, BT_ERR_NUMERIC, BT_ERR_IO};
+    enum { N = sizeof order / sizeof *order };
+    int at = N - 1, worst;
+    for (int i = 0; i < N; i++)
+        if (order[i] == status) at = i;
+    MPI_Allreduce(&at, &worst, 1, MPI_INT, MPI_MAX, c->mpi);
+    return order[worst];
+}
+
+static bool has(const bt_errors *e, const char *text)
+{
+    for (size_t i = 0; i < e->n; i++)
+        if (!strcmp(e->text[i], text)) return true;
+    return false;
+}
+
+void bt_comm_errors(const bt_comm *c, bt_errors *err)
+{
+    if (c->size == 1) return;
+    int n = 0, *counts = NULL, *starts = NULL, all = 0;
+    for (size_t i = 0; i < err->n; i++) n += (int)strlen(err->text[i]) + 1;
+    char *mine = bt_alloc((size_t)n, 1), *texts = NULL, *end = mine;
+    for (size_t i = 0; i < err->n; i++) end = stpcpy(end, err->text[i]) + 1;
+    bt_errors_free(err);
+    if (c->rank == 0) counts = bt_alloc(2 * (size_t)c->size, sizeof *counts);
+    MPI_Gather(&n, 1, MPI_INT, counts, 1, MPI_INT, 0, c->mpi);
+    if (c->rank == 0) {
+        starts = counts + c->size;
+        for (int k = 0; k < c->size; k++) {
+            starts[k] = all;
+            all += counts[k];
+        }
+        texts = bt_alloc((size_t)all, 1);
+    }
+    MPI_Gatherv(mine, n, MPI_CHAR, texts, counts, starts, MPI_CHAR, 0, c->mpi);
+    for (int at = 0; at < all; at += (int)strlen(texts + at) + 1)
+        if (!has(err, texts + at)) bt_errors_add(err, "%s", texts + at);
+    free(mine);
+    free(texts);
+    free(counts);
+}
+
+void bt_comm_bcast(const bt_comm *c, void *data, size_t bytes)
+{
+    if (c->size == 1) return;
+    const size_t most = (size_t)1 << 30; // MPI counts are of 31 bits
+    for (size_t at = 0; at < bytes; at += most)
+        MPI_Bcast((char *)data + at, (int)(bytes - at < most ? bytes - at : most), MPI_BYTE, 0, c->mpi);
+}
+
+bool bt_comm_any(const bt_comm *c, bool value)
+{
+    if (c->size == 1) return value;
+    int mine = value, any;
+    MPI_Allreduce(&mine, &any, 1, MPI_INT, MPI_MAX, c->mpi);
+    return any;
+}
+
+void bt_comm_rest(const bt_comm *c)
+{
+    if (c->size == 1) return;
+    // Blocking MPI calls poll, with the whole core. Looked for every 10 ms at last, and often at first: most waits are short.
+    MPI_Request all;
+    int there = 0;
+    MPI_Ibarrier(c->mpi, &all);
+    for (long pause = 20000; MPI_Test(&all, &there, MPI_STATUS_IGNORE), !there; pause = pause < 5000000 ? 2 * pause : 10000000)
+        nanosleep(&(struct timespec){.tv_nsec = pause}, NULL);
+}
+
+void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors)
+{
+    if (c->size == 1) return;
+    enum { FEW = 64 };
+    item few[FEW], *items = few;
+    const int n = n_sums + n_max + n_ors;
+    if (n == 0) return;
+    if (n > FEW) items = bt_alloc((size_t)n, sizeof *items);
+    item *p = items;
+    for (int i = 0; i < n_sums; i++) *p++ = (item){SUM, (uint64_t)sums[i].v, (uint64_t)(sums[i].v >> 64), sums[i].bad};
+    for (int i = 0; i < n_max; i++) *p++ = (item){MAX, as_word(maxima[i]), 0, 0};
+    for (int i = 0; i < n_ors; i++) *p++ = (item){OR, ors[i], 0, 0};
+    MPI_Allreduce(MPI_IN_PLACE, items, n, item_type, item_op, c->mpi);
+    p = items;
+    for (int i = 0; i < n_sums; i++, p++)
+        sums[i] = (bt_sum){.v = (bt_int128)((__extension__ (unsigned __int128)p->high) << 64 | p->low), .bad = p->bad != 0};
+    for (int i = 0; i < n_max; i++) maxima[i] = as_double(p++->low);
+    for (int i = 0; i < n_ors; i++) ors[i] = p++->low;
+    if (items != few) free(items);
+}
+
+int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total)
+{
+    int64_t before = 0, all = value;
+    if (c->size > 1) {
+        MPI_Exscan(&value, &before, 1, MPI_INT64_T, MPI_SUM, c->mpi);
+        if (c->rank == 0) before = 0; // undefined by MPI
+        MPI_Allreduce(&value, &all, 1, MPI_INT64_T, MPI_SUM, c->mpi);
+    }
+    if (total) *total = all;
+    return before;
+}
+
+// ---- rows by id ----
+
+// The rank whose block holds an id; empty blocks hold none.
+static int holder(const int64_t *first, int size, bt_gid gid)
+{
+    int low = 0, high = size;
+    while (high - low > 1) {
+        const int middle = (low + high) / 2;
+        if (first[middle] <= gid) low = middle;
+        else high = middle;
+    }
+    return low;
+}
+
+// "1, 2, 3, ..." of the ids of a block whose count is wrong.
+static void name_ids(const unsigned char *count, int64_t from, int64_t n, bool missing, bt_errors *err)
+{
+    enum { SHOWN = 5 };
+    char text[200] = "";
+    int64_t found = 0;
+    for (int64_t i = 0; i < n; i++) {
+        if (missing ? count[i] != 0 : count[i] < 2) continue;
+        const size_t used = strlen(text);
+        if (found++ < SHOWN) snprintf(text + used, sizeof text - used, "%s%lld", used ? ", " : "", (long long)(from + i));
+    }
+    if (found)
+        bt_errors_add(err, "%lld bodies are %s: id %s%s; please report this case", (long long)found,
+                      missing ? "held by no rank" : "held by several ranks", text, found > SHOWN ? ", ..." : "");
+}
+
+static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_gid *gid, int width, const double *rows, double *block, bt_errors *err)
+{
+    unsigned char *seen = bt_alloc((size_t)count, 1);
+    bool wrong = n != count;
+    for (int64_t i = 0; i < n; i++) {
+        const int64_t at = gid[i] - from;
+        if (at < 0 || at >= count) {
+            bt_errors_add(err, "a body has the id %lld, which does not exist; please report this case", (long long)gid[i]);
+            wrong = true;
+            continue;
+        }
+        if (seen[at]) wrong = true;
+        if (seen[at] < 2) seen[at]++;
+        memcpy(block + at * width, rows + i * width, (size_t)width * sizeof *block);
+    }
+    if (wrong) {
+        name_ids(seen, from, count, true, err);
+        name_ids(seen, from, count, false, err);
+    }
+    free(seen);
+    return wrong ? BT_ERR_NUMERIC : BT_OK;
+}
+
+static int running_sum(int size, const int *counts, int *starts)
+{
+    int all = 0;
+    for (int k = 0; k < size; k++) {
+        starts[k] = all;
+        all += counts[k];
+    }
+    return all;
+}
+
+bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width, const double *rows,
+                              double *block, bt_errors *err)
+{
+    const int size = c->size;
+    const int64_t from = first[c->rank], count = first[c->rank + 1] - from;
+    if (size == 1) return put_in_order(from, count, n, gid, width, rows, block, err);
+
+    int *numbers = bt_alloc(5 * (size_t)size, sizeof *numbers);
+    int *send = numbers, *send_at = numbers + size, *take = numbers + 2 * size, *take_at = numbers + 3 * size, *next = numbers + 4 * size;
+    for (bt_idx i = 0; i < n; i++) send[holder(first, size, gid[i])]++;
+    running_sum(size, send, send_at);
+    MPI_Alltoall(send, 1, MPI_INT, take, 1, MPI_INT, c->mpi);
+    const int n_take = running_sum(size, take, take_at);
+
+    bt_gid *gid_out = bt_alloc((size_t)n, sizeof *gid_out), *gid_in = bt_alloc((size_t)n_take, sizeof *gid_in);
+    double *out = bt_alloc((size_t)n, (size_t)width * sizeof *out);
+    memcpy(next, send_at, (size_t)size * sizeof *next);
+    for (bt_idx i = 0; i < n; i++) {
+        const int at = next[holder(first, size, gid[i])]++;
+        gid_out[at] = gid[i];
+        memcpy(out + (size_t)at * (size_t)width, rows + (size_t)i * (size_t)width, (size_t)width * sizeof *out);
+    }
+    MPI_Datatype row;
+    MPI_Type_contiguous(width, MPI_DOUBLE, &row);
+    MPI_Type_commit(&row);
+    double *in = bt_alloc((size_t)n_take, (size_t)width * sizeof *in);
+    MPI_Alltoallv(gid_out, send, send_at, MPI_INT64_T, gid_in, take, take_at, MPI_INT64_T, c->mpi);
+    MPI_Alltoallv(out, send, send_at, row, in, take, take_at, row, c->mpi);
+    MPI_Type_free(&row);
+    free(out);
+    free(gid_out);
+    const bt_status status = put_in_order(from, count, n_take, gid_in, width, in, block, err);
+    free(in);
+    free(gid_in);
+    free(numbers);
+    return bt_comm_agree(c, status);
+}
