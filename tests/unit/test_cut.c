@@ -7,7 +7,6 @@
 
 #include <cmocka.h>
 #include <pthread.h>
-#include <stdio.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -406,9 +405,8 @@ static void test_moving_spot(void **state)
         bt_cut(&t.g, 32, 0.04, fresh, &f);
         assert_true((double)q.cut <= 1.3 * (double)f.cut);
     }
-    // 3.4 % of the weight on average; new cuts with exchanged labels move ten times that
-    if (moved > sum * n_steps / 10) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
-    printf("moved %g\n",(double)moved / (double)sum / n_steps);
+    // 2 % of the weight a step; a new cut with exchanged labels moves twenty times that
+    if (moved > sum * n_steps / 25) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
     free(part);
     free(fresh);
     grid_free(&t);
@@ -421,11 +419,14 @@ static void on_term(int signal)
     n_terms++;
 }
 
-static pthread_t main_thread;
-static void *terminate_main(void *us)
+static void *terminate(void *us)
 {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &set, NULL);
     usleep((unsigned)*(int *)us);
-    pthread_kill(main_thread, SIGTERM);
+    kill(getpid(), SIGTERM);
     return NULL;
 }
 
@@ -435,14 +436,13 @@ static void test_signals(void **state)
     struct sigaction action = {.sa_handler = on_term, .sa_flags = SA_RESTART}, saved, after;
     sigaddset(&action.sa_mask, SIGUSR1);
     sigaction(SIGTERM, &action, &saved);
-    main_thread = pthread_self();
     grid t;
     grid_init(&t, 150, 150, 9, 2);
     for (int us = 0; us <= 40000; us += 4000) {
         n_terms = 0;
         pthread_t killer;
         int *part = labels(&t, -1);
-        pthread_create(&killer, NULL, terminate_main, &us);
+        pthread_create(&killer, NULL, terminate, &us);
         bt_cut_quality q;
         bt_cut(&t.g, 64, 0.03, part, &q);
         pthread_join(killer, NULL);
