@@ -328,10 +328,12 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
 void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q)
 {
     int *before = bt_alloc((size_t)g->n, sizeof *before);
-    memcpy(before, part, (size_t)g->n * sizeof *before);
     bt_cut_method method = BT_CUT_NONE;
-    if (n_parts == 1) memset(part, 0, (size_t)g->n * sizeof *part);
-    else if (g->n > 0) {
+    for (int v = 0; v < g->n; v++) {
+        before[v] = part[v];
+        part[v] = 0;
+    }
+    if (n_parts > 1 && g->n > 0) {
         int *of = bt_alloc((size_t)g->n, sizeof *of);
         int n = contracted_numbers(g, of);
         owned c = mapped(g, n, of);
