@@ -438,8 +438,8 @@ static void test_moving_spot(void **state)
         bt_cut(&t.g, 32, 0.04, fresh, &f);
         assert_true((double)q.cut <= 1.3 * (double)f.cut);
     }
-    // 2 % of the weight a step; a new cut with exchanged labels moves twenty times that
-    if (moved > sum * n_steps / 25) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
+    // 4 % a step on average: 2 % where labels are kept, 40 % in the few new cuts
+    if (moved > sum * n_steps / 15) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
     free(part);
     free(fresh);
     grid_free(&t);
