@@ -32,8 +32,8 @@ WALL_DISTANCE = 1500.0                           # m, of the compression scenes,
 #: steps of a run: long enough for the ice to be packed where it will be, short enough for the dense scenes, which cost 30 times as much
 STEPS = {"tow-80": 100, "tow-95": 20, "compression-80": 100, "compression-95": 30}
 #: a size and its double give a weak-scaling figure
-SIZES = {"quick": [1000, 2000, 4000], "default": [1000, 2000, 10000, 20000, 30000],
-         "full": [1000, 2000, 10000, 20000, 30000, 60000, 100000, 150000, 300000]}
+SIZES = {"quick": [1000, 2000, 4000], "default": [1000, 2000, 10000, 15000, 30000],
+         "full": [1000, 2000, 10000, 15000, 30000, 60000, 100000, 150000, 300000]}
 REPEATS = {"quick": 2, "default": 3, "full": 3}
 ONCE_ABOVE = 50000                               # floes: larger fields are run once
 
@@ -85,7 +85,7 @@ def field_of(scene, n, o):
 
 
 def command(scene, n, ranks, threads, steps, o):
-    values = dict(settings(scene, n), **{"ice.field": field_of(scene, n, o).resolve()})
+    values = dict(settings(scene, n), **o.set_keys, **{"ice.field": field_of(scene, n, o).resolve()})
     folder = o.out / "runs" / f"{scene}-{n}-{ranks}x{threads}"
     words = [o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads", threads, "--steps", steps]
     if ranks > 1:
@@ -178,6 +178,7 @@ def describe_machine(o, load_before, triads, ranks_reason):
     lines = [f"date: {time.strftime('%Y-%m-%d %H:%M:%S %Z')}", f"host: {text_of('uname', '-srm')}"]
     wanted = ("Model name", "CPU(s)", "Thread(s) per core", "CPU max MHz", "L1d cache", "L1i cache", "L2 cache", "L3 cache", "NUMA node(s)", "Hypervisor vendor")
     lines += [line for line in text_of("lscpu").splitlines() if line.split(":")[0].strip() in wanted]
+    lines += [f"set: {key}={value}" for key, value in o.set_keys.items()]
     lines += [f"cores used: {o.cores}", f"memory: {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"]
     lines += [f"bergtow {k}: {v}" for k, v in built.items()]
     lines += [f"mpirun: {text_of('mpirun', '--version').splitlines()[0]}", f"ranks: {ranks_reason or 'measured'}"]
@@ -259,6 +260,8 @@ def options():
     p.add_argument("--steps", type=int, help="steps of every run, instead of the scene's own number")
     p.add_argument("--repeats", type=int, help="runs of each configuration")
     p.add_argument("--cores", type=int, default=len(os.sched_getaffinity(0)), help="use at most so many (default: all)")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="set_keys", help="a case key for every run, not for its field; "
+                   "solver.max_sweeps=50 with solver.tolerance=1e-9 gives every size the same sweeps")
     p.add_argument("--out", type=Path, default=ROOT / "build/bench", help="folder of tables, plot and cached fields")
     p.add_argument("--bergtow", type=Path, default=Path(os.environ.get("BERGTOW", ROOT / "build/release/bergtow")))
     p.add_argument("--triad", type=Path, default=ROOT / "build/release/triad")
@@ -268,6 +271,9 @@ def options():
         o.sizes = sorted({int(x) for x in o.sizes.split(",")}) if o.sizes else SIZES[o.set]
     except ValueError:
         p.error(f"--sizes {o.sizes}: give whole numbers with commas, as in 1000,2000")
+    if not all("=" in x for x in o.set_keys):
+        p.error(f"--set {' '.join(o.set_keys)}: give KEY=VALUE")
+    o.set_keys = dict(x.split("=", 1) for x in o.set_keys)
     o.scenes = o.scenes.split(",")
     unknown = [s for s in o.scenes if s not in STEPS]
     if unknown:

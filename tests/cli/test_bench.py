@@ -70,12 +70,16 @@ def test_picture_and_machine(small):
         assert re.search("^" + line.replace(": ", r":\s*"), machine, re.M), (line, machine)
 
 
-def test_fields_are_made_once(small):
+def test_fields_are_made_once_and_keys_reach_the_run(small):
     out, rows = small
     before = {p: p.stat().st_mtime_ns for p in (out / "fields").iterdir()}
     assert len(before) == 8
-    done = start("--sizes", 300, "--scenes", "tow-80", "--steps", 1, "--repeats", 1, "--cores", 1, "--triad-mib", 4, "--out", out)
+    done = start("--sizes", 300, "--scenes", "tow-95", "--steps", 2, "--repeats", 1, "--cores", 1, "--triad-mib", 4, "--out", out,
+                 "--set", "solver.max_sweeps=5", "--set", "solver.tolerance=1e-9")
     assert done.returncode == 0, done.stderr
+    with open(out / "bench.csv", newline="") as f:
+        (row,) = csv.DictReader(f)
+    assert row["mean_sweeps"] == "5" and row["unconverged"] == "2"  # a key set for the runs leaves the field alone
     assert {p: p.stat().st_mtime_ns for p in (out / "fields").iterdir()} == before
 
 
@@ -119,7 +123,7 @@ def test_every_column_is_explained():
 
 
 @pytest.mark.parametrize("args, words", [(["--scenes", "tow-81"], "no such scene; there are tow-80"), (["--sizes", "300;600"], "whole numbers"),
-                                         (["--sizes", "20"], "at least 300"), (["--triad", "/nowhere"], "is missing; run `make bench`")])
+                                         (["--sizes", "20"], "at least 300"), (["--set", "run.dt"], "KEY=VALUE"), (["--triad", "/nowhere"], "is missing; run `make bench`")])
 def test_wrong_use(args, words, tmp_path):
     done = start("--out", tmp_path, *args)
     assert done.returncode == 2 and words in done.stderr
