@@ -37,13 +37,13 @@ BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
 TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
 
-.PHONY: all help deps demo test test-long clean install tests lint asan FORCE
+.PHONY: all help deps demo test test-long bench clean install tests lint asan partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug or asan for the others)
 
 help: ## this list
-	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 # The stamp changes when the flags do, so that a new flag rebuilds everything.
 STAMP := $(BUILD)/flags
@@ -78,7 +78,12 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
 
-tests: $(TEST_BIN) ## build the test programs
+tests: $(TEST_BIN) $(BUILD)/triad ## build the test programs
+
+$(BUILD)/triad: cases/scaling/triad.c $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  LINK $@'
+	@$(CC) $(CFLAGS) $< -o $@
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
@@ -116,6 +121,21 @@ test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time s
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
+STUDY := $(BUILD)/partition/study/partition_quality
+$(STUDY): partition/study/partition_quality.c $(BUILD)/libbergtow.a $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  LINK $@'
+	@$(CC) $(CFLAGS) $< $(BUILD)/libbergtow.a $(LDLIBS) -o $@
+
+partition-study: $(STUDY) ## cut tile graphs of a million floes into up to 4,096 parts: partition/quality.csv
+	$(STUDY) > partition/quality.csv.new
+	mv partition/quality.csv.new partition/quality.csv
+
+BENCH ?= default
+bench: deps ## time a floe and step over sizes, threads and ranks: 10-15 minutes (BENCH=quick 1-2, BENCH=full to 300,000 floes)
+	@$(AGAIN) CONFIG=release all build/release/triad
+	$(PYTHON) cases/scaling/bench.py $(BENCH)
+
 lint: all ## names of external symbols, licence lines, syntax
 	@tests/lint.sh
 
@@ -129,4 +149,4 @@ install: all ## install the program into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d)
+-include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(STUDY).d $(BUILD)/triad.d

@@ -21,7 +21,7 @@
 #include "bergtow/base.h"
 #include "cut_method.h"
 
-static const double KEEP = 1.25;  // edge cut of the old labels against that of a new cut; see the study in README.md
+static const double KEEP = 1.25;  // what the old labels may be worse by
 static const double CLOSE = 1.1;  // imbalances within this factor of the best count as equal when none is within the tolerance
 
 // A graph that owns its arrays, and where the vertices of the larger graph went (−1 nowhere).
@@ -167,9 +167,10 @@ static const trial *better_of(const trial *t, int n, double tolerance)
         if (t[i].n_empty == n_empty) least = bt_min(least, t[i].excess);
     const trial *best = NULL, *kept = NULL;
     for (int i = 0; i < n; i++) {
-        if (t[i].n_empty > n_empty || t[i].excess > bt_max(tolerance, CLOSE * least)) continue;
-        if (!best || t[i].cut < best->cut) best = &t[i];
+        double allowed = bt_max(tolerance, CLOSE * least);
+        if (t[i].n_empty > n_empty || t[i].excess > KEEP * allowed) continue;
         if (t[i].method == BT_CUT_KEPT) kept = &t[i];
+        if (t[i].excess <= allowed && (!best || t[i].cut < best->cut)) best = &t[i];
     }
     return kept && (double)kept->cut <= KEEP * (double)best->cut ? kept : best;
 }
@@ -327,10 +328,12 @@ static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n
 void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q)
 {
     int *before = bt_alloc((size_t)g->n, sizeof *before);
-    memcpy(before, part, (size_t)g->n * sizeof *before);
     bt_cut_method method = BT_CUT_NONE;
-    if (n_parts == 1) memset(part, 0, (size_t)g->n * sizeof *part);
-    else if (g->n > 0) {
+    for (int v = 0; v < g->n; v++) {
+        before[v] = part[v];
+        part[v] = 0;
+    }
+    if (n_parts > 1 && g->n > 0) {
         int *of = bt_alloc((size_t)g->n, sizeof *of);
         int n = contracted_numbers(g, of);
         owned c = mapped(g, n, of);

@@ -35,11 +35,12 @@ typedef struct bt_cut_quality {
 
 /// Cut the graph into n_parts >= 1 parts of equal weight, with little weight on the edges between them and few labels changed.
 /// part: in, the labels before (outside 0 ... n_parts − 1: none); out, the labels. tolerance: imbalance that is as good as none,
-/// e.g. 0.03. A vertex or group heavier than a part's share gets a part of its own, and the rest is balanced without
+/// e.g. 0.04 (labels before are kept up to 1.25 times that). A vertex or group heavier than a part's share gets a part of its own, and the rest is balanced without
 /// it. A part is empty only if there are fewer vertices (a group counts as one) than parts. q may be NULL.
 /// Deterministic: the same graph and labels before give the same labels. Not to be called by two threads at once (METIS).
-/// Signal handlers are as before on return; a SIGTERM that comes while METIS runs is delivered to the caller's handler
-/// afterwards. That holds for the calling thread: other threads should block SIGTERM.
+/// SIGTERM is blocked in the calling thread while METIS runs, and its handler is as before on return. All other threads of the
+/// process must block SIGTERM: METIS's handler would crash in them. (Block it before MPI_Init and the first parallel
+/// region, whose threads inherit that, and unblock it in the main thread afterwards.)
 void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q);
 
 /// Quality of labels. before: as in bt_cut, NULL = none. method is BT_CUT_NONE.

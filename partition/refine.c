@@ -61,8 +61,9 @@ static void shift(parts *p, int v, int b)
 }
 
 // Vertex of a to give to its neighbour b, −1 if none: one that brings a within the limit (and, where b is the end of the way,
-// keeps b within it) before others, then the one that lowers the cut most, then the heaviest.
-static int vertex_to_give(const parts *p, int a, int b, bool end)
+// keeps b within it) before others, and of those the one that lowers the cut most. With `nearest` the one whose weight
+// is nearest to what a has too much: the first rule may offer nothing but a berg's tiles.
+static int vertex_to_give(const parts *p, int a, int b, bool end, bool nearest)
 {
     const bt_graph *g = p->g;
     int best = -1, best_fit = 0;
@@ -79,16 +80,15 @@ static int vertex_to_give(const parts *p, int a, int b, bool end)
         }
         if (!touches) continue;
         int fit = (p->load[a] - w <= p->limit) + (!end || p->load[b] + w <= p->limit);
-        bool better = best < 0 || fit > best_fit || (fit == best_fit && gain > best_gain) ||
-                      (fit == best_fit && gain == best_gain && w > g->weight[best]) ||
-                      (fit == best_fit && gain == best_gain && w == g->weight[best] && v < best);
-        if (better) best = v, best_fit = fit, best_gain = gain;
+        if (nearest) fit = 0, gain = -llabs(p->load[a] - w - p->limit);
+        if (best < 0 || fit > best_fit || (fit == best_fit && (gain > best_gain || (gain == best_gain && v < best))))
+            best = v, best_fit = fit, best_gain = gain;
     }
     return best;
 }
 
 // Shift one vertex along every link of the way from `heavy` to `end`; undone and false if that does not help.
-static bool shift_along(parts *p, int heavy, int end)
+static bool shift_along(parts *p, int heavy, int end, bool nearest)
 {
     int n_way = 0, *way = bt_alloc((size_t)p->n, sizeof *way), *given = bt_alloc((size_t)p->n, sizeof *given);
     for (int a = end; a != heavy; a = p->from[a]) way[n_way++] = a;
@@ -96,7 +96,7 @@ static bool shift_along(parts *p, int heavy, int end)
     int a = heavy, n_given = 0;
     bool good = true;
     for (int i = n_way - 1; good && i >= 0; i--) {
-        int v = vertex_to_give(p, a, way[i], i == 0);
+        int v = vertex_to_give(p, a, way[i], i == 0, nearest);
         good = v >= 0;
         if (!good) break;
         given[n_given++] = v;
@@ -122,7 +122,7 @@ static bool relieve(parts *p, int heavy)
     for (int i = 0; !done && i < n_reached && n_tried < ENDS_TRIED; i++) {
         int a = p->queue[i];
         if (p->load[a] < p->share) {
-            done = shift_along(p, heavy, a);
+            done = shift_along(p, heavy, a, false) || shift_along(p, heavy, a, true);
             n_tried++;
             if (done) break;
         }

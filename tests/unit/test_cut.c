@@ -7,7 +7,6 @@
 
 #include <cmocka.h>
 #include <pthread.h>
-#include <stdio.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,7 +133,7 @@ static void test_grid(void **state)
     }
 }
 
-// A few uneven tiles a part: METIS alone is 10 to 30 % out of balance here.
+// A few uneven tiles a part: METIS alone is 5 and 11 % out of balance at 150 and 200 parts.
 static void test_few_tiles_a_part(void **state)
 {
     (void)state;
@@ -172,6 +171,25 @@ static void test_groups(void **state)
         free(part);
     }
     grid_free(&t);
+}
+
+// A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves that
+// cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
+static void test_group_edges(void **state)
+{
+    (void)state;
+    const int start[] = {0, 1, 2, 3, 7, 9, 10}, to[] = {3, 3, 3, 0, 1, 2, 4, 3, 5, 4}, group[] = {2, 2, 2, -1, -1, -1};
+    const int64_t edge[] = {2, 2, 2, 2, 2, 2, 5, 5, 1, 1}, weight[] = {10, 10, 10, 20, 30, 20};
+    const double at[][2] = {{0, 0}, {0, 0}, {0, 0}, {3, 0}, {2, 0}, {1, 0}}; // bisection finds the second
+    bt_graph g = {6, start, to, edge, weight, at, group};
+    assert_true(bt_graph_is_valid(&g));
+    int part[6] = {0, 0, 0, 1, 1, 0};
+    assert_int_equal(bt_cut_measure(&g, 2, part, NULL).cut, 7);
+    for (int i = 0; i < 6; i++) part[i] = -1;
+    bt_cut_quality q;
+    bt_cut(&g, 2, 0.03, part, &q);
+    assert_true(q.imbalance == 0);
+    assert_int_equal(q.cut, 5);
 }
 
 static double imbalance_of_others(const grid *t, int n_parts, const int *part, int heavy)
@@ -218,6 +236,10 @@ static void test_weights(void **state)
         for (int v = 0; v < t.g.n; v++) count[part[v]]++;
         for (int p = 0; p < 16; p++)
             if (count[p] < 60 || count[p] > 66) fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
+        if (weight[i]) { // METIS itself, which bisection would stand in for
+            assert_true(bt_cut_by_metis(&t.g, 16, 0.03, part));
+            assert_true(bt_cut_measure(&t.g, 16, part, NULL).imbalance <= 0.04);
+        }
         free(part);
     }
     // half of the tiles empty: the others are balanced
@@ -256,7 +278,7 @@ static void test_disconnected(void **state)
         free(cut(&t, 9, 0.03, &q));
         assert_true(q.imbalance <= 0.0301);
         free(cut(&t, 7, 0.03, &q));
-        assert_true(q.imbalance <= 0.04);
+        assert_true(q.imbalance <= 0.04); // 900 / 7 tiles: within one tile of 3 %
     }
     grid_free(&t);
 }
@@ -314,6 +336,16 @@ static void test_bisection(void **state)
     bt_cut_quality q = bt_cut_measure(&t.g, 16, part, NULL);
     assert_true(q.imbalance == 0);
     assert_int_equal(q.cut, straight_cut(&t, 4, 4));
+    for (int i = 0; i < t.g.n; i++) t.weight[i] = i / 64 < 32; // the empty half is divided by number
+    bt_cut_by_bisection(&t.g, 12, part);
+    int count[12] = {0}, least = t.g.n;
+    for (int i = 0; i < t.g.n; i++) count[part[i]]++;
+    for (int p = 0; p < 12; p++) least = count[p] < least ? count[p] : least;
+    assert_true(least >= 2048 / 12);
+    for (int i = 0; i < t.g.n; i++) t.weight[i] = 0;
+    bt_cut_by_bisection(&t.g, 64, part);
+    for (int i = 0; i < t.g.n; i++) t.weight[i] = 1;
+    assert_true(bt_cut_measure(&t.g, 64, part, NULL).imbalance == 0);
     free(part);
     grid_free(&t);
 
@@ -406,9 +438,8 @@ static void test_moving_spot(void **state)
         bt_cut(&t.g, 32, 0.04, fresh, &f);
         assert_true((double)q.cut <= 1.3 * (double)f.cut);
     }
-    // 3.4 % of the weight on average; new cuts with exchanged labels move ten times that
-    if (moved > sum * n_steps / 10) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
-    printf("moved %g\n",(double)moved / (double)sum / n_steps);
+    // 4 % a step on average: 2 % where labels are kept, 40 % in the few new cuts
+    if (moved > sum * n_steps / 15) fail_msg("moved %g of the weight a step", (double)moved / (double)sum / n_steps);
     free(part);
     free(fresh);
     grid_free(&t);
@@ -421,11 +452,14 @@ static void on_term(int signal)
     n_terms++;
 }
 
-static pthread_t main_thread;
-static void *terminate_main(void *us)
+static void *terminate(void *us)
 {
+    sigset_t set;
+    sigemptyset(&set);
+    sigaddset(&set, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &set, NULL);
     usleep((unsigned)*(int *)us);
-    pthread_kill(main_thread, SIGTERM);
+    kill(getpid(), SIGTERM);
     return NULL;
 }
 
@@ -435,14 +469,13 @@ static void test_signals(void **state)
     struct sigaction action = {.sa_handler = on_term, .sa_flags = SA_RESTART}, saved, after;
     sigaddset(&action.sa_mask, SIGUSR1);
     sigaction(SIGTERM, &action, &saved);
-    main_thread = pthread_self();
     grid t;
     grid_init(&t, 150, 150, 9, 2);
     for (int us = 0; us <= 40000; us += 4000) {
         n_terms = 0;
         pthread_t killer;
         int *part = labels(&t, -1);
-        pthread_create(&killer, NULL, terminate_main, &us);
+        pthread_create(&killer, NULL, terminate, &us);
         bt_cut_quality q;
         bt_cut(&t.g, 64, 0.03, part, &q);
         pthread_join(killer, NULL);
@@ -464,10 +497,19 @@ static void test_signals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_measure),         cmocka_unit_test(test_grid),    cmocka_unit_test(test_few_tiles_a_part),
-        cmocka_unit_test(test_groups),          cmocka_unit_test(test_one_heavy), cmocka_unit_test(test_weights),
-        cmocka_unit_test(test_disconnected),    cmocka_unit_test(test_few_vertices), cmocka_unit_test(test_bisection),
-        cmocka_unit_test(test_labels_stay),     cmocka_unit_test(test_moving_spot), cmocka_unit_test(test_signals),
+        cmocka_unit_test(test_measure),
+        cmocka_unit_test(test_grid),
+        cmocka_unit_test(test_few_tiles_a_part),
+        cmocka_unit_test(test_group_edges),
+        cmocka_unit_test(test_groups),
+        cmocka_unit_test(test_one_heavy),
+        cmocka_unit_test(test_weights),
+        cmocka_unit_test(test_disconnected),
+        cmocka_unit_test(test_few_vertices),
+        cmocka_unit_test(test_bisection),
+        cmocka_unit_test(test_labels_stay),
+        cmocka_unit_test(test_moving_spot),
+        cmocka_unit_test(test_signals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
