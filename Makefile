@@ -14,7 +14,7 @@ HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
 
 # -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler.
-BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -MMD -MP -ffp-contract=off -fno-math-errno \
+BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -Ipartition -MMD -MP -ffp-contract=off -fno-math-errno \
           -Wall -Wextra -Wpedantic -Wshadow $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
@@ -26,7 +26,7 @@ ifeq ($(filter $(CONFIG),release debug asan),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug or asan)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lm
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lmetis -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -82,7 +82,7 @@ tests: $(TEST_BIN) ## build the test programs
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev \
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-pytest ffmpeg
 

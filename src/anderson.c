@@ -1,28 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Anderson acceleration (Anderson 1965, J. ACM 12; Walker & Ni 2011, SIAM J. Numer. Anal. 49, type II).
-//
-//     f_k = g(x_k) − x_k,   γ = argmin |f_k − ΔF γ|,   x_{k+1} = g(x_k) − ΔG γ
-// with the last m differences of f and g as columns of ΔF and ΔG. On a linear problem this is GMRES on
-// the fixed-point map, whether or not that map is symmetric (a Gauss–Seidel sweep is not; conjugate gradients around
-// it need 10 to 100 times the sweeps on long chains and on heavy bodies, see heavy_body_squeezes_a_row in tests/physics).
-//
-// The contact problem is only piecewise smooth, so: when |f|² has grown tenfold over its best, the columns
-// describe another piece and are dropped; when it has grown a million-fold, x also goes back to the best g. A γ beyond
-// 10⁶ (columns nearly dependent) drops the columns as well. And where |f| has not halved in 150 iterations, extrapolation may undo
-// what sweeps achieve, for ever (seen: two points of an edge, one of them about to let go, which plain sweeps settle in 300): a
-// long rest follows, 150, 300, 600... sweeps. After each drop a few sweeps stay plain, 0, 1, 3, 7, 15.
-//
-// Order-free sums: the scalar products steer the solver, so they must have the same bits in any order of
-// summation. Each term is first rounded to a multiple of one quantum, chosen from bounds (max-norms, order-free
-// themselves) such that every partial sum is exact in double precision: adding C = 1.5·2^p and taking it away again
-// rounds to a multiple of 2^(p−52), and sums below 2^p of such multiples are exact. Relative to n times the
-// largest term the rounding is 2⁻⁵². This vectorises; a 128-bit accumulator costs as much as the sweep itself.
+// Anderson acceleration over the tiles; method and reasons in anderson.h.
 #include "anderson.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#define DEPTH BT_ANDERSON_DEPTH
 #define DROP_COLUMNS 10.0
 #define MAX_REST 15
 #define GO_BACK 1e12
@@ -30,61 +14,110 @@
 #define MAX_GAMMA 1e6
 #define RIDGE 1e-11 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
 
-void bt_anderson_start(bt_anderson *a, size_t n)
+enum { UNIT_ARRAYS = 2 + 2 * DEPTH, BODY_ARRAYS = 1 + DEPTH }; // f, g before, ΔG, ΔF; v before, ΔV
+
+void bt_anderson_start(bt_anderson *a, double energy)
 {
-    if (n > a->cap) {
-        a->cap = n + n / 4;
-        double **arrays[] = {&a->g, &a->f, &a->g_before, &a->f_before, &a->move, &a->best_g};
-        for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) *arrays[k] = bt_realloc(*arrays[k], a->cap, sizeof(double));
-        for (int j = 0; j < BT_ANDERSON_DEPTH; j++) {
-            a->df[j] = bt_realloc(a->df[j], a->cap, sizeof(double));
-            a->dg[j] = bt_realloc(a->dg[j], a->cap, sizeof(double));
+    *a = (bt_anderson){.best = INFINITY, .mark = INFINITY, .before = INFINITY, .long_rest = STALL};
+    // Quantum 2⁻⁶⁴ of the sums: 10⁻¹⁰ of the energy at convergence, so that 10²⁷ times that energy still fits.
+    a->scale = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
+}
+
+int bt_anderson_begin(bt_anderson *a)
+{
+    a->recording = a->rest == 0;
+    a->has_column = a->recording && a->started;
+    a->column = a->head;
+    return a->has_column ? 1 + 2 * DEPTH : 1;
+}
+
+void bt_anderson_reserve(bt_tile *tile, bool units)
+{
+    const bt_idx n_bodies = tile->end - tile->first;
+    if (n_bodies > tile->cap_body_history) {
+        tile->cap_body_history = n_bodies;
+        tile->body_history = bt_realloc(tile->body_history, 3 * BODY_ARRAYS * (size_t)n_bodies, sizeof(double));
+    }
+    if (units && tile->n_units > tile->cap_unit_history) {
+        tile->cap_unit_history = tile->n_units + tile->n_units / 4;
+        free(tile->unit_history);
+        tile->unit_history = bt_realloc(NULL, 3 * UNIT_ARRAYS * (size_t)tile->cap_unit_history, sizeof(double));
+    }
+}
+
+/// Arrays of a tile's unit history.
+typedef struct {
+    double *f, *g, *dg[DEPTH], *df[DEPTH];
+} history;
+
+static history history_of(const bt_tile *tile)
+{
+    const size_t n = 3 * (size_t)tile->cap_unit_history;
+    history h = {tile->unit_history, tile->unit_history + n, {0}, {0}};
+    for (int j = 0; j < DEPTH; j++) {
+        h.dg[j] = tile->unit_history + (size_t)(2 + j) * n;
+        h.df[j] = tile->unit_history + (size_t)(2 + DEPTH + j) * n;
+    }
+    return h;
+}
+
+static void add(const bt_anderson *a, bt_totals *t, int k, double x) { bt_sum_add(&t->sum[k], x * a->scale); }
+
+static int columns(const bt_anderson *a) { return a->depth < DEPTH ? a->depth + 1 : DEPTH; }
+
+void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, const double *x, bt_totals *t)
+{
+    const history h = history_of(tile);
+    double norm = 0, gram[DEPTH] = {0}, right[DEPTH] = {0};
+    const int n_columns = a->has_column ? columns(a) : 0;
+    for (bt_idx i = 0; i < tile->n_units; i++) {
+        const bt_unit *u = &tile->units[i];
+        const double g[3] = {u->ln[0], u->ln[1], u->lt}, weight[3] = {u->w[0], u->w[1], u->wt};
+        for (int c = 0; c < 3; c++) {
+            const size_t k = 3 * (size_t)i + (size_t)c;
+            const double f = g[c] - x[k];
+            norm += weight[c] * f * f;
+            if (!a->recording) continue;
+            if (a->has_column) {
+                const double df = f - h.f[k];
+                h.df[a->column][k] = df;
+                h.dg[a->column][k] = g[c] - h.g[k];
+                for (int j = 0; j < n_columns; j++) {
+                    const double wd = weight[c] * h.df[j][k];
+                    gram[j] += wd * df;
+                    right[j] += wd * f;
+                }
+            }
+            h.f[k] = f;
+            h.g[k] = g[c];
         }
     }
-    a->n = n;
-    a->depth = a->head = 0;
-    a->rest = a->next_rest = 0;
-    a->started = false;
-    a->best = a->mark = INFINITY;
-    a->stalled = 0;
-    a->long_rest = STALL;
-}
-
-void bt_anderson_free(bt_anderson *a)
-{
-    double *arrays[] = {a->g, a->f, a->g_before, a->f_before, a->move, a->best_g};
-    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
-    for (int j = 0; j < BT_ANDERSON_DEPTH; j++) {
-        free(a->df[j]);
-        free(a->dg[j]);
+    add(a, t, 0, norm);
+    for (int j = 0; j < n_columns; j++) {
+        add(a, t, 1 + j, gram[j]);
+        add(a, t, 1 + DEPTH + j, right[j]);
     }
 }
 
-static double max_norm(const double *x, size_t n)
+void bt_anderson_collect_scalar(const bt_anderson *a, bt_anderson_scalar *s, double x, double g, double weight, bt_totals *t)
 {
-    double m = 0;
-#pragma omp simd reduction(max : m)
-    for (size_t i = 0; i < n; i++) m = bt_max(m, fabs(x[i]));
-    return m;
-}
-
-/// Σ x y, order-free; bound_x, bound_y: max-norms.
-static double dot(const double *x, const double *y, size_t n, double bound_x, double bound_y)
-{
-    const double bound = (double)n * bound_x * bound_y;
-    if (!(bound > 0)) return 0;
-    const double c = 1.5 * exp2(ceil(log2(bound)) + 1);
-    double sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (size_t i = 0; i < n; i++) {
-        double t = x[i] * y[i] + c;
-        sum += t - c;
+    const double f = g - x;
+    add(a, t, 0, weight * f * f);
+    if (!a->recording) return;
+    if (a->has_column) {
+        s->df[a->column] = f - s->f_before;
+        s->dg[a->column] = g - s->g_before;
+        for (int j = 0; j < columns(a); j++) {
+            add(a, t, 1 + j, weight * s->df[j] * s->df[a->column]);
+            add(a, t, 1 + DEPTH + j, weight * s->df[j] * f);
+        }
     }
-    return sum;
+    s->f_before = f;
+    s->g_before = g;
 }
 
 /// Solve the m×m symmetric positive definite system A γ = b by Cholesky; false when it is not.
-static bool solve_spd(int m, double a[BT_ANDERSON_DEPTH][BT_ANDERSON_DEPTH], double *b)
+static bool solve_spd(int m, double a[DEPTH][DEPTH], double *b)
 {
     for (int i = 0; i < m; i++)
         for (int j = 0; j <= i; j++) {
@@ -108,83 +141,114 @@ static bool solve_spd(int m, double a[BT_ANDERSON_DEPTH][BT_ANDERSON_DEPTH], dou
     return true;
 }
 
-static void add_column(bt_anderson *a)
-{
-    const int h = a->head;
-    double *df = a->df[h], *dg = a->dg[h];
-    for (size_t i = 0; i < a->n; i++) {
-        df[i] = a->f[i] - a->f_before[i];
-        dg[i] = a->g[i] - a->g_before[i];
-    }
-    a->largest_df[h] = max_norm(df, a->n);
-    a->head = (h + 1) % BT_ANDERSON_DEPTH;
-    if (a->depth < BT_ANDERSON_DEPTH) a->depth++;
-    for (int j = 0; j < a->depth; j++)
-        a->gram[h][j] = a->gram[j][h] = dot(df, a->df[j], a->n, a->largest_df[h], a->largest_df[j]);
-}
-
 /// Forget the columns and leave the next sweeps plain, twice as many each time: the plain sweep always gets there.
 static void drop(bt_anderson *a)
 {
     a->depth = a->head = 0;
-    a->started = false;
     a->rest = a->next_rest;
     a->next_rest = a->next_rest < MAX_REST ? 2 * a->next_rest + 1 : MAX_REST;
+    a->started = a->recording && a->rest == 0; // this iteration is then the first of the next history
 }
 
-bool bt_anderson_advance(bt_anderson *a)
+bt_anderson_verdict bt_anderson_decide(bt_anderson *a, const bt_totals *t)
 {
-    const size_t n = a->n;
-    const double largest_f = max_norm(a->f, n), norm = dot(a->f, a->f, n, largest_f, largest_f);
-    if (norm > GO_BACK * a->best || !isfinite(norm)) {
-        for (size_t i = 0; i < n; i++) a->move[i] = a->best_g[i] - a->g[i];
+    const double norm = bt_sum_value(&t->sum[0]);
+    const bool plain = a->rest > 0;
+    if (a->has_column && (!isfinite(norm) || norm > GO_BACK * a->before)) {
         drop(a);
-        return true;
+        a->started = false;
+        return BT_ANDERSON_BACK;
     }
+    a->before = norm;
+    bool dropped = false;
     if (norm > DROP_COLUMNS * a->best) {
         drop(a);
+        dropped = true;
         a->best = norm; // the measure from here on: another piece of the problem
     }
-    if (norm <= a->best) {
-        a->best = norm;
-        memcpy(a->best_g, a->g, n * sizeof *a->g);
-    }
+    a->best = bt_min(a->best, norm);
     if (norm < 0.25 * a->mark) {
         a->mark = norm;
         a->stalled = 0;
-    } else if (a->rest == 0 && ++a->stalled > STALL) {
+    } else if (!plain && ++a->stalled > STALL) {
         drop(a);
+        dropped = true;
+        a->started = false;
         a->rest = a->long_rest;
         a->long_rest *= 2;
         a->mark = norm;
         a->stalled = 0;
     }
-    if (a->rest > 0) {
+    if (plain) {
         a->rest--;
-        return false;
+        return BT_ANDERSON_STAY;
     }
-    if (a->started) add_column(a);
-    memcpy(a->f_before, a->f, n * sizeof *a->f);
-    memcpy(a->g_before, a->g, n * sizeof *a->g);
-    a->started = true;
-    if (a->depth == 0) return false;
-
-    double matrix[BT_ANDERSON_DEPTH][BT_ANDERSON_DEPTH], gamma[BT_ANDERSON_DEPTH];
+    if (dropped) return BT_ANDERSON_STAY;
+    if (!a->has_column) {
+        a->started = true;
+        return BT_ANDERSON_STAY;
+    }
+    a->depth = columns(a);
+    a->head = (a->column + 1) % DEPTH;
+    double matrix[DEPTH][DEPTH];
+    for (int j = 0; j < a->depth; j++) a->gram[a->column][j] = a->gram[j][a->column] = bt_sum_value(&t->sum[1 + j]);
     for (int i = 0; i < a->depth; i++) {
         for (int j = 0; j < a->depth; j++) matrix[i][j] = a->gram[i][j];
         matrix[i][i] *= 1 + RIDGE;
-        gamma[i] = dot(a->df[i], a->f, n, a->largest_df[i], largest_f);
+        a->gamma[i] = bt_sum_value(&t->sum[1 + DEPTH + i]);
     }
-    bool usable = solve_spd(a->depth, matrix, gamma);
-    for (int i = 0; usable && i < a->depth; i++) usable = fabs(gamma[i]) < MAX_GAMMA;
-    if (!usable) {
-        drop(a);
-        return false;
+    bool usable = solve_spd(a->depth, matrix, a->gamma);
+    for (int i = 0; usable && i < a->depth; i++) usable = fabs(a->gamma[i]) < MAX_GAMMA;
+    if (usable) return BT_ANDERSON_MOVE;
+    drop(a);
+    return BT_ANDERSON_STAY;
+}
+
+void bt_anderson_move_units(const bt_anderson *a, bt_anderson_verdict v, bt_tile *tile)
+{
+    const history h = history_of(tile);
+    for (bt_idx i = 0; i < tile->n_units; i++) {
+        double move[3] = {0, 0, 0};
+        for (int c = 0; c < 3; c++) {
+            const size_t k = 3 * (size_t)i + (size_t)c;
+            if (v == BT_ANDERSON_BACK) move[c] = h.dg[a->column][k];
+            else
+                for (int j = 0; j < a->depth; j++) move[c] += a->gamma[j] * h.dg[j][k];
+        }
+        bt_unit *u = &tile->units[i];
+        u->ln[0] -= move[0];
+        u->ln[1] -= move[1];
+        u->lt -= move[2];
     }
-    memset(a->move, 0, n * sizeof *a->move);
-    for (int j = 0; j < a->depth; j++) {
-        const double *dg = a->dg[j];
-        for (size_t i = 0; i < n; i++) a->move[i] -= gamma[j] * dg[i];
+}
+
+double bt_anderson_moved(const bt_anderson *a, bt_anderson_verdict v, const bt_anderson_scalar *s, double g)
+{
+    if (v == BT_ANDERSON_BACK) return g - s->dg[a->column];
+    double move = 0;
+    for (int j = 0; j < a->depth; j++) move += a->gamma[j] * s->dg[j];
+    return g - move;
+}
+
+void bt_anderson_move_bodies(const bt_anderson *a, bt_anderson_verdict v, bt_tile *tile, bt_vel *vel, const bt_inv *inv)
+{
+    const size_t n = 3 * (size_t)tile->cap_body_history;
+    double *before = tile->body_history, *dv[DEPTH];
+    for (int j = 0; j < DEPTH; j++) dv[j] = tile->body_history + (size_t)(1 + j) * n;
+    for (bt_idx i = tile->first; i < tile->end; i++) {
+        if (!(inv[i].m > 0)) continue;
+        const size_t k = 3 * (size_t)(i - tile->first);
+        double x[3] = {vel[i].x, vel[i].y, vel[i].w};
+        for (size_t c = 0; c < 3; c++) {
+            const double now = x[c];
+            if (a->has_column) dv[a->column][k + c] = now - before[k + c];
+            before[k + c] = now;
+            double move = 0;
+            if (v == BT_ANDERSON_BACK) move = dv[a->column][k + c];
+            else if (v == BT_ANDERSON_MOVE)
+                for (int j = 0; j < a->depth; j++) move += a->gamma[j] * dv[j][k + c];
+            x[c] = now - move;
+        }
+        vel[i].x = x[0], vel[i].y = x[1], vel[i].w = x[2];
     }
-    return true;
 }

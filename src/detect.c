@@ -1,84 +1,226 @@
 // SPDX-License-Identifier: MIT
-// Contact detection of one step: pair list, narrow phase where needed, manifolds with last step's impulses.
+// Contact detection of one step: which tiles are active, their margins, narrow phase, units with last step's impulses.
 #include <math.h>
+#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/tiles.h"
+#include "bergtow/tow.h"
+#include "domain.h"
+#include "pack.h"
 #include "pairs.h"
 
-bt_contacts *bt_contacts_create(void) { return bt_alloc(1, sizeof(bt_contacts)); }
+enum { FEW_TILES = 24 }; // fewer are done by one thread: a team costs microseconds
 
-void bt_contacts_free(bt_contacts *c)
+double bt_contacts_margin(const bt_world *w, double s)
 {
-    if (!c) return;
-    void *arrays[] = {c->pairs,     c->man,     c->man_before, c->path_built, c->pairs_before, c->cell_start,
-                      c->cell_item, c->cell_of, c->large_head, c->large_next, c->large_item,   c->box};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
-    free(c);
-}
-
-double bt_contacts_margin(const bt_world *w, const bt_vel *v)
-{
-    const bt_bodies *b = &w->bodies;
-    double fastest = 0;
-    for (bt_idx i = 0; i < b->n; i++)
-        fastest = bt_max(fastest, sqrt(v[i].x * v[i].x + v[i].y * v[i].y) + b->radius[i] * fabs(v[i].w));
-    const double least = 2 * w->par.dt * fastest;
+    const double least = 2 * w->par.dt * s;
     if (!(least > w->par.slop)) return w->par.slop;
     return exp2(0.5 * ceil(2 * log2(least)));
 }
 
-static bt_manifold *next_manifold(bt_contacts *c)
+/// Speed of the fastest point of body i through the water's frame, m/s.
+static double speed_of(const bt_world *w, bt_idx i, const bt_vel *v)
 {
-    if (c->n_man == c->cap_man) {
-        c->cap_man = c->cap_man ? c->cap_man + c->cap_man / 2 : 1024;
-        c->man = bt_realloc(c->man, (size_t)c->cap_man, sizeof *c->man);
-    }
-    return &c->man[c->n_man];
+    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
+    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
 }
 
-static void inherit_impulses(bt_manifold *m, const bt_manifold *before)
+/// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1; the bodies of those
+/// blocks, up to t + 2, may then be set in motion.
+static void raise(bt_tiles *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
-    for (int i = 0; i < m->n_points; i++)
-        for (int j = 0; j < before->n_points; j++)
-            if (before->p[j].feature == m->p[i].feature) {
-                m->p[i].ln = before->p[j].ln;
-                m->p[i].lt = before->p[j].lt;
-            }
+    for (int32_t y = y0 - 2; y <= y1 + 2; y++)
+        for (int32_t x = x0 - 2; x <= x1 + 2; x++) {
+            const bt_idx k = bt_tiles_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
+            if (k < 0) continue;
+            t->awake[k] = 1;
+            if ((x <= x1 + 1 || t->wrap_x == 1) && (y <= y1 + 1 || t->wrap_y == 1)) t->bound[k] = bt_max(t->bound[k], s);
+        }
 }
 
-void bt_contacts_detect(bt_world *w, double margin)
+void bt_contacts_spread(bt_tiles *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
+
+/// What a large body that moves, or can be moved, asks of the tiles under it and beside it.
+static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
 {
-    bt_contacts *c = w->contacts;
+    bt_tiles *t = w->tiles;
     const bt_bodies *b = &w->bodies;
-    c->margin = margin;
-    bt_pairs_update(w, margin);
+    double fastest = 0;
+    bool movable = false;
+    for (bt_idx l = t->n_tiled; l < b->n; l++) {
+        double s = bt_max(speed_of(w, l, &v[l]), speed_of(w, l, &v2[l]));
+        if (b->stirred[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
+        movable = movable || b->motion[l] == BT_DYNAMIC;
+        if (s == 0) continue;
+        fastest = bt_max(fastest, s);
+        const bt_tile_range r = bt_pairs_range(w, l, bt_contacts_margin(w, s) + t->reach + t->allowance);
+        raise(t, r.x0, r.x1, r.y0, r.y1, s);
+    }
+    return movable ? fastest : 0;
+}
 
-    bt_manifold *swap = c->man_before;
-    bt_idx cap = c->cap_man_before;
-    c->man_before = c->man, c->n_man_before = c->n_man, c->cap_man_before = c->cap_man;
-    c->man = swap, c->cap_man = cap, c->n_man = 0;
-    c->n_points = 0;
-    c->overlap = 0;
-    for (bt_idx k = 0; k < c->n_pairs; k++) {
-        bt_pair *p = &c->pairs[k];
-        double paths = b->path[p->a] + b->path[p->b], gap;
-        if (paths + margin < p->reach) {
-            p->man = -1;
+double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep)
+{
+    bt_tiles *t = w->tiles;
+    const bt_bodies *b = &w->bodies;
+    const double stir = 0.5 * w->par.slop / w->par.dt;
+    const bt_idx n = t->n - 1;
+    if (!keep) {
+        memset(t->bound, 0, (size_t)t->n * sizeof *t->bound);
+        memset(t->awake, 0, (size_t)t->n * sizeof *t->awake);
+    }
+#pragma omp parallel for schedule(static) if (n > FEW_TILES)
+    for (bt_idx k = 0; k < n; k++) {
+        double s = 0;
+        for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
+            s = bt_max(s, bt_max(speed_of(w, i, &v[i]), speed_of(w, i, &v2[i])));
+            if (b->stirred[i]) s = bt_max(s, stir);
+        }
+        t->speed[k] = s;
+    }
+    double fastest = 0;
+    for (bt_idx k = 0; k < n; k++)
+        if (t->speed[k] > 0 && t->tile[k].own) {
+            fastest = bt_max(fastest, t->speed[k]);
+            bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
+        }
+    bt_domain_share_speeds(w);
+    const double large = spread_large(w, v, v2);
+    // The last tile meets floes anywhere: it is made for the fastest of them all.
+    bool movable = false;
+    for (bt_idx l = t->n_tiled; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
+    fastest = bt_max(fastest, large);
+    bt_domain_maxima(w, &fastest, 1);
+    if (movable) t->bound[n] = bt_max(t->bound[n], fastest);
+    return fastest;
+}
+
+bool bt_contacts_outrun(const bt_world *w)
+{
+    const bt_tiles *t = w->tiles;
+    double any = 0;
+    for (bt_idx k = 0; k < t->n && any == 0; k++) {
+        const bt_tile *tile = &t->tile[k];
+        any = tile->own && t->bound[k] > 0 && (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin);
+    }
+    bt_domain_maxima(w, &any, 1);
+    return any > 0;
+}
+
+typedef struct {
+    bt_pair_scratch pairs;
+    bt_pack_scratch pack;
+} thread_scratch;
+
+static void go_idle(bt_tile *t)
+{
+    free(t->pairs);
+    t->pairs = NULL;
+    t->n_pairs = t->cap_pairs = t->n_units = 0;
+    t->n_points = 0;
+    t->listed = false;
+    t->overlap = 0;
+}
+
+static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_tile *t = &w->tiles->tile[k];
+    bt_pairs_update(w, k, t->margin, &s->pairs);
+    bt_pack_begin(&s->pack, (size_t)t->n_pairs);
+    t->n_points = 0;
+    t->overlap = 0;
+    for (bt_idx i = 0; i < t->n_pairs; i++) {
+        bt_pair *p = &t->pairs[i];
+        const double paths = b->path[p->a] + b->path[p->b];
+        if (paths + t->margin < p->reach) {
+            p->n_points = 0;
             continue;
         }
-        const bt_manifold *before = p->man >= 0 ? &c->man_before[p->man] : NULL;
-        bt_manifold *m = next_manifold(c);
-        bool near = bt_contacts_pair(w, p->a, p->b, margin, before, m, &gap, &p->axis);
+        double gap;
+        bt_manifold *m = bt_pack_next(&s->pack, i);
+        const bool touch = bt_contacts_pair(w, p->a, p->b, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
         p->reach = gap + paths;
-        p->man = -1;
-        if (!near) continue;
-        if (before) inherit_impulses(m, before);
-        p->man = c->n_man++;
-        c->n_points += m->n_points;
-        for (int i = 0; i < m->n_points; i++) c->overlap = bt_max(c->overlap, -m->p[i].gap);
+        if (!touch) {
+            p->n_points = 0;
+            continue;
+        }
+        bt_pack_keep(&s->pack);
+        t->n_points += m->n_points;
+        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, -m->p[j].gap);
     }
+    bt_pack_units(w, k, &s->pack);
+}
+
+/// Tiles in the order of the sweep: by phase, and in a phase those whose results other ranks wait for first.
+static void order_tiles(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    bt_idx n = 0;
+    t->n_units = 0;
+    for (int phase = 0; phase < BT_PHASES; phase++) {
+        t->phase_start[phase] = n;
+        for (int inner = 0; inner < 2; inner++) {
+            if (inner) t->phase_inner[phase] = n;
+            for (bt_idx k = 0; k < t->n; k++) {
+                const bt_tile *tile = &t->tile[k];
+                const bool line = k == t->n - 1 && w->tow && w->tow->mode == BT_TOW_LINE;
+                if (!tile->own || tile->phase != phase || (tile->n_units == 0 && !line) || tile->border == inner) continue;
+                t->phase_tile[n++] = k;
+                t->n_units += tile->n_units;
+            }
+        }
+    }
+    t->phase_start[BT_PHASES] = n;
+}
+
+static void detect(bt_world *w, bool again)
+{
+    bt_tiles *t = w->tiles;
+    bt_idx *due = bt_alloc((size_t)t->n, sizeof *due), n_due = 0;
+    for (bt_idx k = 0; k < t->n; k++) {
+        bt_tile *tile = &t->tile[k];
+        if (!tile->own) continue;
+        const bool active = t->bound[k] > 0;
+        if (!active) {
+            if (tile->pairs || tile->n_units) go_idle(tile);
+            tile->active = false;
+            continue;
+        }
+        const double margin = bt_contacts_margin(w, t->bound[k]);
+        if (again && tile->active && margin <= tile->margin) continue;
+        tile->active = true;
+        tile->margin = margin;
+        due[n_due++] = k;
+    }
+#pragma omp parallel if (n_due > FEW_TILES)
+    {
+        thread_scratch s = {0};
+#pragma omp for schedule(dynamic, 4)
+        for (bt_idx i = 0; i < n_due; i++) narrow_phase(w, due[i], &s);
+        bt_pair_scratch_free(&s.pairs);
+        bt_pack_scratch_free(&s.pack);
+    }
+    free(due);
+    order_tiles(w);
+    bt_domain_select(w);
+}
+
+void bt_contacts_detect(bt_world *w, bool again) { detect(w, again); }
+
+void bt_contacts_detect_all(bt_world *w, double margin)
+{
+    bt_tiles_begin(w);
+    bt_tiles_update(w, margin);
+    // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
+    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
+    bool movable = false;
+    for (bt_idx l = w->tiles->n_tiled; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
+    if (!movable) w->tiles->bound[w->tiles->n - 1] = 0;
+    detect(w, false);
 }
 
 void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man)
@@ -87,28 +229,22 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
     bt_idx cap = 64;
     *man = bt_alloc((size_t)cap, sizeof **man);
     *n_man = 0;
-    for (bt_idx i = 0; i < b->n; i++)
-        for (bt_idx j = i + 1; j < b->n; j++) {
+    for (bt_gid g = 0; g < b->n_global; g++)
+        for (bt_gid h = g + 1; h < b->n_global; h++) {
+            const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
             if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) continue;
             if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
             double gap;
             int32_t axis = -1;
-            if (bt_contacts_pair(w, i, j, margin, NULL, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+            if (bt_contacts_pair(w, i, j, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
         }
 }
 
 double bt_world_overlap(bt_world *w)
 {
-    bt_contacts *c = w->contacts;
-    bt_pairs_update(w, bt_max(c->margin, w->par.slop));
+    bt_contacts_detect_all(w, w->par.slop);
     double deepest = 0;
-    for (bt_idx k = 0; k < c->n_pairs; k++) {
-        const bt_pair *p = &c->pairs[k];
-        bt_manifold m;
-        double gap;
-        int32_t axis = p->axis;
-        if (!bt_contacts_pair(w, p->a, p->b, 0, NULL, &m, &gap, &axis)) continue;
-        for (int i = 0; i < m.n_points; i++) deepest = bt_max(deepest, -m.p[i].gap);
-    }
+    for (bt_idx k = 0; k < w->tiles->n; k++) deepest = bt_max(deepest, w->tiles->tile[k].overlap);
+    bt_domain_maxima(w, &deepest, 1);
     return deepest;
 }

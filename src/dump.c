@@ -15,8 +15,24 @@ typedef struct {
     int side;        ///< −1: the body is a, +1: it is b
 } touch;
 
+/// One contact point.
+typedef struct {
+    bt_gid gid_a, gid_b;
+    int point;
+    bt_idx a, b;
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt;
+} row;
+
+static int by_gids(const void *p, const void *q)
+{
+    const row *a = p, *b = q;
+    if (a->gid_a != b->gid_a) return a->gid_a < b->gid_a ? -1 : 1;
+    if (a->gid_b != b->gid_b) return a->gid_b < b->gid_b ? -1 : 1;
+    return (a->point > b->point) - (a->point < b->point);
+}
+
 /// Inverse-mass product of two rows' directions at the shared body: [n n', n t'; t n', t t'].
-static void couple(const bt_row *r, int sr, const bt_row *q, int sq, bt_inv inv, double out[4])
+static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, double out[4])
 {
     const double rn = sr > 0 ? r->rbn : r->ran, rt = sr > 0 ? r->rbt : r->rat;
     const double qn = sq > 0 ? q->rbn : q->ran, qt = sq > 0 ? q->rbt : q->rat;
@@ -27,6 +43,27 @@ static void couple(const bt_row *r, int sr, const bt_row *q, int sq, bt_inv inv,
     out[3] += s * (inv.m * c + inv.i * rt * qt);  // t·t'
 }
 
+/// Normal and tangential row of every contact point, in the order of the gids.
+static row *rows_of(const bt_world *w, int *n)
+{
+    const bt_tiles *ts = w->tiles;
+    int64_t most = 0;
+    for (bt_idx k = 0; k < ts->n; k++) most += ts->tile[k].n_points;
+    row *rows = bt_alloc((size_t)most, sizeof *rows);
+    *n = 0;
+    for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
+            const bt_unit *u = &ts->tile[k].units[j];
+            const double total = u->ln[0] + u->ln[1];
+            for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
+                rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = i, .a = u->a, .b = u->b, .nx = u->nx,
+                                     .ny = u->ny, .ran = u->ran[i], .rbn = u->rbn[i], .rat = u->rat, .rbt = u->rbt, .bias = u->bias[i],
+                                     .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0};
+        }
+    if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
+    return rows;
+}
+
 static int by_contact(const void *a, const void *b)
 {
     const touch *p = a, *q = b;
@@ -35,32 +72,28 @@ static int by_contact(const void *a, const void *b)
 
 bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
 {
-    const bt_solver *s = w->solver;
-    const bt_contacts *c = w->contacts;
     const bt_bodies *b = &w->bodies;
-    const int n = (int)c->n_points;
-    const bt_row **row = bt_alloc((size_t)n, sizeof *row);
-    for (int k = 0, m = 0; m < c->n_man; m++)
-        for (int i = 0; i < c->man[m].n_points; i++) row[k++] = &s->rows[s->row_of[m] + i];
+    int n;
+    row *rows = rows_of(w, &n);
 
     // Which contacts touch each movable body.
     int64_t *first = bt_alloc((size_t)b->n + 1, sizeof *first);
     for (int k = 0; k < n; k++) {
-        if (b->inv[row[k]->a].m > 0) first[row[k]->a + 1]++;
-        if (b->inv[row[k]->b].m > 0) first[row[k]->b + 1]++;
+        if (b->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
+        if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
     }
     for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
     touch *at = bt_alloc((size_t)first[b->n], sizeof *at);
     int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
     for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
     for (int k = 0; k < n; k++) {
-        if (b->inv[row[k]->a].m > 0) at[next[row[k]->a]++] = (touch){k, -1};
-        if (b->inv[row[k]->b].m > 0) at[next[row[k]->b]++] = (touch){k, 1};
+        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (touch){k, -1};
+        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (touch){k, 1};
     }
 
     int64_t most = 0;
     for (int k = 0; k < n; k++) {
-        const bt_idx ends[2] = {row[k]->a, row[k]->b};
+        const bt_idx ends[2] = {rows[k].a, rows[k].b};
         for (int e = 0; e < 2; e++) most += first[ends[e] + 1] - first[ends[e]];
     }
     int64_t *ptr = bt_alloc(2 * (size_t)n + 1, sizeof *ptr);
@@ -69,7 +102,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     double *q = bt_alloc(2 * (size_t)n, sizeof *q), *mu = bt_alloc((size_t)n, sizeof *mu);
     double *u = bt_alloc(2 * (size_t)n, sizeof *u), *r = bt_alloc(2 * (size_t)n, sizeof *r);
     for (int k = 0; k < n; k++) {
-        const bt_row *p = row[k];
+        const row *p = &rows[k];
         const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
         const double dx = vb->x - va->x, dy = vb->y - va->y;
         u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
@@ -82,7 +115,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     touch *near = NULL;
     size_t cap = 0;
     for (int k = 0; k < n; k++) {
-        const bt_row *p = row[k];
+        const row *p = &rows[k];
         size_t m = 0;
         const bt_idx ends[2] = {p->a, p->b};
         for (int e = 0; e < 2; e++) {
@@ -101,8 +134,8 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
             const int o = near[i].contact;
             double block[4] = {0};
             for (; i < m && near[i].contact == o; i++) {
-                const bt_idx body = near[i].side > 0 ? row[o]->b : row[o]->a;
-                couple(p, body == p->b ? 1 : -1, row[o], near[i].side, b->inv[body], block);
+                const bt_idx body = near[i].side > 0 ? rows[o].b : rows[o].a;
+                couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, b->inv[body], block);
             }
             for (int t = 0; t < 2; t++) {
                 col[e0] = col[e1] = 2 * o + t;
@@ -118,7 +151,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     }
     bt_status status = bt_fclib_write_local(path, n, ptr, col, val, q, mu, NULL, u, r, "bergtow",
                                             "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {row, first, at, next, ptr, col, val, q, mu, u, r, near};
+    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

@@ -19,7 +19,7 @@
 #include "rng.h"
 
 enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
-static const double LARGE = 4; // floes of more than this many mean diameters stay out of the contact grid, whose cells fit the rest
+static const double LARGE = 4; // floes of more than this many mean diameters are in no tile: tiles fit the rest
 
 static void add_static(bt_world *w, int n, double *v)
 {
@@ -110,7 +110,7 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         if (w->stats.kinetic_energy > 1.1 * energy) {
             double s = sqrt(energy / w->stats.kinetic_energy);
             for (bt_idx i = 0; i < f->n; i++) {
-                bt_vel *v = &w->bodies.vel[i];
+                bt_vel *v = &w->bodies.vel[bt_world_index(w, i)];
                 v->x *= s, v->y *= s, v->w *= s;
             }
         }
@@ -119,14 +119,14 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
     // position projection alone acts, and takes that out.
     w->par.position_sweeps = REST_SWEEPS;
     for (int k = 0; k < REST_STEPS; k++) {
-        for (bt_idx i = 0; i < f->n; i++) w->bodies.vel[i] = (bt_vel){0};
+        for (bt_idx i = 0; i < f->n; i++) w->bodies.vel[bt_world_index(w, i)] = (bt_vel){0};
         bt_world_step(w);
         if (w->stats.overlap <= 3 * par.slop) break;
     }
     omp_set_num_threads(threads);
     bt_status status = BT_OK;
     for (bt_idx i = 0; i < f->n; i++) {
-        const bt_pose *p = &w->bodies.pose[i];
+        const bt_pose *p = &w->bodies.pose[bt_world_index(w, i)];
         if (!isfinite(p->x) || !isfinite(p->y) || !isfinite(p->yaw)) {
             bt_errors_add(err, "%s: ice field: floe %lld left the numbers while the field was shaken; report this case with its seed, "
                           "and use ice.shake: 0 meanwhile", c->path ? c->path : "case", (long long)i);

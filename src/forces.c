@@ -4,6 +4,8 @@
 
 #include <math.h>
 
+#include "bergtow/tiles.h"
+
 /// Implicit drag: K = Σ k|U_ref−U| (kg/s), K·U_ref (N), and the yaw coefficient k|ω| (kg m²/s).
 typedef struct {
     double k, jx, jy, kw;
@@ -59,9 +61,11 @@ static void predict(bt_world *w, bt_idx i, double cos_f, double sin_f)
     u.x += dt * p->tilt_ax;
     u.y += dt * p->tilt_ay;
     const bt_inv inv = {1 / (m + dt * l.k), 1 / (inertia + dt * l.kw)};
-    u.x = (m * u.x + dt * l.jx) * inv.m;
-    u.y = (m * u.y + dt * l.jy) * inv.m;
-    u.w = inertia * u.w * inv.i;
+    if (l.k > 0) { // without drag exactly as it was: a floe that drifts with the water is at rest to the last bit
+        u.x = (m * u.x + dt * l.jx) * inv.m;
+        u.y = (m * u.y + dt * l.jy) * inv.m;
+    }
+    if (l.kw > 0) u.w = inertia * u.w * inv.i;
     b->inv[i] = inv;
     b->vel[i] = b->vel_free[i] = u;
 }
@@ -69,11 +73,16 @@ static void predict(bt_world *w, bt_idx i, double cos_f, double sin_f)
 void bt_forces_predict(bt_world *w)
 {
     bt_bodies *b = &w->bodies;
+    bt_tiles *t = w->tiles;
     const double turn = w->par.coriolis * w->par.dt, cos_f = cos(turn), sin_f = sin(turn);
-#pragma omp parallel for schedule(static) if (b->n > 2000)
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] == BT_DYNAMIC) predict(w, i, cos_f, sin_f);
-        else b->vel_free[i] = b->vel[i];
+#pragma omp parallel for schedule(dynamic, 16) if (b->n > 2000)
+    for (bt_idx k = 0; k < t->n; k++) {
+        if (t->rest[k] == BT_REST_KNOWN) continue;
+        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
+            if (b->motion[i] == BT_DYNAMIC) predict(w, i, cos_f, sin_f);
+            else b->vel_free[i] = b->vel[i];
+        }
+        if (t->rest[k]) t->rest[k] = BT_REST_KNOWN;
     }
 }
 

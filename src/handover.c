@@ -109,7 +109,7 @@ bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roste
     if (status == BT_OK) status = hand_over_vertices(c, b, &l, offsets, vertices, err);
     free_list(&l);
     *out = (bt_record_bodies){.n_floes = roster->n_floes, .n_bodies = b->n, .offsets = offsets, .vertices = vertices, .thickness = thickness,
-                              .area = area, .names = roster->names, .towed = w->towed};
+                              .area = area, .names = roster->names, .towed = (bt_idx)w->towed};
     if (status != BT_OK) bt_handover_free(out);
     return status;
 }
@@ -127,7 +127,7 @@ bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster
 {
     const bt_bodies *b = &w->bodies;
     double *force = bt_alloc((size_t)b->n, sizeof *force);
-    bt_observe_contact_force(w, roster->n_floes, force);
+    bt_observe_contact_force(w, force);
     list l = make_list(c, w, roster);
     bt_frame_row *rows = bt_alloc((size_t)l.n, sizeof *rows), *block = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {

@@ -16,7 +16,8 @@
 #include "bergtow/contacts.h"
 
 typedef struct {
-    const double *v, *n; ///< outline and edge normals, relative to the centroid
+    const double *v;     ///< outline, relative to the centroid
+    const double *per_length; ///< of the edges
     int count;
     double x, y;         ///< centroid in the frame of body a
 } polygon;
@@ -24,13 +25,22 @@ typedef struct {
 static polygon polygon_of(const bt_bodies *b, bt_idx i, double x, double y)
 {
     int64_t first = b->offset[i];
-    return (polygon){b->outline + 2 * first, b->normal + 2 * first, (int)(b->offset[i + 1] - first), x, y};
+    return (polygon){b->outline + 2 * first, b->per_length + first, (int)(b->offset[i + 1] - first), x, y};
+}
+
+/// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a floe's memory.
+static inline void edge_normal(const polygon *p, int i, double *nx, double *ny)
+{
+    const double *v = p->v + 2 * i, *next = p->v + 2 * (i + 1 < p->count ? i + 1 : 0);
+    *nx = (next[1] - v[1]) * p->per_length[i];
+    *ny = (v[0] - next[0]) * p->per_length[i];
 }
 
 /// Signed distance of q from edge i of p.
 static double edge_separation(const polygon *p, int i, const polygon *q)
 {
-    double nx = p->n[2 * i], ny = p->n[2 * i + 1];
+    double nx, ny;
+    edge_normal(p, i, &nx, &ny);
     double least = INFINITY;
     for (int j = 0; j < q->count; j++) least = bt_min(least, nx * q->v[2 * j] + ny * q->v[2 * j + 1]);
     return least + nx * (q->x - p->x - p->v[2 * i]) + ny * (q->y - p->y - p->v[2 * i + 1]);
@@ -106,7 +116,8 @@ static void set_point(bt_manifold *m, double x, double y, double gap, double dx,
 static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, double margin,
                         bt_manifold *m)
 {
-    const double nx = ref->n[2 * i], ny = ref->n[2 * i + 1];
+    double nx, ny;
+    edge_normal(ref, i, &nx, &ny);
     const double tx = -ny, ty = nx; // along the edge: outlines run anticlockwise
     double r[2], rn[2];
     world_vertex(ref, i, r);
@@ -116,7 +127,9 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     int facing = 0;
     double least = INFINITY;
     for (int j = 0; j < inc->count; j++) {
-        double d = nx * inc->n[2 * j] + ny * inc->n[2 * j + 1];
+        double jx, jy;
+        edge_normal(inc, j, &jx, &jy);
+        double d = nx * jx + ny * jy;
         if (d < least) {
             least = d;
             facing = j;
@@ -163,7 +176,8 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
 /// The deepest vertex of inc below reference edge i as the only point.
 static void deepest_point(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, bt_manifold *m)
 {
-    const double nx = ref->n[2 * i], ny = ref->n[2 * i + 1];
+    double nx, ny;
+    edge_normal(ref, i, &nx, &ny);
     double r[2], x[2], least = INFINITY;
     int deepest = 0;
     world_vertex(ref, i, r);
@@ -182,7 +196,7 @@ static void deepest_point(const polygon *ref, int i, const polygon *inc, bool fl
               ((uint32_t)flip << 31) | ((uint32_t)i << 20) | (uint32_t)deepest << 1);
 }
 
-bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, const bt_manifold *before, bt_manifold *m,
+bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
                       double *gap_out, int32_t *axis_out)
 {
     double d[2];
@@ -216,9 +230,12 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, cons
     // before, so that features, and with them impulses, persist. The tie is 1 % of the smaller floe's radius.
     const double tie = 0.01 * bt_min(w->bodies.radius[a], w->bodies.radius[b]);
     bool ref_b = sb > sa;
-    const bool square = pa.n[2 * ia] * pb.n[2 * ib] + pa.n[2 * ia + 1] * pb.n[2 * ib + 1] < -0.98;
-    if (square && before && fabs(sa - sb) < tie) ref_b = before->p[0].feature >> 31;
-    else if (square && !before && sb < sa + tie) ref_b = false;
+    double ax, ay, bx, by;
+    edge_normal(&pa, ia, &ax, &ay);
+    edge_normal(&pb, ib, &bx, &by);
+    const bool square = ax * bx + ay * by < -0.98;
+    if (square && reference_before >= 0 && fabs(sa - sb) < tie) ref_b = reference_before;
+    else if (square && reference_before < 0 && sb < sa + tie) ref_b = false;
     if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b; // apart by one of them: the tie must not feign overlap
     *gap_out = bt_max(sa, sb);
     *axis_out = ref_b ? pa.count + ib : ia;

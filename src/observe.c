@@ -13,54 +13,94 @@
 #include "bergtow/forces.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
+#include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "domain.h"
+#include "phases.h"
 
-/// Contact impulse on the towed body along (dx, dy) without using its rows.
-static double budget_impulse(const bt_world *w, double dx, double dy)
+enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
+
+/// One tile's share of the sums over contacts and floes.
+static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_idx t = w->towed;
-    if (b->motion[t] == BT_DYNAMIC) {
-        double jx = (b->vel[t].x - b->vel_free[t].x) / b->inv[t].m, jy = (b->vel[t].y - b->vel_free[t].y) / b->inv[t].m;
-        if (w->tow && w->tow->mode == BT_TOW_LINE) {
-            jx -= w->tow->lambda * w->tow->lx;
-            jy -= w->tow->lambda * w->tow->ly;
+    const bt_tile *tile = &w->tiles->tile[k];
+    const bt_idx towed = bt_world_towed(w);
+    const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
+    const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
+    for (bt_idx i = tile->first; i < tile->end; i++) {
+        if (b->motion[i] != BT_DYNAMIC || i == towed) continue;
+        const bt_vel *v = &b->vel[i];
+        if (v->x * v->x + v->y * v->y > slow2) bt_sum_add(&t->sum[MOVING], 1);
+        const double ux = v->x - b->vel_free[i].x, uy = v->y - b->vel_free[i].y;
+        if (prescribed && (ux != 0 || uy != 0)) bt_sum_add(&t->sum[BUDGET], -(ux * dx + uy * dy) / b->inv[i].m);
+    }
+    if (towed < 0) return;
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        const bt_unit *u = &tile->units[j];
+        const double normal = u->ln[0] + u->ln[1];
+        if (normal == 0) continue;
+        const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
+        if (u->a == towed || u->b == towed) {
+            const bool is_b = u->b == towed;
+            const double sign = is_b ? 1 : -1;
+            const double *arm = is_b ? u->rbn : u->ran;
+            bt_sum_add(&t->sum[ICE_X], sign * jx);
+            bt_sum_add(&t->sum[ICE_Y], sign * jy);
+            bt_sum_add(&t->sum[ICE_TURN], sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
+            bt_sum_add(&t->sum[TOUCHING], (u->ln[0] > 0) + (u->ln[1] > 0));
+        } else if (prescribed) { // impulses that came from the other bodies of infinite mass
+            const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
+            if (sign != 0) bt_sum_add(&t->sum[BUDGET], sign * (jx * dx + jy * dy));
         }
-        return jx * dx + jy * dy;
     }
-    bt_sum sum = {0};
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] != BT_DYNAMIC) continue;
-        double ux = b->vel[i].x - b->vel_free[i].x, uy = b->vel[i].y - b->vel_free[i].y;
-        if (ux == 0 && uy == 0) continue;
-        bt_sum_add(&sum, -(ux * dx + uy * dy) / b->inv[i].m);
-    }
-    const bt_solver *s = w->solver; // impulses that came from the other bodies of infinite mass
-    for (bt_idx k = 0; k < s->n_rows; k++) {
-        const bt_row *r = &s->rows[k];
-        if (r->ln == 0) continue;
-        bt_idx fixed = b->inv[r->b].m == 0 ? r->b : r->a;
-        if (b->inv[fixed].m != 0 || fixed == t) continue;
-        double jx = r->ln * r->nx - r->lt * r->ny, jy = r->ln * r->ny + r->lt * r->nx;
-        bt_sum_add(&sum, (fixed == r->b ? -1 : 1) * (jx * dx + jy * dy));
-    }
-    return bt_sum_value(&sum);
 }
 
-static void observe_body(const bt_world *w, bt_sample *s)
+static bt_totals observe_tiles(const bt_world *w, double slow2)
+{
+    const bt_tiles *ts = w->tiles;
+    bt_totals all = {.n_sums = N_SEEN};
+#pragma omp parallel if (w->bodies.n > 2000)
+    {
+        bt_totals t = {.n_sums = N_SEEN};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx k = 0; k < ts->n; k++)
+            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || ts->tile[k].n_units > 0 || !ts->still)) observe_tile(w, k, slow2, &t);
+#pragma omp critical
+        bt_totals_merge(&all, &t);
+    }
+    bt_domain_reduce(w, &all);
+    return all;
+}
+
+/// Contact impulse on the towed body along (dx, dy) without using its rows.
+static double budget_impulse(const bt_world *w, const bt_totals *seen, double dx, double dy)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_idx t = w->towed;
+    const bt_idx t = bt_world_towed(w);
+    if (b->motion[t] != BT_DYNAMIC) return bt_sum_value(&seen->sum[BUDGET]);
+    double jx = (b->vel[t].x - b->vel_free[t].x) / b->inv[t].m, jy = (b->vel[t].y - b->vel_free[t].y) / b->inv[t].m;
+    if (w->tow && w->tow->mode == BT_TOW_LINE) {
+        jx -= w->tow->lambda * w->tow->lx;
+        jy -= w->tow->lambda * w->tow->ly;
+    }
+    return jx * dx + jy * dy;
+}
+
+static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_idx t = bt_world_towed(w);
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
-    double ice[3], external[3];
-    bt_solver_impulse_on(w, t, ice);
+    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
+    double external[3];
     bt_forces_impulse(w, t, external);
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
     s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
-    s->ice_resistance_budget = -budget_impulse(w, dx, dy) / dt;
+    s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
     s->drag_force = -(external[0] * dx + external[1] * dy) / dt;
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
@@ -80,20 +120,20 @@ static void observe_body(const bt_world *w, bt_sample *s)
     } else {
         s->tow_force = 0;
     }
-    const bt_solver *sv = w->solver;
-    for (bt_idx k = 0; k < sv->n_rows; k++) s->contacts_body += sv->rows[k].ln > 0 && (sv->rows[k].a == t || sv->rows[k].b == t);
+    s->contacts_body = bt_sum_value(&seen->sum[TOUCHING]);
 }
 
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
 {
     const bt_step_stats *st = &w->stats;
-    const bt_bodies *b = &w->bodies;
     *s = (bt_sample){
         .time = (double)w->step * w->par.dt,
         .contacts = (double)st->n_points,
         .sweeps = (double)st->sweeps,
         .position_sweeps = (double)st->position_sweeps,
         .residual = st->residual,
+        .residual_rms = st->residual_rms,
+        .active = (double)st->n_active,
         .unconverged = !st->converged,
         .overlap = st->overlap,
         .momentum_residual = st->momentum_residual,
@@ -108,13 +148,10 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .carriage_y = NAN,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
-    int64_t moving = 0;
-    for (bt_idx i = 0; i < b->n; i++)
-        moving += b->motion[i] == BT_DYNAMIC && i != w->towed &&
-                  b->vel[i].x * b->vel[i].x + b->vel[i].y * b->vel[i].y > slow2;
-    s->moving = (double)moving;
+    const bt_totals seen = observe_tiles(w, slow2);
+    s->moving = bt_sum_value(&seen.sum[MOVING]);
     if (w->towed >= 0) {
-        observe_body(w, s);
+        observe_body(w, &seen, s);
     } else {
         s->tow_force = s->ice_resistance = s->ice_resistance_budget = s->ice_force_x = s->ice_force_y = s->ice_moment = NAN;
         s->drag_force = s->inertia_force = s->body_x = s->body_y = s->body_yaw = NAN;
@@ -122,18 +159,17 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
     }
 }
 
-void bt_observe_contact_force(const bt_world *w, bt_idx n, double *force)
+void bt_observe_contact_force(const bt_world *w, double *force)
 {
-    for (bt_idx i = 0; i < n; i++) force[i] = 0;
-    const bt_contacts *c = w->contacts;
-    for (bt_idx k = 0; k < c->n_man; k++) {
-        const bt_manifold *m = &c->man[k];
-        double f = m->p[0].ln;
-        if (m->n_points > 1) f += m->p[1].ln;
-        f /= w->par.dt;
-        if (m->a < n) force[m->a] = bt_max(force[m->a], f);
-        if (m->b < n) force[m->b] = bt_max(force[m->b], f);
-    }
+    for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
+            const bt_unit *u = &w->tiles->tile[k].units[j];
+            const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
+            force[u->a] = bt_max(force[u->a], f);
+            force[u->b] = bt_max(force[u->b], f);
+        }
+    bt_domain_largest(w, force);
 }
 
 bt_idx bt_observe_not_finite(const bt_world *w)

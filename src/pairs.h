@@ -1,11 +1,26 @@
 // SPDX-License-Identifier: MIT
-// The pair list of the broad phase (private to contact detection).
+// The pair list of one tile (private to the detection).
 #ifndef BERGTOW_PAIRS_H
 #define BERGTOW_PAIRS_H
 
-#include "bergtow/contacts.h"
+#include "bergtow/tiles.h"
 
-/// Build the pair list anew if bodies have travelled farther than its clearance allows, or the margin has grown.
-void bt_pairs_update(bt_world *w, double margin);
+/// Room that one thread works in.
+typedef struct bt_pair_scratch {
+    double *box;          ///< [6][cap_boxes] x, y and the box about them: low x, low y, high x, high y, m
+    bt_idx *body;         ///< [cap_boxes]
+    size_t cap_boxes;
+    bt_pair *found;       ///< [cap_found]
+    size_t cap_found;
+} bt_pair_scratch;
+
+/// Make the list of tile k anew unless it holds for this margin.
+void bt_pairs_update(bt_world *w, bt_idx k, double margin, bt_pair_scratch *s);
+
+void bt_pair_scratch_free(bt_pair_scratch *s);
+
+/// Tiles (unwrapped coordinates) that the box of body i covers, widened by pad, m.
+typedef struct bt_tile_range { int32_t x0, x1, y0, y1; } bt_tile_range;
+bt_tile_range bt_pairs_range(const bt_world *w, bt_idx i, double pad);
 
 #endif

@@ -3,60 +3,83 @@
 //
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M⁻¹ J_nᵀ p with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction. Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart does
-// not press either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that
+// by the same rows without friction, swept in the same order. Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart
+// does not press either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that
 // is not there (Metrikin 2014).
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/solver.h"
+#include "domain.h"
+#include "kernel.h"
+#include "phases.h"
 
-static double normal_rate(const bt_row *r, const bt_vel *x)
+static double gap_after(const bt_world *w, const bt_unit *u, int i)
 {
-    const bt_vel *a = &x[r->a], *b = &x[r->b];
-    return r->nx * (b->x - a->x) + r->ny * (b->y - a->y) + r->rbn * b->w - r->ran * a->w;
+    return u->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
 }
 
-static void displace(const bt_row *r, double p, bt_vel *d, const bt_inv *inv)
+static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    const bt_inv ia = inv[r->a], ib = inv[r->b];
-    if (ia.m > 0) {
-        d[r->a].x -= ia.m * p * r->nx;
-        d[r->a].y -= ia.m * p * r->ny;
-        d[r->a].w -= ia.i * p * r->ran;
+    (void)context;
+    bt_tile *tile = &w->tiles->tile[k];
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        bt_unit *u = &tile->units[j];
+        u->push[0] = u->push[1] = 0;
+        for (int i = 0; i < u->n; i++) t->most = bt_max(t->most, -gap_after(w, u, i));
     }
-    if (ib.m > 0) {
-        d[r->b].x += ib.m * p * r->nx;
-        d[r->b].y += ib.m * p * r->ny;
-        d[r->b].w += ib.i * p * r->rbn;
+}
+
+static void push_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context;
+    bt_tile *tile = &w->tiles->tile[k];
+    bt_vel *d = w->solver->shift;
+    const bt_inv *inv = w->bodies.inv;
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        bt_unit *u = &tile->units[j];
+        for (int i = 0; i < u->n; i++) {
+            bt_vel da = d[u->a], db = d[u->b];
+            const double g2 = gap_after(w, u, i);
+            const double p = bt_max(0, u->push[i] - (bt_normal_velocity(u, i, &da, &db) + g2 + w->par.slop) * u->mn[i]), step = p - u->push[i];
+            if (step == 0) continue;
+            u->push[i] = p;
+            bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
+            bt_store(&d[u->a], inv[u->a], &da);
+            bt_store(&d[u->b], inv[u->b], &db);
+            t->most = bt_max(t->most, fabs(step) * u->w[i]);
+        }
     }
 }
 
 void bt_solver_project(bt_world *w)
 {
     bt_solver *s = w->solver;
-    const bt_bodies *b = &w->bodies;
+    const bt_tiles *ts = w->tiles;
     const double slop = w->par.slop;
     w->stats.position_sweeps = 0;
-    s->shifted = false;
-    for (bt_idx i = 0; i < s->n_rows && !s->shifted; i++)
-        s->shifted = s->rows[i].gap + w->par.dt * normal_rate(&s->rows[i], b->vel) < -slop;
+    bt_totals t = {0};
+    bt_phases_any_order(w, find_overlap, NULL, &t);
+    bt_domain_reduce(w, &t);
+    s->shifted = t.most > slop;
     if (!s->shifted) return;
 
-    memset(s->shift, 0, (size_t)b->n * sizeof *s->shift);
-    memset(s->push, 0, (size_t)s->n_rows * sizeof *s->push);
+    if (w->bodies.n > s->cap_bodies) {
+        s->cap_bodies = w->bodies.n;
+        free(s->shift);
+        s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
+    }
+    for (bt_idx k = 0; k < ts->n; k++)
+        if (k == ts->n - 1 || bt_tiles_moves(ts, k))
+            memset(s->shift + ts->tile[k].first, 0, (size_t)(ts->tile[k].end - ts->tile[k].first) * sizeof *s->shift);
     double worst = INFINITY;
     while (worst > 0.1 * slop && w->stats.position_sweeps < w->par.position_sweeps) {
-        worst = 0;
-        for (bt_idx i = 0; i < s->n_rows; i++) {
-            const bt_row *r = &s->rows[i];
-            double g2 = r->gap + w->par.dt * normal_rate(r, b->vel);
-            double p = bt_max(0, s->push[i] - (normal_rate(r, s->shift) + g2 + slop) * r->mn), d = p - s->push[i];
-            if (d == 0) continue;
-            s->push[i] = p;
-            displace(r, d, s->shift, b->inv);
-            worst = bt_max(worst, fabs(d) / r->mn);
-        }
+        t = (bt_totals){0};
+        bt_phases_run(w, push_tile, NULL, s->shift, &t);
+        bt_domain_reduce(w, &t);
+        worst = t.most;
         w->stats.position_sweeps++;
     }
+    bt_domain_settle(w);
 }

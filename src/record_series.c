@@ -30,6 +30,8 @@ const bt_series_field bt_series_fields[] = {
     ROW(sweeps, MEAN, "1", "sweeps of the contact solver in a step"),
     ROW(position_sweeps, MEAN, "1", "sweeps of the position projection in a step"),
     ROW(residual, MAX, "m/s", "natural-map residual of the contact problem at the end of the step, largest component"),
+    ROW(residual_rms, MAX, "m/s", "the same residual, root mean square over the rows of all contacts"),
+    ROW(active, LAST, "1", "floes in tiles whose contacts were looked at; all others are at rest"),
     ROW(unconverged, SUM, "1", "steps that met the sweep limit before the tolerance"),
     ROW(overlap, MAX, "m", "deepest overlap of two bodies at the start of the step"),
     ROW(momentum_residual, MAX, "1", "|momentum change - external impulse| / momentum exchanged in the step"),

@@ -13,7 +13,7 @@
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
-#define LARGE_RATIO 3.0         // a floe with more than this times the mean radius is kept out of the grid
+#define LARGE_RATIO 8.0         // a floe with more than this times the mean radius is in no tile: tiles fit the largest of the others
 
 bt_params bt_setup_params(const bt_case *c, double size)
 {
@@ -30,6 +30,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .tolerance = c->solver.tolerance * bt_case_reference_speed(c),
         .max_sweeps = c->solver.max_sweeps,
         .warm_start = c->solver.warm_start,
+        .plain_sweeps = c->solver.plain,
+        .inner_sweeps = c->solver.inner_sweeps,
+        .tile = c->solver.tile,
         .slop = c->solver.slop * size,
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
@@ -193,8 +196,9 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, double dx, doub
     for (int64_t k = 0; k <= na + nb; k++) {
         double nx = -dy, ny = dx;
         if (k < na + nb) {
-            const double *n = bd->normal + 2 * (k < na ? bd->offset[a] + k : bd->offset[b] + k - na);
-            nx = n[0], ny = n[1];
+            const int64_t first = k < na ? bd->offset[a] : bd->offset[b], m = k < na ? na : nb, at = k < na ? k : k - na;
+            const double *p = bd->outline + 2 * (first + at), *q = bd->outline + 2 * (first + (at + 1) % m);
+            nx = q[1] - p[1], ny = p[0] - q[0];
         }
         double low_a = INFINITY, high_a = -INFINITY, low_b = INFINITY, high_b = -INFINITY;
         const double along = nx * dx + ny * dy, offset = nx * d[0] + ny * d[1];

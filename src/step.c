@@ -6,8 +6,11 @@
 #include "bergtow/forces.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
+#include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "bergtow/world.h"
+#include "domain.h"
+#include "phases.h"
 
 static double wrap(double x, double low, double period)
 {
@@ -18,35 +21,78 @@ static double wrap(double x, double low, double period)
     return x;
 }
 
-/// X2 = X1 + U2 Δt + D.
-static void advance(bt_world *w)
+/// Move body i; returns the length of its path through the water's frame, m.
+static double move(bt_world *w, bt_idx i)
 {
     bt_bodies *b = &w->bodies;
     const bt_solver *s = w->solver;
-    const double dt = w->par.dt;
-#pragma omp parallel for schedule(static) if (b->n > 2000)
-    for (bt_idx i = 0; i < b->n; i++) {
-        double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
-        if (s->shifted) {
-            dx += s->shift[i].x;
-            dy += s->shift[i].y;
-            turn += s->shift[i].w;
-        }
-        if (dx == 0 && dy == 0 && turn == 0) continue;
-        bt_pose *p = &b->pose[i];
+    const double dt = w->par.dt, drift_x = w->par.water_u, drift_y = w->par.water_v;
+    double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
+    double x = dt * (b->vel[i].x - drift_x), y = dt * (b->vel[i].y - drift_y);
+    b->stirred[i] = 0;
+    if (s->shifted) {
+        const bt_vel d = s->shift[i];
+        dx += d.x, dy += d.y, turn += d.w;
+        x += d.x, y += d.y;
+        b->stirred[i] = d.x != 0 || d.y != 0 || d.w != 0;
+    }
+    bt_pose *p = &b->pose[i];
+    if (dx != 0 || dy != 0) {
         p->x = wrap(p->x + dx, w->par.x0, w->par.period_x);
         p->y = wrap(p->y + dy, w->par.y0, w->par.period_y);
-        if (turn != 0) {
-            p->yaw += turn;
-            bt_world_turn_outline(w, i);
-        }
-        // Rounding of a pose of kilometres must not make the path shorter than the move.
-        b->path[i] += (sqrt(dx * dx + dy * dy) + b->radius[i] * fabs(turn)) * (1 + 1e-9);
-        if (i == w->towed && w->tow) {
-            w->tow->travel_x += dx;
-            w->tow->travel_y += dy;
-        }
     }
+    if (turn != 0) {
+        p->yaw += turn;
+        bt_world_turn_outline(w, i);
+    }
+    if (w->tow && i >= w->tiles->n_tiled && i == bt_world_towed(w)) {
+        w->tow->travel_x += dx;
+        w->tow->travel_y += dy;
+    }
+    if (x == 0 && y == 0 && turn == 0) return 0;
+    // Rounding of a pose of kilometres must not make the path shorter than the move.
+    const double path = (sqrt(x * x + y * y) + b->radius[i] * fabs(turn)) * (1 + 1e-9);
+    b->path[i] += path;
+    return path;
+}
+
+/// All bodies of tile k drift with the water, and nothing pushed them apart.
+static bool at_rest(const bt_world *w, const bt_tile *t)
+{
+    const bt_bodies *b = &w->bodies;
+    for (bt_idx i = t->first; i < t->end; i++)
+        if (b->stirred[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0) return false;
+    return true;
+}
+
+/// X2 = X1 + U2 Δt + D.
+static void advance(bt_world *w)
+{
+    bt_tiles *ts = w->tiles;
+    const double dt = w->par.dt;
+    // Tiles move with the water where that is not periodic.
+    const double drift = (double)(w->step + 1) * dt;
+    if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + drift * w->par.water_u;
+    if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + drift * w->par.water_v;
+    const bool still = w->par.water_u == 0 && w->par.water_v == 0;
+    double farthest = 0, out = 0;
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (w->bodies.n > 2000)
+    for (bt_idx k = 0; k < ts->n; k++) {
+        const bt_tile *t = &ts->tile[k];
+        const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
+        if (!moves && still) continue;
+        double path = 0;
+        for (bt_idx i = t->first; i < t->end; i++) {
+            path = bt_max(path, move(w, i));
+            if (!last) out = bt_max(out, bt_tiles_outside(w, i));
+        }
+        ts->moved[k] += path;
+        if (!last) farthest = bt_max(farthest, path);
+        if (moves && !last) ts->rest[k] = ts->calm && at_rest(w, t) ? BT_REST_NEW : BT_REST_NO;
+    }
+    ts->moved_any += farthest;
+    bt_domain_maxima(w, &out, 1);
+    ts->relabel = out > ts->allowance;
     if (w->tow) {
         bt_tow *t = w->tow;
         double speed = bt_tow_speed(t, t->time + dt);
@@ -56,53 +102,73 @@ static void advance(bt_world *w)
     }
 }
 
-/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
-/// line; returns the difference over the momentum exchanged (both from the velocities and the rows, independently).
-static double momentum_residual(const bt_world *w)
-{
-    const bt_bodies *b = &w->bodies;
-    const bt_solver *s = w->solver;
-    bt_sum gained[2] = {{0}, {0}}, applied[2] = {{0}, {0}}, exchanged = {0}, carried = {0};
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (b->motion[i] != BT_DYNAMIC) continue;
-        if (b->vel[i].x != 0 || b->vel[i].y != 0) bt_sum_add(&carried, b->mass[i] * (fabs(b->vel[i].x) + fabs(b->vel[i].y)));
-        double dx = b->vel[i].x - b->vel_free[i].x, dy = b->vel[i].y - b->vel_free[i].y;
-        if (dx == 0 && dy == 0) continue;
-        bt_sum_add(&gained[0], dx / b->inv[i].m);
-        bt_sum_add(&gained[1], dy / b->inv[i].m);
-    }
-    for (bt_idx k = 0; k < s->n_rows; k++) {
-        const bt_row *r = &s->rows[k];
-        if (r->ln == 0) continue;
-        double sign = (b->inv[r->b].m > 0) - (b->inv[r->a].m > 0);
-        bt_sum_add(&exchanged, r->ln);
-        if (sign == 0) continue;
-        bt_sum_add(&applied[0], sign * (r->ln * r->nx - r->lt * r->ny));
-        bt_sum_add(&applied[1], sign * (r->ln * r->ny + r->lt * r->nx));
-    }
-    if (w->tow && w->tow->mode == BT_TOW_LINE) {
-        bt_sum_add(&applied[0], w->tow->lambda * w->tow->lx);
-        bt_sum_add(&applied[1], w->tow->lambda * w->tow->ly);
-        bt_sum_add(&exchanged, w->tow->lambda);
-    }
-    double ex = bt_sum_value(&gained[0]) - bt_sum_value(&applied[0]);
-    double ey = bt_sum_value(&gained[1]) - bt_sum_value(&applied[1]);
-    // A step that exchanges next to nothing is measured against the momentum carried: rounding is relative to that.
-    double scale = bt_max(bt_sum_value(&exchanged), 1e-4 * bt_sum_value(&carried));
-    return scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
-}
+enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
 
-static double kinetic_energy(const bt_world *w)
+/// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
+static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    bt_sum e = {0};
-    for (bt_idx i = 0; i < b->n; i++) {
+    const bt_tile *tile = &w->tiles->tile[k];
+    for (bt_idx i = tile->first; i < tile->end; i++) {
         if (b->motion[i] != BT_DYNAMIC) continue;
         const bt_vel *v = &b->vel[i];
         if (v->x == 0 && v->y == 0 && v->w == 0) continue;
-        bt_sum_add(&e, 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
+        bt_sum_add(&t->sum[CARRIED], b->mass[i] * (fabs(v->x) + fabs(v->y)));
+        bt_sum_add(&t->sum[ENERGY], 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
+        const double dx = v->x - b->vel_free[i].x, dy = v->y - b->vel_free[i].y;
+        if (dx == 0 && dy == 0) continue;
+        bt_sum_add(&t->sum[GAINED_X], dx / b->inv[i].m);
+        bt_sum_add(&t->sum[GAINED_Y], dy / b->inv[i].m);
     }
-    return bt_sum_value(&e);
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        const bt_unit *u = &tile->units[j];
+        const double normal = u->ln[0] + u->ln[1];
+        if (normal == 0) continue;
+        bt_sum_add(&t->sum[EXCHANGED], normal);
+        bt_sum_add(&t->sum[WORK], bt_solver_work(w, u));
+        const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
+        if (sign == 0) continue;
+        bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
+        bt_sum_add(&t->sum[APPLIED_Y], sign * (normal * u->ny + u->lt * u->nx));
+    }
+    bt_sum_add(&t->sum[POINTS], (double)tile->n_points);
+    if (tile->active) bt_sum_add(&t->sum[ACTIVE], tile->end - tile->first);
+    t->most = bt_max(t->most, tile->overlap);
+}
+
+/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
+/// line; the difference over the momentum exchanged is the residual. Also work, energy, counts and overlap of the step.
+static void balance(bt_world *w)
+{
+    const bt_tiles *ts = w->tiles;
+    bt_step_stats *st = &w->stats;
+    bt_totals all = {.n_sums = N_BALANCE};
+#pragma omp parallel if (w->bodies.n > 2000)
+    {
+        bt_totals t = {.n_sums = N_BALANCE};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx k = 0; k < ts->n; k++)
+            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || !ts->still)) balance_tile(w, k, &t);
+#pragma omp critical
+        bt_totals_merge(&all, &t);
+    }
+    if (w->tow && w->tow->mode == BT_TOW_LINE && ts->tile[ts->n - 1].own) {
+        bt_sum_add(&all.sum[APPLIED_X], w->tow->lambda * w->tow->lx);
+        bt_sum_add(&all.sum[APPLIED_Y], w->tow->lambda * w->tow->ly);
+        bt_sum_add(&all.sum[EXCHANGED], w->tow->lambda);
+    }
+    bt_domain_reduce(w, &all);
+    double x[N_BALANCE];
+    for (int k = 0; k < N_BALANCE; k++) x[k] = bt_sum_value(&all.sum[k]);
+    const double ex = x[GAINED_X] - x[APPLIED_X], ey = x[GAINED_Y] - x[APPLIED_Y];
+    // A step that exchanges next to nothing is measured against the momentum carried: rounding is relative to that.
+    const double scale = bt_max(x[EXCHANGED], 1e-4 * x[CARRIED]);
+    st->momentum_residual = scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
+    st->contact_work = x[WORK];
+    st->kinetic_energy = x[ENERGY];
+    st->n_points = (int64_t)x[POINTS];
+    st->n_active = (int64_t)x[ACTIVE];
+    st->overlap = all.most;
 }
 
 /// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
@@ -113,26 +179,35 @@ static void solve_contacts(bt_world *w)
     enum { MAX_REPEATS = 4 };
     bt_step_stats *st = &w->stats;
     bt_bodies *b = &w->bodies;
-    double margin = bt_max(bt_contacts_margin(w, b->vel_start), bt_contacts_margin(w, b->vel_free));
+    const double t0 = bt_clock();
+    double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+    if (bt_tiles_update(w, bt_contacts_margin(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     int64_t sweeps = 0;
+    bool again = false;
     st->repeats = 0;
-    st->detect_s = st->colour_s = st->solve_s = 0;
-    for (;;) {
-        const double t0 = bt_clock();
-        bt_contacts_detect(w, margin); // gaps and J at X1
+    st->detect_s = bt_clock() - t0;
+    st->colour_s = st->solve_s = 0;
+    for (bool done = false; !done;) {
         const double t1 = bt_clock();
-        bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+        bt_contacts_detect(w, again); // gaps and J at X1
         const double t2 = bt_clock();
+        bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+        const double t3 = bt_clock();
         sweeps += st->sweeps;
-        st->detect_s += t1 - t0;
+        fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
+        st->outrun = bt_contacts_outrun(w);
+        done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
+        if (!done) {
+            st->repeats++;
+            again = !bt_tiles_update(w, bt_contacts_margin(w, fastest));
+            if (!again) {
+                bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+                bt_contacts_bound(w, b->vel, b->vel, true);
+            }
+        }
+        st->detect_s += t2 - t1 + bt_clock() - t3;
         st->colour_s += w->solver->prepare_s;
-        st->solve_s += t2 - t1 - w->solver->prepare_s;
-        const double needed = bt_contacts_margin(w, b->vel);
-        st->outrun = needed > margin;
-        if (!st->outrun || !st->converged || st->repeats == MAX_REPEATS) break;
-        margin = needed;
-        st->repeats++;
-        for (bt_idx i = 0; i < b->n; i++) b->vel[i] = b->vel_free[i];
+        st->solve_s += t3 - t2 - w->solver->prepare_s;
     }
     st->sweeps = sweeps;
 }
@@ -141,19 +216,19 @@ void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
     const double t0 = bt_clock();
+    bt_tiles_begin(w);
+    const double t1 = bt_clock();
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
-    st->forces_s = bt_clock() - t0;
+    st->forces_s = bt_clock() - t1;
     solve_contacts(w); // U2
-    const double t1 = bt_clock();
-    bt_solver_project(w); // D
-    st->momentum_residual = momentum_residual(w);
     const double t2 = bt_clock();
+    bt_solver_project(w); // D
+    balance(w);
+    const double t3 = bt_clock();
     advance(w); // X2 = X1 + U2 Δt + D
-    st->kinetic_energy = kinetic_energy(w);
-    st->n_points = w->contacts->n_points;
-    st->overlap = w->contacts->overlap;
     w->step++;
-    st->solve_s += t2 - t1;
-    st->advance_s = bt_clock() - t2;
+    st->detect_s += t1 - t0;
+    st->solve_s += t3 - t2;
+    st->advance_s = bt_clock() - t3;
 }

@@ -13,7 +13,7 @@ double bt_tow_speed(const bt_tow *t, double time)
 
 static void begin_line(bt_world *w, bt_tow *t)
 {
-    const bt_idx i = w->towed;
+    const bt_idx i = bt_world_towed(w);
     const bt_pose *p = &w->bodies.pose[i];
     const bt_inv inv = w->bodies.inv[i];
     const bt_vel *v = &w->bodies.vel[i];
@@ -43,10 +43,11 @@ void bt_tow_begin(bt_world *w)
     bt_tow *t = w->tow;
     if (!t || w->towed < 0) return;
     bt_bodies *b = &w->bodies;
+    const bt_idx i = bt_world_towed(w);
     if (t->mode == BT_TOW_SPEED) {
-        b->vel_start[w->towed] = b->vel[w->towed];
+        b->vel_start[i] = b->vel[i];
         double s = bt_tow_speed(t, t->time + t->dt);
-        b->vel[w->towed] = b->vel_free[w->towed] = (bt_vel){.x = s * t->ux, .y = s * t->uy};
+        b->vel[i] = b->vel_free[i] = (bt_vel){.x = s * t->ux, .y = s * t->uy};
     } else if (t->mode == BT_TOW_LINE) {
         begin_line(w, t);
     }
@@ -73,11 +74,9 @@ void bt_tow_apply(const bt_tow *t, double d, bt_vel *v, bt_inv inv)
 
 double bt_tow_update(bt_tow *t, bt_vel *v, bt_inv inv)
 {
-    t->step = 0;
     if (!t->taut) return 0;
     double l = solved(t, v), d = l - t->lambda;
     t->lambda = l;
-    t->step = d;
     bt_tow_apply(t, d, v, inv);
     return fabs(d) * t->w;
 }
@@ -87,10 +86,9 @@ double bt_tow_residual(const bt_tow *t, const bt_vel *v)
     return t->taut ? fabs(solved(t, v) - t->lambda) * t->w : 0;
 }
 
-void bt_tow_warm_start(bt_tow *t, bt_vel *v, bt_inv inv, bool keep)
+void bt_tow_warm_start(bt_tow *t, bool keep)
 {
     if (!keep || !t->taut) t->lambda = 0;
-    bt_tow_apply(t, t->lambda, v, inv);
 }
 
 uint64_t bt_tow_hash(const bt_tow *t)

@@ -9,7 +9,9 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/solver.h"
+#include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "domain.h"
 
 bt_world *bt_world_create(const bt_params *p)
 {
@@ -17,91 +19,75 @@ bt_world *bt_world_create(const bt_params *p)
     w->par = *p;
     w->towed = -1;
     w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
-    w->contacts = bt_contacts_create();
+    w->tiles = bt_tiles_create();
     w->solver = bt_solver_create();
     return w;
 }
+
+#define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
+const bt_body_field bt_body_fields[] = {
+    FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
+    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(drag), FIELD(motion), FIELD(large),
+    FIELD(stirred), FIELD(tile),
+};
+const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
 void bt_world_free(bt_world *w)
 {
     if (!w) return;
     bt_bodies *b = &w->bodies;
-    void *arrays[] = {b->vel,  b->inv,     b->pose,    b->outline,  b->normal,    b->path,   b->vel_start,
-                      b->gid,  b->offset,  b->vertices, b->normals, b->radius,    b->mass,   b->inertia,
-                      b->drag, b->friction, b->restitution, b->motion, b->large,  b->vel_free, b->area};
+    for (int k = 0; k < bt_n_body_fields; k++) free(*(void **)((char *)b + bt_body_fields[k].array));
+    void *arrays[] = {b->outline, b->offset, b->vertices, b->per_length, b->index_of};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
-    bt_contacts_free(w->contacts);
+    bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
+    bt_domain_free(w->domain);
     free(w->tow);
     free(w);
 }
 
-static void *grow_aligned(void *p, size_t n_old, size_t n_new, size_t size)
+void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
 {
-    void *q = bt_alloc_aligned(n_new, size);
-    if (p) memcpy(q, p, n_old * size);
-    free(p);
-    return q;
+    if (n > b->cap) {
+        const bt_idx cap = b->cap == 0 ? n : n > b->cap + b->cap / 4 ? n : b->cap + b->cap / 4;
+        for (int k = 0; k < bt_n_body_fields; k++) {
+            void **array = (void **)((char *)b + bt_body_fields[k].array), *old = *array;
+            *array = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
+            if (old) memcpy(*array, old, (size_t)b->n * bt_body_fields[k].size);
+            free(old);
+        }
+        b->offset = bt_realloc(b->offset, (size_t)cap + 1, sizeof *b->offset);
+        b->cap = cap;
+    }
+    if (n_vertices > b->cap_vertices) {
+        const int64_t more = b->cap_vertices + b->cap_vertices / 4, cap = n_vertices > more ? n_vertices : more;
+        b->vertices = bt_realloc(b->vertices, 2 * (size_t)cap, sizeof *b->vertices);
+        b->outline = bt_realloc(b->outline, 2 * (size_t)cap, sizeof *b->outline);
+        b->per_length = bt_realloc(b->per_length, (size_t)cap, sizeof *b->per_length);
+        b->cap_vertices = cap;
+    }
 }
 
-static void reserve(bt_bodies *b, bt_idx n)
-{
-    if (n <= b->cap) return;
-    bt_idx cap = b->cap ? 2 * b->cap : 64;
-    if (cap < n) cap = n;
-    size_t c = (size_t)cap, old = (size_t)b->n;
-    b->vel = grow_aligned(b->vel, old, c, sizeof *b->vel);
-    b->inv = grow_aligned(b->inv, old, c, sizeof *b->inv);
-    b->vel_start = grow_aligned(b->vel_start, old, c, sizeof *b->vel_start);
-    b->vel_free = grow_aligned(b->vel_free, old, c, sizeof *b->vel_free);
-    b->pose = bt_realloc(b->pose, c, sizeof *b->pose);
-    b->path = bt_realloc(b->path, c, sizeof *b->path);
-    b->gid = bt_realloc(b->gid, c, sizeof *b->gid);
-    b->offset = bt_realloc(b->offset, c + 1, sizeof *b->offset);
-    b->radius = bt_realloc(b->radius, c, sizeof *b->radius);
-    b->area = bt_realloc(b->area, c, sizeof *b->area);
-    b->mass = bt_realloc(b->mass, c, sizeof *b->mass);
-    b->inertia = bt_realloc(b->inertia, c, sizeof *b->inertia);
-    b->friction = bt_realloc(b->friction, c, sizeof *b->friction);
-    b->restitution = bt_realloc(b->restitution, c, sizeof *b->restitution);
-    b->drag = bt_realloc(b->drag, c, sizeof *b->drag);
-    b->motion = bt_realloc(b->motion, c, sizeof *b->motion);
-    b->large = bt_realloc(b->large, c, sizeof *b->large);
-    b->cap = cap;
-}
-
-static void reserve_vertices(bt_bodies *b, int64_t n)
-{
-    if (n <= b->cap_vertices) return;
-    int64_t cap = b->cap_vertices ? 2 * b->cap_vertices : 512;
-    if (cap < n) cap = n;
-    size_t c = 2 * (size_t)cap;
-    b->vertices = bt_realloc(b->vertices, c, sizeof *b->vertices);
-    b->normals = bt_realloc(b->normals, c, sizeof *b->normals);
-    b->outline = bt_realloc(b->outline, c, sizeof *b->outline);
-    b->normal = bt_realloc(b->normal, c, sizeof *b->normal);
-    b->cap_vertices = cap;
-}
-
-bt_idx bt_world_add(bt_world *w, const bt_body_def *d)
+bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
 {
     bt_bodies *b = &w->bodies;
     assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
     assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
-    reserve(b, b->n + 1);
-    bt_idx i = b->n++;
-    int64_t first = b->offset[i];
-    reserve_vertices(b, first + d->n_vertices);
+    assert(b->n == b->n_global); // bodies are added before they are dealt to ranks
+    int64_t first = b->offset[b->n];
+    bt_world_reserve(b, b->n + 1, first + d->n_vertices);
+    const bt_idx i = b->n++;
+    if ((b->n_global & (b->n_global - 1)) == 0) // a power of two: room for twice as many
+        b->index_of = bt_realloc(b->index_of, 2 * (size_t)b->n_global + 2, sizeof *b->index_of);
+    b->index_of[b->n_global] = i;
     b->offset[i + 1] = first + d->n_vertices;
     memcpy(b->vertices + 2 * first, d->vertices, 2 * sizeof(double) * (size_t)d->n_vertices);
     bt_moments m = bt_shape_moments(d->n_vertices, d->vertices);
     for (int k = 0; k < d->n_vertices; k++) {
         const double *p = d->vertices + 2 * k, *q = d->vertices + 2 * ((k + 1) % d->n_vertices);
-        double ex = q[0] - p[0], ey = q[1] - p[1], l = hypot(ex, ey);
-        b->normals[2 * (first + k)] = ey / l;
-        b->normals[2 * (first + k) + 1] = -ex / l;
+        b->per_length[first + k] = 1 / hypot(q[0] - p[0], q[1] - p[1]);
     }
-    b->gid[i] = i;
+    b->gid[i] = b->n_global++;
     b->pose[i] = (bt_pose){.x = d->x, .y = d->y, .yaw = d->yaw};
     b->vel[i] = b->vel_start[i] = b->vel_free[i] =
         d->motion == BT_STATIC ? (bt_vel){0} : (bt_vel){.x = d->vx, .y = d->vy, .w = d->yaw_rate};
@@ -116,9 +102,11 @@ bt_idx bt_world_add(bt_world *w, const bt_body_def *d)
     b->drag[i] = d->drag;
     b->motion[i] = (uint8_t)d->motion;
     b->large[i] = d->large;
+    b->stirred[i] = 1;
+    b->tile[i][0] = b->tile[i][1] = 0;
     bt_world_turn_outline(w, i);
-    w->contacts->built = false;
-    return i;
+    w->tiles->labelled = false;
+    return b->gid[i];
 }
 
 void bt_world_turn_outline(bt_world *w, bt_idx i)
@@ -128,11 +116,9 @@ void bt_world_turn_outline(bt_world *w, bt_idx i)
     p->c = cos(p->yaw);
     p->s = sin(p->yaw);
     for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
-        const double *v = b->vertices + 2 * k, *n = b->normals + 2 * k;
+        const double *v = b->vertices + 2 * k;
         b->outline[2 * k] = p->c * v[0] - p->s * v[1];
         b->outline[2 * k + 1] = p->s * v[0] + p->c * v[1];
-        b->normal[2 * k] = p->c * n[0] - p->s * n[1];
-        b->normal[2 * k + 1] = p->s * n[0] + p->c * n[1];
     }
 }
 
@@ -157,12 +143,14 @@ uint64_t bt_world_hash(const bt_world *w)
 {
     // The sum over bodies is associative: any order, any distribution.
     const bt_bodies *b = &w->bodies;
-    uint64_t sum = mix((uint64_t)w->step);
+    uint64_t sum = 0;
     for (bt_idx i = 0; i < b->n; i++) {
+        if (!bt_domain_owns(w, i)) continue;
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
         sum += h;
     }
+    sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

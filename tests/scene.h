@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/tiles.h"
 #include "bergtow/forces.h"
 #include "bergtow/shape.h"
 #include "bergtow/solver.h"

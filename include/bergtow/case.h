@@ -123,6 +123,9 @@ typedef struct bt_case {
         double tolerance;        ///< natural-map residual / reference speed at which a step has converged
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
+        int64_t inner_sweeps;    ///< sweeps of a tile in its turn
+        double tile;             ///< least side of a tile / mean floe size
+        bool plain;              ///< no acceleration
         bool warm_start;
         double slop;             ///< overlap left alone by the position projection / mean floe size
         int64_t position_sweeps; ///< limit of the position projection

@@ -25,6 +25,8 @@ typedef struct bt_sample {
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
     double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
+    double residual_rms;    ///< the same, root mean square over the rows, m/s
+    double active;          ///< floes in tiles whose contacts were looked at; the others rest
     double unconverged;     ///< 1 if the sweep limit came before the tolerance
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged

@@ -36,7 +36,6 @@ typedef struct bt_tow {
     double carriage_speed;    ///< ċ·u, m/s
     double w;                 ///< W, 1/kg
     double a, b;              ///< λ = max(0, a + b l̇2)
-    double step;              ///< what the last update added to λ, N s
 } bt_tow;
 
 /// Speed of the prescribed programme at time t: linear from 0 over the ramp, then constant. m/s
@@ -54,8 +53,8 @@ void bt_tow_apply(const bt_tow *t, double d, bt_vel *v, bt_inv inv);
 /// Natural-map residual of the line row at velocity v, m/s.
 double bt_tow_residual(const bt_tow *t, const bt_vel *v);
 
-/// Apply the impulse carried over from the last step (warm start), or drop it.
-void bt_tow_warm_start(bt_tow *t, bt_vel *v, bt_inv inv, bool keep);
+/// Start from the impulse of the last step, or from none.
+void bt_tow_warm_start(bt_tow *t, bool keep);
 
 /// Tension of the last step, N.
 static inline double bt_tow_tension(const bt_tow *t) { return t->lambda / t->dt; }

@@ -3,9 +3,11 @@
 //
 // Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
 // 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
-// path), and a cold part (mass, drag, polygon in its own frame, names). Each part is an array of its own over the
-// bodies in storage order; every reference between bodies is a bt_idx into that order, and every order that the
-// result depends on follows from the global ids (gid), not from storage.
+// path), and a cold part (mass, drag, polygon in its own frame). Each part is an array of its own over the
+// bodies in storage order, which is the order of the tiles (tiles.h): neighbours in space are neighbours in memory. Every
+// reference between bodies is a bt_idx into that order and changes when bodies change their tile; the name of a body
+// that stays is its global id (gid), and every order that the result depends on follows from gids and tiles, never from
+// storage or rank. A rank holds the bodies of its tiles, those of tiles beside them (ghosts), and all large or fixed bodies.
 //
 // Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
 // gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
@@ -56,23 +58,26 @@ typedef struct bt_bodies {
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
     double *outline;      ///< [offset[n]][2] vertices turned by yaw, relative to the centroid, m
-    double *normal;       ///< [offset[n]][2] outward unit normal of the edge that starts at each vertex, turned
-    double *path;         ///< [n] length of path travelled by the fastest point of the outline, m (grows only)
+    double *path;         ///< [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
     // cold
     bt_gid *gid;          ///< [n]
     int64_t *offset;      ///< [n+1] first vertex
     double *vertices;     ///< [offset[n]][2] own frame, m
-    double *normals;      ///< [offset[n]][2] edge normals, own frame
+    double *per_length;   ///< [offset[n]] 1/length of the edge that starts at each vertex, 1/m
     double *radius;       ///< [n] m
     double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
     double *friction, *restitution; ///< [n]
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
-    uint8_t *large;       ///< [n]
+    uint8_t *large;       ///< [n] 1 = in no tile
+    uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity
+    int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
     int64_t cap_vertices;
+    bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
+    bt_gid n_global;
 } bt_bodies;
 
 /// Constants of the step.
@@ -84,6 +89,8 @@ typedef struct bt_params {
     int64_t max_sweeps;
     bool warm_start;
     bool plain_sweeps;     ///< no acceleration between the sweeps (reference)
+    int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
+    double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s
@@ -95,33 +102,36 @@ typedef struct bt_params {
     double tilt_ax, tilt_ay;     ///< −g ∇η, m/s²
 } bt_params;
 
-struct bt_contacts;
+struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
+struct bt_domain;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
+    int64_t n_active;        ///< floes in tiles that were looked at (the others rest)
     int64_t sweeps, position_sweeps;
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed
-    double residual;         ///< max-norm natural-map residual, m/s
+    double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s
     bool converged;
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
-    double detect_s, colour_s, forces_s, solve_s, advance_s; ///< wall time, s
+    double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s
 } bt_step_stats;
 
 typedef struct bt_world {
     bt_params par;
     bt_bodies bodies;
-    struct bt_contacts *contacts;
+    struct bt_tiles *tiles;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
-    bt_idx towed;            ///< −1 = none
+    struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
+    bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
     bt_step_stats stats;
 } bt_world;
@@ -130,8 +140,25 @@ typedef struct bt_world {
 bt_world *bt_world_create(const bt_params *p);
 void bt_world_free(bt_world *w);
 
-/// Add a body; returns its index (= its gid). Bodies are added in the order of their gids: floes first. The definition is copied.
-bt_idx bt_world_add(bt_world *w, const bt_body_def *d);
+/// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition is copied.
+bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
+
+/// Where body gid is stored on this rank now, −1 = not here.
+static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->bodies.index_of[gid]; }
+
+/// Index of the towed body, −1 = none. Every rank holds it.
+static inline bt_idx bt_world_towed(const bt_world *w) { return w->towed < 0 ? -1 : w->bodies.index_of[w->towed]; }
+
+/// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
+typedef struct bt_body_field {
+    size_t array; ///< offset of the pointer in bt_bodies
+    size_t size;  ///< bytes a body
+} bt_body_field;
+extern const bt_body_field bt_body_fields[];
+extern const int bt_n_body_fields;
+
+/// Room for n bodies and n_vertices vertices.
+void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 
 /// One step Δt: forces, contacts, solve, advance; see src/step.c.
 void bt_world_step(bt_world *w);

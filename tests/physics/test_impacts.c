@@ -30,8 +30,8 @@ static void central_impact(void **state)
                 assert_true(w->stats.converged);
                 work += w->stats.contact_work;
             }
-            CHECK_CLOSE(w->bodies.vel[0].x, v - (1 + e) * m2 / (m1 + m2) * v, 1e-8);
-            CHECK_CLOSE(w->bodies.vel[1].x, (1 + e) * m1 / (m1 + m2) * v, 1e-8);
+            CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, v - (1 + e) * m2 / (m1 + m2) * v, 1e-8);
+            CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 1)].x, (1 + e) * m1 / (m1 + m2) * v, 1e-8);
             // Energy lost: ½ (1−e²) m1 m2/(m1+m2) v².
             CHECK_CLOSE(work, -0.5 * (1 - e * e) * m1 * m2 / (m1 + m2) * v * v, 1e-7);
             bt_world_free(w);
@@ -53,9 +53,9 @@ static void oblique_impact_with_friction(void **state)
         // An edge-on square cannot turn into the wall: the friction torque is carried by uneven normals as long
         // as both stay positive, i.e. μ < 1 for a square (half height over half width).
         const double left = mu * vn < vt ? vt - mu * vn : 0;
-        CHECK_CLOSE(w->bodies.vel[0].x, 0, 1e-8);
-        CHECK_CLOSE(w->bodies.vel[0].y, left, 1e-7);
-        CHECK_CLOSE(w->bodies.vel[0].w, 0, 1e-7);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 0, 1e-8);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].y, left, 1e-7);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].w, 0, 1e-7);
         bt_world_free(w);
     }
 }
@@ -72,12 +72,12 @@ static void eccentric_impact(void **state)
         add_square(w, 0, 0, yaw, v, 0, mass, 0, 0);
         double corner_x = 0.5 * (cos(yaw) + sin(yaw)), corner_y = 0.5 * (sin(yaw) - cos(yaw)); // lower right corner
         bt_idx wall = scene_wall(w, corner_x + 0.001, -50, corner_x + 5, 50, 0);
-        w->bodies.restitution[wall] = e;
+        w->bodies.restitution[bt_world_index(w, wall)] = e;
         for (int s = 0; s < 10; s++) bt_world_step(w);
         const double inertia = mass / 6, arm = corner_x * 0 - corner_y * -1; // r × n for n = (−1, 0) on the square
         const double lambda = (1 + e) * v / (1 / mass + arm * arm / inertia);
-        CHECK_CLOSE(w->bodies.vel[0].x, v - lambda / mass, 2e-4 * v);
-        CHECK_CLOSE(w->bodies.vel[0].w, arm * lambda / inertia, 2e-4 * fabs(arm * lambda / inertia));
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, v - lambda / mass, 2e-4 * v);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].w, arm * lambda / inertia, 2e-4 * fabs(arm * lambda / inertia));
         bt_world_free(w);
     }
 }
@@ -95,7 +95,7 @@ static void row_of_touching_floes(void **state)
         add_square(w, -1.0, 0, 0, 0.13, 0, 1, 0.3, 0);
         bt_world_step(w);
         assert_true(w->stats.converged);
-        for (int k = 0; k <= n; k++) CHECK_CLOSE(w->bodies.vel[k].x, 0.13 / (n + 1), 1e-7);
+        for (int k = 0; k <= n; k++) CHECK_CLOSE(w->bodies.vel[bt_world_index(w, k)].x, 0.13 / (n + 1), 1e-7);
         assert_true(w->stats.contact_work <= 0);
         assert_true(w->stats.momentum_residual <= 1e-12);
         bt_world_free(w);
@@ -111,7 +111,7 @@ static void row_of_separate_floes(void **state)
     const int n = 6;
     for (int k = 0; k < n; k++) add_square(w, 1.05 * k, 0, 0, k == 0 ? 0.5 : 0, 0, 1, 0, 1);
     for (int s = 0; s < 120; s++) bt_world_step(w);
-    for (int k = 0; k < n; k++) CHECK_CLOSE(w->bodies.vel[k].x, k == n - 1 ? 0.5 : 0, 1e-8);
+    for (int k = 0; k < n; k++) CHECK_CLOSE(w->bodies.vel[bt_world_index(w, k)].x, k == n - 1 ? 0.5 : 0, 1e-8);
     bt_world_free(w);
 }
 
@@ -129,10 +129,10 @@ static void no_tunnelling(void **state)
     scene_wall(w, 100, -500, 101, 500, 0.3);
     for (int s = 0; s < 5; s++) {
         bt_world_step(w);
-        assert_true(w->bodies.pose[0].x <= 85 + 1e-6);
+        assert_true(w->bodies.pose[bt_world_index(w, 0)].x <= 85 + 1e-6);
     }
-    CHECK_CLOSE(w->bodies.pose[0].x, 85, 1e-6);
-    CHECK_CLOSE(w->bodies.vel[0].x, 0, 1e-9);
+    CHECK_CLOSE(w->bodies.pose[bt_world_index(w, 0)].x, 85, 1e-6);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 0, 1e-9);
     bt_world_free(w);
 }
 
@@ -153,7 +153,7 @@ static void heavy_body_squeezes_a_row(void **state)
         assert_true(w->stats.converged);
         assert_true(w->stats.contact_work <= 7 * 1300 * p.tolerance); // Σλ × residual
     }
-    CHECK_CLOSE(w->bodies.vel[5].x, 0, 1e-4);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 5)].x, 0, 1e-4);
     assert_true(bt_world_overlap(w) <= 1e-5);
     bt_world_free(w);
 }
@@ -169,9 +169,9 @@ static void projection_adds_no_velocity(void **state)
     for (int s = 0; s < 5; s++) bt_world_step(w);
     assert_true(bt_world_overlap(w) <= 1.2e-6);
     for (int k = 0; k < 2; k++)
-        CHECK_CLOSE(fabs(w->bodies.vel[k].x) + fabs(w->bodies.vel[k].y) + fabs(w->bodies.vel[k].w), 0, 0);
+        CHECK_CLOSE(fabs(w->bodies.vel[bt_world_index(w, k)].x) + fabs(w->bodies.vel[bt_world_index(w, k)].y) + fabs(w->bodies.vel[bt_world_index(w, k)].w), 0, 0);
     // The lighter one moves three times as far.
-    CHECK_CLOSE(-w->bodies.pose[0].x, 3 * (w->bodies.pose[1].x - 0.95), 1e-6);
+    CHECK_CLOSE(-w->bodies.pose[bt_world_index(w, 0)].x, 3 * (w->bodies.pose[bt_world_index(w, 1)].x - 0.95), 1e-6);
     bt_world_free(w);
 }
 

@@ -19,12 +19,12 @@ static void quadratic_drag_decay(void **state)
     bt_world *w = bt_world_create(&p);
     const bt_drag drag = {.water_skin = 3, .yaw = 0.7};
     add_disc(w, 2, 20, drag, 0.6, -0.8, 0.5);
-    const double m = w->bodies.mass[0], inertia = w->bodies.inertia[0];
+    const double m = w->bodies.mass[bt_world_index(w, 0)], inertia = w->bodies.inertia[bt_world_index(w, 0)];
     for (int s = 0; s < 1000; s++) bt_world_step(w);
     const double u = 1 / (1 + 3 * 1 * 100 / m), om = 0.5 / (1 + 0.7 * 0.5 * 100 / inertia);
-    CHECK_CLOSE(w->bodies.vel[0].x, 0.6 * u, 1e-12);
-    CHECK_CLOSE(w->bodies.vel[0].y, -0.8 * u, 1e-12);
-    CHECK_CLOSE(w->bodies.vel[0].w, om, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 0.6 * u, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].y, -0.8 * u, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].w, om, 1e-12);
     bt_world_free(w);
 }
 
@@ -43,12 +43,12 @@ static void terminal_velocity(void **state)
         double furthest = 0;
         for (int s = 0; s < 20000; s++) {
             bt_world_step(w);
-            furthest = bt_max(furthest, hypot(w->bodies.vel[0].x, w->bodies.vel[0].y));
+            furthest = bt_max(furthest, hypot(w->bodies.vel[bt_world_index(w, 0)].x, w->bodies.vel[bt_world_index(w, 0)].y));
         }
         const double width = bt_shape_width(24, w->bodies.vertices, 12.0 / 13, 5.0 / 13);
         const double kw = 4 + 10 * width, ka = 0.02 + 0.1 * width, u = 13 / (1 + sqrt(kw / ka));
-        CHECK_CLOSE(w->bodies.vel[0].x, u * 12 / 13, 1e-9);
-        CHECK_CLOSE(w->bodies.vel[0].y, u * 5 / 13, 1e-9);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, u * 12 / 13, 1e-9);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].y, u * 5 / 13, 1e-9);
         // Drag never reverses a relative velocity; while it is resolved it does not overshoot the balance either.
         assert_true(furthest <= (steps[i] < 1 ? u * (1 + 1e-9) : 13));
         bt_world_free(w);
@@ -69,15 +69,15 @@ static void inertial_circle(void **state)
         const int n = (int)(2 * BT_PI / f / dt);
         for (int s = 0; s < n; s++) {
             bt_world_step(w);
-            if (s == n / 8) assert_true(sense * w->bodies.vel[0].y > 0);
-            x_min = bt_min(x_min, w->bodies.pose[0].x);
-            x_max = bt_max(x_max, w->bodies.pose[0].x);
-            if (fabs(w->bodies.pose[0].y) > fabs(y_far)) y_far = w->bodies.pose[0].y;
+            if (s == n / 8) assert_true(sense * w->bodies.vel[bt_world_index(w, 0)].y > 0);
+            x_min = bt_min(x_min, w->bodies.pose[bt_world_index(w, 0)].x);
+            x_max = bt_max(x_max, w->bodies.pose[bt_world_index(w, 0)].x);
+            if (fabs(w->bodies.pose[bt_world_index(w, 0)].y) > fabs(y_far)) y_far = w->bodies.pose[bt_world_index(w, 0)].y;
         }
-        CHECK_CLOSE(hypot(w->bodies.vel[0].x, w->bodies.vel[0].y), u, 1e-13);
+        CHECK_CLOSE(hypot(w->bodies.vel[bt_world_index(w, 0)].x, w->bodies.vel[bt_world_index(w, 0)].y), u, 1e-13);
         CHECK_CLOSE(0.5 * (x_max - x_min), u / f, 2e-3 * u / f);
         CHECK_CLOSE(y_far, sense * 2 * u / f, 2e-3 * u / f);
-        CHECK_CLOSE(hypot(w->bodies.pose[0].x, w->bodies.pose[0].y), 0, 0.01 * u / f);
+        CHECK_CLOSE(hypot(w->bodies.pose[bt_world_index(w, 0)].x, w->bodies.pose[bt_world_index(w, 0)].y), 0, 0.01 * u / f);
         bt_world_free(w);
     }
 }
@@ -91,7 +91,7 @@ static void tilt_and_geostrophic_balance(void **state)
     bt_world *w = bt_world_create(&p);
     add_disc(w, 700, 900, (bt_drag){0}, 0, 0, 0);
     for (int s = 0; s < 100; s++) bt_world_step(w);
-    CHECK_CLOSE(w->bodies.vel[0].x, -9.81e-3, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, -9.81e-3, 1e-12);
     bt_world_free(w);
 
     p = scene_params(5, 30);
@@ -101,8 +101,8 @@ static void tilt_and_geostrophic_balance(void **state)
     w = bt_world_create(&p);
     add_disc(w, 700, 900, (bt_drag){.water_skin = 4000}, 0.2, -0.1, 0);
     for (int s = 0; s < 1000; s++) bt_world_step(w);
-    CHECK_CLOSE(w->bodies.vel[0].x, 0.2, 1e-12);
-    CHECK_CLOSE(w->bodies.vel[0].y, -0.1, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 0.2, 1e-12);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].y, -0.1, 1e-12);
     bt_world_free(w);
 }
 
@@ -128,13 +128,13 @@ static void spring_towed_mass(void **state)
     (void)state;
     const double k = 4, v = 0.13, dt = 0.02;
     bt_world *w = line_world(dt, k, 0, v, (bt_drag){0});
-    const double m = w->bodies.mass[0], om = sqrt(k / m), peak = k * v / om;
+    const double m = w->bodies.mass[bt_world_index(w, 0)], om = sqrt(k / m), peak = k * v / om;
     double worst_u = 0, worst_t = 0;
     const int n = (int)(BT_PI / om / dt);
     for (int s = 1; s <= n; s++) {
         bt_world_step(w);
         const double t = s * dt;
-        worst_u = bt_max(worst_u, fabs(w->bodies.vel[0].x - v * (1 - cos(om * t))));
+        worst_u = bt_max(worst_u, fabs(w->bodies.vel[bt_world_index(w, 0)].x - v * (1 - cos(om * t))));
         // The tension of a step is its mean, at t − Δt/2 to second order; with θ = 0 it is taken at the step's start.
         worst_t = bt_max(worst_t, fabs(bt_tow_tension(w->tow) - peak * sin(om * (t - 0.5 * dt))));
     }
@@ -143,7 +143,7 @@ static void spring_towed_mass(void **state)
     CHECK_CLOSE(worst_t, 0, 0.003 * peak);
     // Slack: it coasts at 2V, faster than the carriage, without any force.
     for (int s = 0; s < 100; s++) bt_world_step(w);
-    CHECK_CLOSE(w->bodies.vel[0].x, 2 * v, 0.003 * 2 * v);
+    CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 2 * v, 0.003 * 2 * v);
     CHECK_CLOSE(bt_tow_tension(w->tow), 0, 0);
     bt_world_free(w);
 }
@@ -159,10 +159,10 @@ static void line_is_stable_and_carries_the_drag(void **state)
         for (int s = 0; s < 100000; s++) {
             bt_world_step(w);
             assert_true(w->stats.converged);
-            largest = bt_max(largest, fabs(w->bodies.vel[0].x));
+            largest = bt_max(largest, fabs(w->bodies.vel[bt_world_index(w, 0)].x));
         }
         CHECK_CLOSE(bt_tow_tension(w->tow), kd * v * v, 1e-4 * kd * v * v);
-        CHECK_CLOSE(w->bodies.vel[0].x, v, 1e-4 * v);
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, v, 1e-4 * v);
         assert_true(largest <= 2.05 * v);
         bt_world_free(w);
     }
@@ -176,7 +176,7 @@ static void line_turns_the_body(void **state)
     w->tow->hull_x = 0;
     w->tow->hull_y = 0.6;
     for (int s = 0; s < 20000; s++) bt_world_step(w);
-    CHECK_CLOSE(remainder(w->bodies.pose[0].yaw + 0.5 * BT_PI, 2 * BT_PI), 0, 0.02);
+    CHECK_CLOSE(remainder(w->bodies.pose[bt_world_index(w, 0)].yaw + 0.5 * BT_PI, 2 * BT_PI), 0, 0.02);
     bt_world_free(w);
 }
 

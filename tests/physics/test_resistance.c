@@ -42,7 +42,7 @@ static void dilute_floes_one_by_one(void **state)
             double o[2 * BT_MAX_VERTICES];
             int n = bt_shape_named("disc", 2 * big, 2 * big, o);
             add_body(w, n, o, -sqrt((big + r) * (big + r) - y * y) - 0.1, v);
-            w->bodies.restitution[w->towed] = es[i];
+            w->bodies.restitution[bt_world_index(w, w->towed)] = es[i];
             for (int s = 0; s < 60; s++) {
                 bt_sample sample;
                 bt_world_step(w);
@@ -129,7 +129,9 @@ static void plough_in_a_channel(void **state)
             bt_observe(w, v, &sample);
             // A row solved to the residual ρ can do at most λ ρ of positive work.
             double exchanged = 0;
-            for (bt_idx k = 0; k < w->solver->n_rows; k++) exchanged += w->solver->rows[k].ln;
+            for (bt_idx k = 0; k < w->tiles->n; k++)
+                for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++)
+                    exchanged += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
             assert_true(w->stats.contact_work <= 2 * exchanged * p.tolerance);
             if (s % 50 && front0 > 0) {
                 impulse += sample.ice_resistance * p.dt;
@@ -138,7 +140,7 @@ static void plough_in_a_channel(void **state)
             // Front: where the ice that moves on average ends, by the momentum of the swept floes: all floes up
             // to it have been swept, so their number gives it without a threshold on single floes.
             double momentum = 0;
-            for (int k = 0; k < n; k++) momentum += w->bodies.mass[k] * w->bodies.vel[k].x;
+            for (int k = 0; k < n; k++) momentum += w->bodies.mass[bt_world_index(w, k)] * w->bodies.vel[bt_world_index(w, k)].x;
             const double front = momentum / (sheet * a * width * v);
             if (front0 == 0 && front > 0.3 * length) front0 = front, t0 = sample.time, impulse = 0;
             else if (front0 > 0) impulse += sample.ice_resistance * p.dt;
@@ -146,9 +148,9 @@ static void plough_in_a_channel(void **state)
             if (front > 0.85 * length) break;
         }
         // φ from areas: every floe whose centre lies between piston and front, away from the loose layer at the front.
-        const double low = w->bodies.pose[w->towed].x + 1, high = front1 - 5;
+        const double low = w->bodies.pose[bt_world_index(w, w->towed)].x + 1, high = front1 - 5;
         double inside = 0;
-        for (int k = 0; k < n; k++) inside += w->bodies.pose[k].x > low && w->bodies.pose[k].x < high ? area : 0;
+        for (int k = 0; k < n; k++) inside += w->bodies.pose[bt_world_index(w, k)].x > low && w->bodies.pose[bt_world_index(w, k)].x < high ? area : 0;
         const double phi = inside / (width * (high - low));
         const double speed = v * phi / (phi - a), force = sheet * width * v * v * a * phi / (phi - a);
         print_message("A %.3f phi %.4f front %.4f want %.4f force %.4f want %.4f\n", a, phi, (front1 - front0) / (t1 - t0), speed, impulse / (t1 - t0), force);

@@ -2,6 +2,7 @@
 // Contact detection: the optimised path against all pairs, distances against an independent computation, features.
 #include "scene.h"
 
+
 /// Distance of two separate convex polygons by brute force over vertices and edges (own arithmetic, no contact code).
 static double reference_distance(const double *p, int np, const double *q, int nq)
 {
@@ -38,6 +39,7 @@ static int world_polygon(const bt_world *w, bt_idx i, double shift_x, double shi
 static bt_world *random_scene(uint64_t *rng, int n, bool periodic, double box)
 {
     bt_params p = scene_params(0.1, 1);
+    p.tile = 2; // small, so that floes change their tiles
     p.period_x = periodic ? box : 0;
     p.period_y = periodic ? box : 0;
     bt_world *w = bt_world_create(&p);
@@ -71,36 +73,104 @@ static void move_all(bt_world *w, uint64_t *rng, double step)
     }
 }
 
+/// What the tiles must know of moves that were not made by a step.
+static void note_moves(bt_world *w, double most)
+{
+    bt_tiles *t = w->tiles;
+    for (bt_idx k = 0; k < t->n; k++) t->moved[k] += most;
+    t->moved_any += most;
+    for (bt_idx i = 0; i < t->n_tiled; i++) t->relabel = t->relabel || bt_tiles_outside(w, i) > t->allowance;
+}
+
+typedef struct {
+    bt_gid a, b;
+    int n_points;
+    double gap;       ///< least
+    uint32_t feature; ///< of the first point
+} contact;
+
+static int by_gids(const void *p, const void *q)
+{
+    const contact *a = p, *b = q;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    return a->b < b->b ? -1 : a->b > b->b;
+}
+
+/// Units of all tiles in the order of their gids; the caller frees.
+static contact *contacts_of(const bt_world *w, bt_idx *n)
+{
+    contact *c = bt_alloc((size_t)w->tiles->n_units, sizeof *c);
+    *n = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++) {
+        const bt_tile *t = &w->tiles->tile[k];
+        for (bt_idx j = 0; j < t->n_units; j++) {
+            const bt_unit *u = &t->units[j];
+            assert_int_equal(bt_tiles_of_pair(w, u->a, u->b), k);
+            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n, u->n > 1 ? bt_min(u->gap[0], u->gap[1]) : u->gap[0],
+                                  t->pairs[u->pair].feature[0]};
+        }
+    }
+    assert_int_equal(*n, w->tiles->n_units);
+    if (*n) qsort(c, (size_t)*n, sizeof *c, by_gids);
+    return c;
+}
+
+/// Tiles of one phase touch disjoint sets of movable bodies.
+static void assert_phases_disjoint(const bt_world *w)
+{
+    int *phase = bt_alloc((size_t)w->bodies.n, sizeof *phase);
+    bt_idx *tile = bt_alloc((size_t)w->bodies.n, sizeof *tile);
+    for (int p = 0; p < BT_COLOURS; p++) {
+        for (bt_idx i = 0; i < w->bodies.n; i++) tile[i] = -1;
+        for (bt_idx i = w->tiles->phase_start[p]; i < w->tiles->phase_start[p + 1]; i++) {
+            const bt_idx k = w->tiles->phase_tile[i];
+            for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
+                const bt_idx ends[2] = {w->tiles->tile[k].units[j].a, w->tiles->tile[k].units[j].b};
+                for (int e = 0; e < 2; e++) {
+                    if (w->bodies.inv[ends[e]].m == 0) continue;
+                    assert_true(tile[ends[e]] < 0 || tile[ends[e]] == k);
+                    tile[ends[e]] = k;
+                }
+            }
+        }
+    }
+    free(phase);
+    free(tile);
+}
+
 static void detect_equals_brute_force(void **state)
 {
     (void)state;
     uint64_t rng = 7;
-    int64_t total = 0;
+    int64_t total = 0, labellings = 0;
     for (int scene = 0; scene < 12; scene++) {
         const bool periodic = scene % 3 == 2;
         const double box = scene % 2 ? 12 : 25;
         bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
         for (int step = 0; step < 60; step++) {
-            const double margin = step % 20 < 10 ? 0.05 : 0.12; // the margin comes and goes
-            bt_contacts_detect(w, margin);
+            const double margin = bt_contacts_margin(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12)); // it comes and goes
+            bt_contacts_detect_all(w, margin);
             bt_manifold *want;
-            bt_idx n;
+            bt_idx n, m;
             bt_contacts_brute_force(w, margin, &want, &n);
-            const bt_contacts *c = w->contacts;
-            assert_int_equal(c->n_man, n);
+            contact *have = contacts_of(w, &m);
+            assert_int_equal(m, n);
             total += n;
             for (bt_idx k = 0; k < n; k++) {
-                assert_int_equal(c->man[k].a, want[k].a);
-                assert_int_equal(c->man[k].b, want[k].b);
-                if (k) assert_true(want[k].a > want[k - 1].a || (want[k].a == want[k - 1].a && want[k].b > want[k - 1].b));
+                assert_int_equal(have[k].a, w->bodies.gid[want[k].a]);
+                assert_int_equal(have[k].b, w->bodies.gid[want[k].b]);
             }
+            assert_phases_disjoint(w);
             free(want);
-            move_all(w, &rng, 0.03);
+            free(have);
+            move_all(w, &rng, 0.08);
+            note_moves(w, 0.09);
         }
-        assert_true(w->contacts->n_builds < 60); // the list is in fact kept
+        labellings += w->tiles->n_labellings;
+        assert_true(w->tiles->n_labellings < 30 && w->tiles->n_listings < 50 * w->tiles->n); // labels and lists are in fact kept
         bt_world_free(w);
     }
-    assert_true(total > 10000);
+    assert_true(total > 10000 && labellings > 14); // and renewed
 }
 
 /// Every separate pair nearer than the margin has a manifold, its least gap is the distance, and none is farther.
@@ -111,12 +181,13 @@ static void gaps_are_distances(void **state)
     int seen = 0, corners = 0;
     for (int scene = 0; scene < 10; scene++) {
         bt_world *w = random_scene(&rng, 120, scene % 2, 25);
-        const double margin = 0.6;
-        bt_contacts_detect(w, margin);
-        const bt_contacts *c = w->contacts;
-        bt_idx k = 0;
-        for (bt_idx i = 0; i < w->bodies.n; i++)
-            for (bt_idx j = i + 1; j < w->bodies.n; j++) {
+        const double margin = bt_contacts_margin(w, 0.5 / w->par.dt * 0.6);
+        bt_contacts_detect_all(w, margin);
+        bt_idx k = 0, n;
+        contact *c = contacts_of(w, &n);
+        for (bt_gid g = 0; g < w->bodies.n; g++)
+            for (bt_gid h = g + 1; h < w->bodies.n; h++) {
+                const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
                 if (w->bodies.motion[i] != BT_DYNAMIC && w->bodies.motion[j] != BT_DYNAMIC) continue;
                 double p[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], d[2];
                 bt_world_offset(w, i, j, d);
@@ -124,9 +195,9 @@ static void gaps_are_distances(void **state)
                 int nq = world_polygon(w, j, w->bodies.pose[i].x + d[0] - w->bodies.pose[j].x,
                                        w->bodies.pose[i].y + d[1] - w->bodies.pose[j].y, q);
                 double distance = reference_distance(p, np, q, nq);
-                while (k < c->n_man && (c->man[k].a < i || (c->man[k].a == i && c->man[k].b < j))) k++;
-                const bool have = k < c->n_man && c->man[k].a == i && c->man[k].b == j;
-                const double gap = have ? bt_min(c->man[k].p[0].gap, c->man[k].p[c->man[k].n_points - 1].gap) : INFINITY;
+                while (k < n && (c[k].a < g || (c[k].a == g && c[k].b < h))) k++;
+                const bool have = k < n && c[k].a == g && c[k].b == h;
+                const double gap = have ? c[k].gap : INFINITY;
                 if (have && gap <= 0) continue; // they overlap
                 if (distance > margin + 1e-12) {
                     assert_false(have);
@@ -135,9 +206,10 @@ static void gaps_are_distances(void **state)
                     // The reference edge may be a near tie (1 % of the radius) of the best one.
                     CHECK_CLOSE(gap, distance, 0.011);
                     seen++;
-                    corners += c->man[k].p[0].feature >= 0x7ff00000u && c->man[k].p[0].feature < 0x80000000u;
+                    corners += c[k].feature >= 0x7ff00000u && c[k].feature < 0x80000000u;
                 }
             }
+        free(c);
         bt_world_free(w);
     }
     assert_true(seen > 500);
@@ -150,10 +222,12 @@ static void arms_meet(void **state)
     (void)state;
     uint64_t rng = 3;
     bt_world *w = random_scene(&rng, 200, true, 15);
-    bt_contacts_detect(w, 0.1);
-    assert_true(w->contacts->n_man > 100);
-    for (bt_idx k = 0; k < w->contacts->n_man; k++) {
-        const bt_manifold *m = &w->contacts->man[k];
+    bt_manifold *man;
+    bt_idx n;
+    bt_contacts_brute_force(w, 0.1, &man, &n);
+    assert_true(n > 100);
+    for (bt_idx k = 0; k < n; k++) {
+        const bt_manifold *m = &man[k];
         double d[2];
         bt_world_offset(w, m->a, m->b, d);
         CHECK_CLOSE(hypot(m->nx, m->ny), 1, 1e-12);
@@ -171,13 +245,14 @@ static void arms_meet(void **state)
             const double step = 1e-4;
             w->bodies.pose[m->b].x += step * m->nx;
             w->bodies.pose[m->b].y += step * m->ny;
-            if (bt_contacts_pair(w, m->a, m->b, 0.2, m, &after, &gap, &axis))
+            if (bt_contacts_pair(w, m->a, m->b, 0.2, (int)(m->p[0].feature >> 31), &after, &gap, &axis))
                 CHECK_CLOSE(bt_min(after.p[0].gap, after.p[after.n_points - 1].gap),
                             bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) + step, 1e-7);
             w->bodies.pose[m->b].x -= step * m->nx;
             w->bodies.pose[m->b].y -= step * m->ny;
         }
     }
+    free(man);
     bt_world_free(w);
 }
 
@@ -195,25 +270,30 @@ static void edge_contact_keeps_its_features(void **state)
     bt_world_add(w, &d);
     uint32_t features[2] = {0, 0};
     for (int s = 0; s < 50; s++) {
-        bt_contacts_detect(w, 0.05);
-        assert_int_equal(w->contacts->n_man, 1);
-        bt_manifold *m = &w->contacts->man[0];
-        assert_int_equal(m->n_points, 2);
-        CHECK_CLOSE(m->nx, 1, 0.02);
+        bt_contacts_detect_all(w, 0.05);
+        assert_int_equal(w->tiles->n_units, 1);
+        const bt_idx k = bt_tiles_of_pair(w, 0, 1);
+        bt_unit *u = &w->tiles->tile[k].units[0];
+        bt_pair *pair = &w->tiles->tile[k].pairs[u->pair];
+        assert_int_equal(u->n, 2);
+        CHECK_CLOSE(u->nx, 1, 0.02);
         if (s == 0) {
-            CHECK_CLOSE(fabs(m->p[0].ra[1] - m->p[1].ra[1]), 0.7, 1e-12);
-            CHECK_CLOSE(m->p[0].gap, 0.01, 1e-12);
+            CHECK_CLOSE(fabs(u->ran[0] - u->ran[1]), 0.7, 1e-12);
+            CHECK_CLOSE(u->gap[0], 0.01, 1e-12);
         } else {
-            CHECK_CLOSE(m->p[0].ln, 100 + s - 1, 0);
-            assert_int_equal(m->p[0].feature, features[0]);
-            assert_int_equal(m->p[1].feature, features[1]);
+            CHECK_CLOSE(u->ln[0], 100 + s - 1, 0);
+            CHECK_CLOSE(u->lt, 7 + s - 1, 0);
+            assert_int_equal(pair->feature[0], features[0]);
+            assert_int_equal(pair->feature[1], features[1]);
         }
-        features[0] = m->p[0].feature, features[1] = m->p[1].feature;
-        m->p[0].ln = 100 + s; // must be handed on to the next step
+        features[0] = pair->feature[0], features[1] = pair->feature[1];
+        pair->ln[0] = 100 + s; // must be handed on to the next step
+        pair->lt = 7 + s;
         w->bodies.pose[1].y += 0.002;
         w->bodies.pose[1].yaw = 2e-4 * (s % 2 ? 1 : -1); // the two edges take turns in being the better axis
         bt_world_turn_outline(w, 1);
         w->bodies.path[1] += 0.01;
+        note_moves(w, 0.01);
     }
     bt_world_free(w);
 }

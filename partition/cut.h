@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// A weighted graph of tiles and its cut into parts of equal work: which rank owns which tile.
+#ifndef BT_CUT_H
+#define BT_CUT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/// Undirected graph in compressed rows: every edge stands in the rows of both of its ends, with the same weight. Sums of all
+/// weights and of all edges must fit into int64_t; loops (an edge from a vertex to itself) are ignored.
+typedef struct bt_graph {
+    int n;                 ///< vertices (tiles)
+    const int *start;      ///< [n+1] first neighbour of each vertex
+    const int *to;         ///< [start[n]] neighbours
+    const int64_t *edge;   ///< [start[n]] >= 0: what is exchanged when the two ends lie in different parts (floes)
+    const int64_t *weight; ///< [n] >= 0: work; any unit
+    const double (*at)[2]; ///< [n] m, position of the vertex
+    const int *group;      ///< [n] vertices of the same group >= 0 stay together (tiles under a large body), −1 = free; NULL = none
+} bt_graph;
+
+typedef enum {
+    BT_CUT_NONE,   ///< nothing to decide: one part, or every vertex a part of its own
+    BT_CUT_KEPT,   ///< the labels before, with vertices shifted between neighbour parts
+    BT_CUT_METIS,  ///< METIS, with vertices shifted where it was out of balance
+    BT_CUT_BISECT, ///< recursive coordinate bisection, likewise
+} bt_cut_method;
+
+typedef struct bt_cut_quality {
+    double imbalance;     ///< heaviest part / mean − 1; 0 if nothing weighs anything
+    int64_t cut;          ///< weight of the edges between parts
+    int n_empty;          ///< parts without a vertex
+    int64_t moved;        ///< weight of the vertices whose label changed (none of those that had no label before)
+    bt_cut_method method; ///< what made it
+} bt_cut_quality;
+
+/// Cut the graph into n_parts >= 1 parts of equal weight, with little weight on the edges between them and few labels changed.
+/// part: in, the labels before (outside 0 ... n_parts − 1: none); out, the labels. tolerance: imbalance that is as good as none,
+/// e.g. 0.03. A vertex or group heavier than a part's share gets a part of its own, and the rest is balanced without
+/// it. A part is empty only if there are fewer vertices (a group counts as one) than parts. q may be NULL.
+/// Deterministic: the same graph and labels before give the same labels. Not to be called by two threads at once (METIS).
+/// Signal handlers are as before on return; a SIGTERM that comes while METIS runs is delivered to the caller's handler
+/// afterwards. That holds for the calling thread: other threads should block SIGTERM.
+void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q);
+
+/// Quality of labels. before: as in bt_cut, NULL = none. method is BT_CUT_NONE.
+bt_cut_quality bt_cut_measure(const bt_graph *g, int n_parts, const int *part, const int *before);
+
+/// Every label in 0 ... n_parts − 1, groups together, and no part empty unless there are fewer vertices than parts.
+bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part);
+
+/// Rows in order, neighbours in range, nothing negative, every edge in both rows with one weight.
+bool bt_graph_is_valid(const bt_graph *g);
+
+#endif

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// The division of a world among ranks: who owns which tile, and what is sent to whom. w->domain == NULL: one rank, nothing to do.
+#ifndef BERGTOW_DOMAIN_H
+#define BERGTOW_DOMAIN_H
+
+#include "bergtow/tiles.h"
+#include "bergtow/world.h"
+#include "phases.h"
+
+typedef struct bt_domain bt_domain;
+
+void bt_domain_free(bt_domain *d);
+
+/// Does this rank answer for the contacts of tile (x, y); for the large movable bodies; for body i?
+bool bt_domain_owns_tile(const bt_world *w, int32_t x, int32_t y);
+bool bt_domain_owns_large(const bt_world *w);
+bool bt_domain_owns(const bt_world *w, bt_idx i);
+
+/// Maxima over the ranks. Collective.
+void bt_domain_maxima(const bt_world *w, double *x, int n);
+/// Totals of a pass over the ranks. Collective.
+void bt_domain_reduce(const bt_world *w, bt_totals *t);
+/// Sum modulo 2⁶⁴ over the ranks. Collective.
+uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x);
+
+/// Is a new division due?
+bool bt_domain_due(const bt_world *w);
+/// After labelling: choose owners, move bodies (owned and ghosts) and traces to where they belong now. Takes and returns the traces. Collective.
+bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n);
+/// After the tiles have been made: what is exchanged with whom. Collective.
+void bt_domain_connect(bt_world *w);
+
+/// Speeds of the tiles of other ranks into bound and awake of the tiles here that they reach. Collective.
+void bt_domain_share_speeds(bt_world *w);
+/// After the detection: which bodies the units of this step touch. Collective.
+void bt_domain_select(bt_world *w);
+/// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
+void bt_domain_send(bt_world *w, int phase, bt_vel *v);
+void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
+/// After the solve: velocities of large bodies and the tow line's impulse to all ranks. Collective.
+void bt_domain_settle(bt_world *w);
+
+/// Largest value of every body over the ranks that hold it: x [n bodies]. Collective.
+void bt_domain_largest(const bt_world *w, double *x);
+
+/// Join the names of islands that meet in a body held by several ranks: name [n bodies] in and out. Collective.
+void bt_domain_join_names(const bt_world *w, bt_gid *name);
+/// Add sums of islands with the same name over the ranks. Collective.
+void bt_domain_add_by_name(const bt_world *w, const bt_idx *root, const bt_gid *name, bt_sum *sum);
+
+#endif

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// METIS behind a guard: k-way cut of a weighted graph (Karypis & Kumar 1998, J. Parallel Distrib. Comput. 48).
+//
+// What METIS 5.1 does unguarded, each met in a trial on Debian 12:
+//   - one part: division by zero (SIGFPE). The caller keeps that away.
+//   - weights that add up to 2³¹ or more, or all zero: METIS_OK with every vertex in one part. Weights are scaled so
+//     that their sum stays below 2³⁰, nonzero ones to at least 1.
+//   - few vertices a part: empty parts under METIS_OK. Every part is counted.
+//   - contiguous parts asked of a graph that is not connected: an error. Contiguity is not asked for.
+//   - it sets its own handlers of SIGTERM and SIGABRT and afterwards puts the caller's back as one-shot
+//     ones (SA_RESETHAND); the actions are saved and restored here.
+//   - a SIGTERM while it runs makes it return METIS_ERROR, and the caller never learns of the signal. Our arguments are
+//     checked, so METIS_ERROR is taken for that and the signal raised again under the caller's handler. Rejected: blocking
+//     SIGTERM meanwhile; the kernel would hand it to another thread, where METIS's handler jumps into
+//     nowhere.
+#include "cut_method.h"
+
+#include <limits.h>
+#include <metis.h>
+#include <signal.h>
+#include <stdlib.h>
+
+#include "bergtow/base.h"
+
+enum { SUM_MAX = 1 << 30 };
+
+// Divisor that brings the sum of n weights down to SUM_MAX, what rounding up to 1 adds included.
+static int64_t divisor_of(int64_t sum, int64_t n)
+{
+    int64_t room = SUM_MAX > 2 * n ? SUM_MAX - n : SUM_MAX / 2;
+    return sum / room + 1;
+}
+
+static idx_t scaled(int64_t weight, int64_t divisor)
+{
+    return (idx_t)(weight / divisor + (weight % divisor != 0));
+}
+
+static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t *weight, idx_t *edge, idx_t n_parts, double tolerance,
+                      idx_t *part)
+{
+    idx_t options[METIS_NOPTIONS], one = 1, cut;
+    METIS_SetDefaultOptions(options);
+    options[METIS_OPTION_SEED] = 1;
+    options[METIS_OPTION_NUMBERING] = 0;
+    options[METIS_OPTION_CONTIG] = 0;
+    double permille = 1000 * tolerance;
+    options[METIS_OPTION_UFACTOR] = permille < 1 ? 1 : permille > 1000 ? 1000 : (idx_t)permille;
+
+    struct sigaction term, abrt;
+    sigaction(SIGTERM, NULL, &term);
+    sigaction(SIGABRT, NULL, &abrt);
+    int status = METIS_PartGraphKway(&n, &one, start, to, weight, NULL, edge, &n_parts, NULL, NULL, options, &cut, part);
+    sigaction(SIGTERM, &term, NULL);
+    sigaction(SIGABRT, &abrt, NULL);
+    if (status == METIS_ERROR) raise(SIGTERM);
+    return status;
+}
+
+bool bt_cut_by_metis(const bt_graph *g, int n_parts, double tolerance, int *part)
+{
+    _Static_assert(sizeof(idx_t) == sizeof(int), "METIS with 64-bit indices: copy start, to and part");
+    int n = g->n, n_edges = g->start[n];
+    if (n > SUM_MAX / 4 || n_edges > SUM_MAX / 4) return false;
+    int64_t sum_weight = 0, sum_edge = 0;
+    for (int i = 0; i < n; i++) sum_weight += g->weight[i];
+    for (int e = 0; e < n_edges; e++) sum_edge += g->edge[e];
+
+    idx_t *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc((size_t)n_edges, sizeof *to);
+    idx_t *weight = bt_alloc((size_t)n, sizeof *weight), *edge = bt_alloc((size_t)n_edges, sizeof *edge);
+    int64_t divisor = divisor_of(sum_weight, n), edge_divisor = divisor_of(sum_edge, n_edges);
+    for (int i = 0; i <= n; i++) start[i] = g->start[i];
+    for (int i = 0; i < n; i++) weight[i] = scaled(g->weight[i], divisor);
+    for (int e = 0; e < n_edges; e++) {
+        to[e] = g->to[e];
+        edge[e] = g->edge[e] ? scaled(g->edge[e], edge_divisor) : 1; // METIS wants edges > 0
+    }
+    int status = call_metis(n, start, to, weight, edge, n_parts, tolerance, part);
+    free(start);
+    free(to);
+    free(weight);
+    free(edge);
+
+    bool good = status == METIS_OK;
+    int *count = bt_alloc((size_t)n_parts, sizeof *count);
+    for (int i = 0; good && i < n; i++) {
+        good = part[i] >= 0 && part[i] < n_parts;
+        if (good) count[part[i]]++;
+    }
+    for (int p = 0; good && p < n_parts; p++) good = count[p] > 0;
+    free(count);
+    return good;
+}
