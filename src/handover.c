@@ -51,7 +51,7 @@ static int most_vertices(const bt_comm *c, const bt_bodies *b)
 /// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
 static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const list *l, const int64_t *offsets, double *vertices, bt_errors *err)
 {
-    enum { PORTION = 6 };
+    enum { PORTION = 4 };
     const int most = most_vertices(c, b);
     double (*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows), (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
     bt_status status = BT_OK;
