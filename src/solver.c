@@ -65,7 +65,7 @@ static bool velocities_from_impulses(bt_world *w)
 {
     const bt_tiles *ts = w->tiles;
     bt_bodies *b = &w->bodies;
-#pragma omp parallel for schedule(static) if (ts->n_units > 1500)
+#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, 1500))
     for (bt_idx k = 0; k < ts->n; k++) {
         const bt_tile *tile = &ts->tile[k];
         if (k < ts->n - 1 && !ts->awake[k]) continue;
@@ -164,7 +164,7 @@ static void accelerate(bt_world *w, const bt_totals *t)
     bt_anderson *a = w->solver->anderson;
     const bt_anderson_verdict verdict = bt_anderson_decide(a, t);
     if (!a->recording) return;
-#pragma omp parallel for schedule(static, 8) if (ts->n_units > 1500)
+#pragma omp parallel for schedule(static, 8) if (BT_MANY(ts->n_units, 1500))
     for (bt_idx k = 0; k < ts->n; k++) {
         bt_tile *tile = &ts->tile[k];
         if (verdict != BT_ANDERSON_STAY && tile->own && tile->n_units > 0) bt_anderson_move_units(a, verdict, tile);
@@ -243,6 +243,7 @@ void bt_solver_solve(bt_world *w)
     bt_solver *s = w->solver;
     bt_step_stats *st = &w->stats;
     st->restitution_cut = false;
+    s->shifted = false; // the displacements of the last step are over, and their array is of the bodies that were here then
     s->prepare_s = 0;
     st->sweeps = 0;
     const double t0 = bt_clock();
