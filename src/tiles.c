@@ -333,7 +333,7 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
     if (n > 0) qsort(trace, (size_t)n, sizeof *trace, by_gids);
     for (int64_t k = 0; k < n; k++) {
         const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
-        assert(a >= 0 && b >= 0);
+        if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
         bt_tile *tile = &t->tile[bt_tiles_of_pair(w, a, b)];
         if (tile->n_pairs == tile->cap_pairs) {
             tile->cap_pairs = tile->cap_pairs ? 2 * tile->cap_pairs : 16;
@@ -344,6 +344,26 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
         memcpy(p->ln, trace[k].ln, sizeof p->ln);
     }
+}
+
+static bool adjacent(int32_t p, int32_t q, int32_t n)
+{
+    const int32_t d = p < q ? q - p : p - q;
+    return d <= 1 || n == 1 || (n > 1 && d == n - 1);
+}
+
+/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the margin they had (the
+/// last solution may be one that did not converge). No tile has both in its block, and no rank may hold both.
+static void drop_parted(const bt_world *w, bt_trace *trace, int64_t *n)
+{
+    const bt_bodies *b = &w->bodies;
+    int64_t kept = 0;
+    for (int64_t k = 0; k < *n; k++) {
+        const bt_idx i = bt_world_index(w, trace[k].a), j = bt_world_index(w, trace[k].b);
+        const bool one_large = b->large[i] || b->large[j];
+        if (one_large || (adjacent(b->tile[i][0], b->tile[j][0], w->tiles->wrap_x) && adjacent(b->tile[i][1], b->tile[j][1], w->tiles->wrap_y))) trace[kept++] = trace[k];
+    }
+    *n = kept;
 }
 
 /// With `renew` new tiles and labels, otherwise only new owners.
@@ -357,6 +377,7 @@ static void deal(bt_world *w, bool renew, double margin)
     }
     int64_t n;
     bt_trace *trace = bt_tiles_take_traces(w, &n);
+    if (renew) drop_parted(w, trace, &n);
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
     t->n = 0;
     trace = bt_domain_migrate(w, trace, &n);
