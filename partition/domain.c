@@ -138,6 +138,19 @@ static int *carry_over(const bt_world *w, const bt_domain *before)
     return owner;
 }
 
+/// Work counted since the last check, on the places of the new box: a cut that is due now is made from it.
+static double *carry_work(const bt_world *w, const bt_domain *before)
+{
+    const bt_tiles *t = w->tiles;
+    double *work = bt_alloc((size_t)t->n_x * (size_t)t->n_y, sizeof *work);
+    for (int64_t p = 0; before->work && p < (int64_t)before->n_x * before->n_y; p++) {
+        const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / t->side_x, py = (before->low_y + p / before->n_x + 0.5) * before->side_y / t->side_y;
+        const int32_t x = (int32_t)bt_max(0, bt_min(t->n_x - 1, floor(px) - t->low_x)), y = (int32_t)bt_max(0, bt_min(t->n_y - 1, floor(py) - t->low_y));
+        work[(int64_t)y * t->n_x + x] += before->work[p];
+    }
+    return work;
+}
+
 /// Work of every tile of the box, over the ranks: what was counted, or the number of bodies.
 static int64_t *gather_work(bt_world *w)
 {
@@ -206,16 +219,20 @@ void bt_division_map(bt_world *w, bool cut)
     const bt_tiles *t = w->tiles;
     bt_domain *d = w->domain;
     int *owner = carry_over(w, d);
+    double *work = carry_work(w, d);
     free(d->owner);
+    free(d->work);
     d->owner = owner;
+    d->work = work;
     d->low_x = t->low_x, d->low_y = t->low_y, d->n_x = t->n_x, d->n_y = t->n_y;
     d->side_x = t->side_x, d->side_y = t->side_y;
     d->under = bt_realloc(d->under, (size_t)t->n_x * (size_t)t->n_y, sizeof *d->under);
     mark_under(w);
-    if (cut || !d->dealt) cut_map(w);
-    free(d->work); // places have changed, or hands
-    d->work = bt_alloc((size_t)d->n_x * (size_t)d->n_y, sizeof *d->work);
-    d->steps = 0;
+    if (cut || !d->dealt) {
+        cut_map(w);
+        memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
+        d->steps = 0; // only now: where floes drift through the tiles, labels are renewed more often than the balance is looked at
+    }
     d->due = false;
     for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++)
         if (d->under[p]) {
