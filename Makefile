@@ -21,9 +21,10 @@ BASE   += -Werror
 endif
 OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
 OPT_debug   := -O1 -g3
+OPT_validate := -O2 -g -march=x86-64-v3 -DBT_VALIDATE
 OPT_asan    := -O1 -g3 -fsanitize=address,undefined -fno-sanitize-recover=undefined
-ifeq ($(filter $(CONFIG),release debug asan),)
-$(error CONFIG=$(CONFIG) is unknown: use release, debug or asan)
+ifeq ($(filter $(CONFIG),release debug validate asan),)
+$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate or asan)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
 LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lmetis -lm
@@ -36,11 +37,13 @@ LIB_OBJ := $(LIB_SRC:%.c=$(BUILD)/%.o)
 BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
 TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
+# Started under mpirun by the Python tests, not by themselves.
+RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long bench clean install tests lint asan partition-study FORCE
+.PHONY: all help deps demo test test-long validate bench clean install tests lint asan partition-study FORCE
 .DEFAULT_GOAL := all
 
-all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug or asan for the others)
+all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -78,7 +81,7 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
 
-tests: $(TEST_BIN) $(BUILD)/triad ## build the test programs
+tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
 
 $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 	@mkdir -p $(@D)
@@ -115,6 +118,7 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
 test: deps ## every test: units, known answers, same bits, command line
 	@$(AGAIN) all tests
+	@$(AGAIN) CONFIG=validate all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
 test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time step, tolerance cut tenfold
@@ -143,10 +147,13 @@ asan: ## the unit and physics tests under AddressSanitizer and UBSan
 	@$(AGAIN) CONFIG=asan all tests
 	@for t in $(TEST_SRC:%.c=build/asan/%); do echo $$t; ASAN_OPTIONS=allocator_may_return_null=1 OMP_WAIT_POLICY=passive $$t >build/asan/log 2>&1 || { cat build/asan/log; exit 1; }; done
 
+validate: deps ## the program with assertions, checks of the division, and teams of threads for every loop: build/validate/bergtow
+	@$(AGAIN) CONFIG=validate all
+
 install: all ## install the program into DESTDIR PREFIX
 	install -D -m 755 $(BUILD)/bergtow $(DESTDIR)$(PREFIX)/bin/bergtow
 
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d

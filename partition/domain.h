@@ -33,6 +33,9 @@ void bt_domain_note(bt_world *w);
 double bt_domain_exchange_time(const bt_world *w);
 /// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what its tiles need?
 bool bt_domain_is_valid(bt_world *w);
+/// Collective. Ends the run with the id of a body if it is not. With -DBT_VALIDATE after every migration and every BT_VALIDATE_STEPS steps.
+void bt_domain_validate(bt_world *w);
+enum { BT_VALIDATE_STEPS = 20 };
 
 /// Does this rank answer for the contacts of tile (x, y); for the large movable bodies; for body i?
 bool bt_domain_owns_tile(const bt_world *w, int32_t x, int32_t y);

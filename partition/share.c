@@ -189,6 +189,16 @@ void bt_domain_add_by_name(const bt_world *w, const bt_idx *up, const bt_gid *na
 
 // --- checks ----------------------------------------------------------------------------------------------------------
 
+/// Collective. Ends the run, after rank 0 has told why: a rank that leaves at once would take it down in the middle of its message.
+static _Noreturn void end_all(const bt_comm *c, bt_errors *err)
+{
+    bt_comm_errors(c, err);
+    bt_errors_print(err);
+    fflush(stderr);
+    bt_comm_rest(c);
+    bt_comm_abort(BT_ERR_NUMERIC);
+}
+
 /// Every body owned once: by their number and the sum of their mixed gids; when that fails, by name.
 void bt_domain_check(bt_world *w)
 {
@@ -213,20 +223,15 @@ void bt_domain_check(bt_world *w)
         bt_comm_rows_by_gid(d->comm, first, n, gid, 1, rows, block, &err);
         bt_errors_add(&err, "step %" PRId64 ": after a migration %" PRId64 " of %" PRId64 " bodies are owned; this is an error of the program: report the case, and go on with another number of ranks",
                       w->step, (int64_t)sums[0].v, b->n_global);
-        bt_comm_errors(d->comm, &err);
-        bt_errors_print(&err);
-        bt_comm_abort(BT_ERR_NUMERIC);
+        end_all(d->comm, &err);
     }
     free(gid);
 #ifdef BT_VALIDATE
-    if (!bt_domain_is_valid(w)) {
-        fprintf(stderr, "bergtow: step %" PRId64 ": the ranks disagree on bodies they share; this is an error of the program\n", w->step);
-        bt_comm_abort(BT_ERR_NUMERIC);
-    }
+    bt_domain_validate(w);
 #endif
 }
 
-typedef struct { bt_gid gid; uint64_t state; } copy;
+typedef struct { bt_gid gid; int64_t holders; uint64_t state; } copy;
 
 static int by_copy(const void *p, const void *q)
 {
@@ -235,20 +240,32 @@ static int by_copy(const void *p, const void *q)
     return (a->state > b->state) - (a->state < b->state);
 }
 
-bool bt_domain_is_valid(bt_world *w)
+/// Least gid of a body that stands in the wrong tile here, or under the wrong name; INT64_MAX = none.
+static bt_gid misplaced(const bt_world *w)
 {
-    const bt_domain *d = w->domain;
-    if (!d) return true;
     const bt_bodies *b = &w->bodies;
     const bt_tiles *t = w->tiles;
-    bool sound = true;
-    for (bt_idx k = 0; k < t->n - 1; k++) // what a tile may touch is here, and nothing stands where it does not belong
-        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++)
-            sound = sound && b->tile[i][0] == t->tile[k].x && b->tile[i][1] == t->tile[k].y && bt_world_index(w, b->gid[i]) == i;
+    bt_gid bad = INT64_MAX;
+    for (bt_idx k = 0; k < t->n; k++)
+        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
+            const bool here = k == t->n - 1 ? b->large[i] : b->tile[i][0] == t->tile[k].x && b->tile[i][1] == t->tile[k].y;
+            if ((!here || bt_world_index(w, b->gid[i]) != i) && b->gid[i] < bad) bad = b->gid[i];
+        }
+    return bad;
+}
+
+/// Collective. Least gid of a body that is not the same on all ranks that must hold it, or that some of them does not hold; −1 = none.
+static bt_gid find_fault(const bt_world *w)
+{
+    const bt_domain *d = w->domain;
+    const bt_bodies *b = &w->bodies;
+    bt_gid bad = misplaced(w);
     copy *mine = bt_alloc((size_t)b->n, sizeof *mine);
     size_t n = 0, n_all;
     for (bt_idx i = 0; i < b->n; i++) {
-        if (!shared(w, i)) continue;
+        int holder[BT_MAX_HOLDERS];
+        const int holders = b->large[i] ? d->comm->size : bt_division_holders(w, b->tile[i][0], b->tile[i][1], holder);
+        if (holders == 1) continue;
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
         const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i]};
@@ -260,12 +277,33 @@ bool bt_domain_is_valid(bt_world *w)
             h = (h ^ u) * UINT64_C(0x9e3779b97f4a7c15);
             h ^= h >> 29;
         }
-        mine[n++] = (copy){b->gid[i], h};
+        mine[n++] = (copy){b->gid[i], holders, h};
     }
     copy *all = gather(d->comm, mine, n, sizeof *mine, &n_all);
     if (n_all) qsort(all, n_all, sizeof *all, by_copy);
-    for (size_t k = 1; k < n_all; k++) sound = sound && (all[k].gid != all[k - 1].gid || all[k].state == all[k - 1].state);
+    for (size_t k = 0, same = 0; k < n_all; k++) {
+        same = k > 0 && all[k].gid == all[k - 1].gid ? same + 1 : 1;
+        const bool last = k + 1 == n_all || all[k + 1].gid != all[k].gid;
+        const bool sound = (same == 1 || (all[k].state == all[k - 1].state && all[k].holders == all[k - 1].holders)) && (!last || (int64_t)same == all[k].holders);
+        if (!sound && all[k].gid < bad) bad = all[k].gid;
+    }
     free(mine);
     free(all);
-    return !bt_comm_any(d->comm, !sound);
+    // As a maximum of doubles: exact below 2⁵³, and a name needs no more.
+    double least = -(double)bad;
+    bt_comm_reduce(d->comm, NULL, 0, &least, 1, NULL, 0);
+    return least > -(double)INT64_MAX ? (bt_gid)-least : -1;
+}
+
+bool bt_domain_is_valid(bt_world *w) { return !w->domain || find_fault(w) < 0; }
+
+void bt_domain_validate(bt_world *w)
+{
+    if (!w->domain) return;
+    const bt_gid bad = find_fault(w);
+    if (bad < 0) return;
+    bt_errors err = {0};
+    bt_errors_add(&err, "step %" PRId64 ": body %" PRId64 " is not the same on all ranks that need it; this is an error of the program: report the case, and go on with another number of ranks",
+                  w->step, bad);
+    end_all(w->domain->comm, &err);
 }

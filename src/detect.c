@@ -72,7 +72,7 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         memset(t->bound, 0, (size_t)t->n * sizeof *t->bound);
         memset(t->awake, 0, (size_t)t->n * sizeof *t->awake);
     }
-#pragma omp parallel for schedule(static) if (n > FEW_TILES)
+#pragma omp parallel for schedule(static) if (BT_MANY(n, FEW_TILES))
     for (bt_idx k = 0; k < n; k++) {
         double s = 0;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
@@ -196,7 +196,7 @@ static void detect(bt_world *w, bool again)
         tile->margin = margin;
         due[n_due++] = k;
     }
-#pragma omp parallel if (n_due > FEW_TILES)
+#pragma omp parallel if (BT_MANY(n_due, FEW_TILES))
     {
         thread_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)

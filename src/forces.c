@@ -75,7 +75,7 @@ void bt_forces_predict(bt_world *w)
     bt_bodies *b = &w->bodies;
     bt_tiles *t = w->tiles;
     const double turn = w->par.coriolis * w->par.dt, cos_f = cos(turn), sin_f = sin(turn);
-#pragma omp parallel for schedule(dynamic, 16) if (b->n > 2000)
+#pragma omp parallel for schedule(dynamic, 16) if (BT_MANY(b->n, 2000))
     for (bt_idx k = 0; k < t->n; k++) {
         if (t->rest[k] == BT_REST_KNOWN) continue;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {

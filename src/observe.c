@@ -60,7 +60,7 @@ static bt_totals observe_tiles(const bt_world *w, double slow2)
 {
     const bt_tiles *ts = w->tiles;
     bt_totals all = {.n_sums = N_SEEN};
-#pragma omp parallel if (w->bodies.n > 2000)
+#pragma omp parallel if (BT_MANY(w->bodies.n, 2000))
     {
         bt_totals t = {.n_sums = N_SEEN};
 #pragma omp for schedule(dynamic, 16)

@@ -20,7 +20,7 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 {
     const bt_tiles *ts = w->tiles;
     const bool exchange = exchanged && w->domain;
-#pragma omp parallel if (ts->n_units > FEW_UNITS)
+#pragma omp parallel if (BT_MANY(ts->n_units, FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
         for (int phase = 0; phase < BT_PHASES; phase++) {
@@ -47,7 +47,7 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
     const bt_tiles *ts = w->tiles;
-#pragma omp parallel if (ts->n_units > FEW_UNITS)
+#pragma omp parallel if (BT_MANY(ts->n_units, FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
 #pragma omp for schedule(dynamic, 4)

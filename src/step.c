@@ -76,7 +76,7 @@ static void advance(bt_world *w)
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + drift * w->par.water_v;
     const bool still = w->par.water_u == 0 && w->par.water_v == 0;
     double farthest = 0, out = 0;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (w->bodies.n > 2000)
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(w->bodies.n, 2000))
     for (bt_idx k = 0; k < ts->n; k++) {
         const bt_tile *t = &ts->tile[k];
         const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
@@ -143,7 +143,7 @@ static void balance(bt_world *w)
     const bt_tiles *ts = w->tiles;
     bt_step_stats *st = &w->stats;
     bt_totals all = {.n_sums = N_BALANCE};
-#pragma omp parallel if (w->bodies.n > 2000)
+#pragma omp parallel if (BT_MANY(w->bodies.n, 2000))
     {
         bt_totals t = {.n_sums = N_BALANCE};
 #pragma omp for schedule(dynamic, 16)
@@ -229,6 +229,9 @@ void bt_world_step(bt_world *w)
     advance(w); // X2 = X1 + U2 Δt + D
     bt_domain_note(w);
     w->step++;
+#ifdef BT_VALIDATE
+    if (w->step % BT_VALIDATE_STEPS == 0) bt_domain_validate(w);
+#endif
     st->exchange_s = bt_domain_exchange_time(w);
     st->detect_s += t1 - t0;
     st->solve_s += t3 - t2;

@@ -12,6 +12,8 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergtow"))
+# Assertions, checks of the division among ranks, and threads in every parallel loop: make validate.
+VALIDATE = os.path.abspath(os.environ.get("BERGTOW_VALIDATE", ROOT / "build/validate/bergtow"))
 DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 # A tow through loose ice, some 140 floes, done in a fraction of a second.
