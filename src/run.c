@@ -113,6 +113,18 @@ static int64_t count_outside(const run *r)
     return all;
 }
 
+/// Collective.
+static void note_division(run *r)
+{
+    const bt_domain_stats s = bt_domain_get_stats(r->w);
+    r->totals.divisions = s.divisions;
+    r->totals.imbalance = s.imbalance;
+    r->totals.worst_imbalance = s.worst_imbalance;
+    r->totals.edge_cut = s.cut;
+    r->totals.halo_share = s.halo;
+    bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);
+}
+
 static void add_phases(bt_phases *p, const bt_step_stats *st)
 {
     p->detect += st->detect_s;
@@ -191,6 +203,7 @@ static bt_status run_world(run *r, bt_errors *err)
     r->totals.n_steps = r->w->step;
     r->totals.floes_outside = count_outside(r);
     r->totals.state_hash = bt_world_hash(r->w);
+    note_division(r);
     char stopped[64] = "";
     if (r->stop) {
         snprintf(stopped, sizeof stopped, "signal %d after step %" PRId64, r->stop, r->w->step);

@@ -72,6 +72,12 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "wall_time_s", t->wall_time);
     bt_json_int(&j, "ranks", t->ranks);
     bt_json_int(&j, "threads", t->threads);
+    bt_json_int(&j, "divisions", t->divisions);
+    bt_json_int(&j, "moved_floes", t->moved_floes);
+    bt_json_number(&j, "imbalance", t->imbalance);
+    bt_json_number(&j, "worst_imbalance", t->worst_imbalance);
+    bt_json_number(&j, "edge_cut", t->edge_cut);
+    bt_json_number(&j, "halo_share", t->halo_share);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);

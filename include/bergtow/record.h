@@ -88,6 +88,9 @@ typedef struct bt_run_totals {
     int64_t floes_outside;       ///< left an open domain
     uint64_t state_hash;
     bt_phases phases;
+    // what the division among ranks has cost (domain.h); 0 for one rank
+    int64_t divisions, moved_floes;
+    double imbalance, worst_imbalance, edge_cut, halo_share;
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
 
