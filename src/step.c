@@ -21,8 +21,9 @@ static double wrap(double x, double low, double period)
     return x;
 }
 
-/// Move body i; returns the length of its path through the water's frame, m.
-static double move(bt_world *w, bt_idx i)
+/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there only for tiles
+/// that contacts may move: for others their array still holds what it held, maybe of other bodies.
+static double move(bt_world *w, bt_idx i, bool shifted)
 {
     bt_bodies *b = &w->bodies;
     const bt_solver *s = w->solver;
@@ -30,7 +31,7 @@ static double move(bt_world *w, bt_idx i)
     double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
     double x = dt * (b->vel[i].x - drift_x), y = dt * (b->vel[i].y - drift_y);
     b->stirred[i] = 0;
-    if (s->shifted) {
+    if (shifted) {
         const bt_vel d = s->shift[i];
         dx += d.x, dy += d.y, turn += d.w;
         x += d.x, y += d.y;
@@ -83,7 +84,7 @@ static void advance(bt_world *w)
         if (!moves && still) continue;
         double path = 0;
         for (bt_idx i = t->first; i < t->end; i++) {
-            path = bt_max(path, move(w, i));
+            path = bt_max(path, move(w, i, w->solver->shifted && moves));
             if (!last) out = bt_max(out, bt_tiles_outside(w, i));
         }
         ts->moved[k] += path;
