@@ -5,17 +5,18 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, call, changed, run
+from harness import call, changed, run
 
 # Loose enough that no jam decides on the force: in one, a single contact more or less is another history.
 CASE = {
-    "run": {"dt": 0.1, "duration": 120},
+    "run": {"dt": 0.1, "duration": 90},
     "domain": {"length": 34, "width": 16},
-    "ice": {"concentration": 0.55, "size": 0.8, "friction": 0.3, "size_law": "lognormal", "size_spread": 0.3},
+    "ice": {"concentration": 0.5, "size": 0.8, "friction": 0.3, "size_law": "lognormal", "size_spread": 0.3},
     "body": {"x": 3, "length": 2},
     "tow": {"speed": 0.2, "ramp": 2},
     "output": {"window_start": 20, "frame_interval": 20},
 }
+FIELDS = 8
 
 
 def permute(source, target, order):
@@ -32,43 +33,42 @@ def permute(source, target, order):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("renumbering")
-    first = run(folder, CASE, "--threads", 1, "--quiet", name="made")
-    result = call("field", folder / "case.yml", "-o", folder / "0.h5")
-    assert result.returncode == 0, result.stderr
-    n = first.summary["n_floes"]
+    """For each of the fields: as made, with the floes in another order, and (a change that does matter) without friction."""
     found = []
-    for k in range(5):
-        order = np.arange(n) if k == 0 else np.random.default_rng(k).permutation(n)
-        if k:
-            permute(folder / "0.h5", folder / f"{k}.h5", order)
-        found.append((order, run(folder, changed(CASE, ice__field=f"{k}.h5"), "--threads", 1, "--quiet", name=f"out{k}")))
-    assert found[0][1].hash == first.hash
+    for seed in range(1, FIELDS + 1):
+        folder = tmp_path_factory.mktemp(f"field{seed}")
+        case = changed(CASE, ice__seed=seed)
+        made = run(folder, case, "--threads", 1, "--quiet", name="made")
+        result = call("field", folder / "case.yml", "-o", folder / "made.h5")
+        assert result.returncode == 0, result.stderr
+        order = np.random.default_rng(seed).permutation(made.summary["n_floes"])
+        permute(folder / "made.h5", folder / "other.h5", order)
+        other = run(folder, changed(case, ice__field="other.h5"), "--threads", 1, "--quiet", name="other")
+        smooth = run(folder, changed(case, ice__friction=0), "--threads", 1, "--quiet", name="smooth")
+        found.append((order, made, other, smooth))
     return found
+
+
+def numbers(r):
+    return r.summary["mean_ice_resistance_n"], r.summary["mean_ice_resistance_se_n"]
 
 
 def test_it_is_the_same_field(runs):
     """The first frame has the same floes, each under its new number."""
-    pose = runs[0][1].dataset("/frames/pose")[0]
-    for order, r in runs[1:]:
-        assert not np.array_equal(order, runs[0][0])
-        np.testing.assert_array_equal(r.dataset("/frames/pose")[0], pose[order])
-        np.testing.assert_array_equal(r.dataset("/floes/area")[:], runs[0][1].dataset("/floes/area")[:][order])
-        assert r.hash != runs[0][1].hash
+    for order, made, other, _ in runs:
+        assert not np.array_equal(order, np.arange(len(order))) and made.hash != other.hash
+        np.testing.assert_array_equal(other.dataset("/frames/pose")[0], made.dataset("/frames/pose")[0][order])
+        np.testing.assert_array_equal(other.dataset("/floes/area")[:], made.dataset("/floes/area")[:][order])
 
 
 def test_the_mean_force_does_not_depend_on_the_numbers(runs):
-    mean = np.array([r.summary["mean_ice_resistance_n"] for _, r in runs])
-    error = np.array([r.summary["mean_ice_resistance_se_n"] for _, r in runs])
-    print(mean, error)
-    assert all(r.summary["unconverged_steps"] == 0 for _, r in runs)
-    assert np.all(error < 0.3 * mean) # or the comparison would say nothing
-    assert np.all(np.abs(mean - mean[0]) < np.minimum(error, error[0])), (mean, error)
-
-
-def test_a_change_that_matters_is_seen(runs):
-    """The same comparison tells another friction apart."""
-    folder = runs[0][1].dir.parent
-    mean, error = (runs[0][1].summary[f"mean_ice_resistance_{k}"] for k in ("n", "se_n"))
-    other = run(folder, changed(CASE, ice__field="0.h5", ice__friction=0.9), "--threads", 1, "--quiet", name="rough")
-    assert abs(other.summary["mean_ice_resistance_n"] - mean) > error
+    """Two histories of one field part by rounding after some seconds, whatever is done: single runs differ as independent ones do. So
+    each pair is held against the standard error of a difference, and the mean over the fields, where that evens out, against the standard error of
+    one run."""
+    made, other, smooth = (np.array([numbers(r[k]) for r in runs]).T for k in (1, 2, 3))
+    assert all(r.summary["unconverged_steps"] == 0 for row in runs for r in row[1:3])
+    assert np.all(made[1] < 0.3 * made[0]) # or the comparison would say nothing
+    difference, error = other[0] - made[0], np.hypot(other[1], made[1])
+    assert np.all(np.abs(difference) < 4 * error)
+    assert abs(difference.mean()) < made[1].mean()
+    assert (made[0] - smooth[0]).mean() > made[1].mean() # a change that matters is seen
