@@ -8,27 +8,32 @@
 
 #define DEPTH BT_ANDERSON_DEPTH
 #define DROP_COLUMNS 10.0
-#define MAX_REST 15
 #define GO_BACK 1e12
-#define STALL 150      // iterations without halving |f|
 #define MAX_GAMMA 1e6
-#define RIDGE 1e-11 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
+#define RIDGE 1e-9 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
+enum { PERIOD = 3, MAX_REST = 3, STALL = 30, MAX_EFFORT = 5 };
 
-enum { UNIT_ARRAYS = 2 + 2 * DEPTH, BODY_ARRAYS = 1 + DEPTH }; // f, g before, ΔG, ΔF; v before, ΔV
+// History of a tile: f and g of the iteration before, [n_units][3]; velocities before, [n_bodies][4] as bt_vel. Columns in single
+// precision: they only point the way, each iterate is swept again, and velocities are formed anew from the impulses at the end.
+enum { UNIT_BYTES = 3 * (2 * sizeof(double) + 2 * DEPTH * sizeof(float)), BODY_BYTES = 4 * (sizeof(double) + DEPTH * sizeof(float)) };
 
 void bt_anderson_start(bt_anderson *a, double energy)
 {
-    *a = (bt_anderson){.best = INFINITY, .mark = INFINITY, .before = INFINITY, .long_rest = STALL};
+    *a = (bt_anderson){.best = INFINITY, .mark = INFINITY, .before = INFINITY, .wait = PERIOD - 1};
     // Quantum 2⁻⁶⁴ of the sums: 10⁻¹⁰ of the energy at convergence, so that 10²⁷ times that energy still fits.
     a->scale = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
 }
 
-int bt_anderson_begin(bt_anderson *a)
+bool bt_anderson_begin(bt_anderson *a, bt_totals *t)
 {
-    a->recording = a->rest == 0;
-    a->has_column = a->recording && a->started;
+    if (a->wait > 0) {
+        a->wait--;
+        return false;
+    }
+    a->has_column = a->started;
     a->column = a->head;
-    return a->has_column ? 1 + 2 * DEPTH : 1;
+    t->n_sums = a->has_column ? 1 + 2 * DEPTH : 1;
+    return true;
 }
 
 void bt_anderson_reserve(bt_tile *tile, bool units)
@@ -36,27 +41,30 @@ void bt_anderson_reserve(bt_tile *tile, bool units)
     const bt_idx n_bodies = tile->end - tile->first;
     if (n_bodies > tile->cap_body_history) {
         tile->cap_body_history = n_bodies;
-        tile->body_history = bt_realloc(tile->body_history, 3 * BODY_ARRAYS * (size_t)n_bodies, sizeof(double));
+        free(tile->body_history);
+        tile->body_history = bt_alloc_aligned((size_t)n_bodies, BODY_BYTES);
     }
     if (units && tile->n_units > tile->cap_unit_history) {
         tile->cap_unit_history = tile->n_units + tile->n_units / 4;
         free(tile->unit_history);
-        tile->unit_history = bt_realloc(NULL, 3 * UNIT_ARRAYS * (size_t)tile->cap_unit_history, sizeof(double));
+        tile->unit_history = bt_alloc_aligned((size_t)tile->cap_unit_history, UNIT_BYTES);
     }
 }
 
-/// Arrays of a tile's unit history.
+/// Arrays of a tile's unit history, each [3 n_units].
 typedef struct {
-    double *f, *g, *dg[DEPTH], *df[DEPTH];
+    double *f, *g;
+    float *dg[DEPTH], *df[DEPTH];
 } history;
 
 static history history_of(const bt_tile *tile)
 {
     const size_t n = 3 * (size_t)tile->cap_unit_history;
-    history h = {tile->unit_history, tile->unit_history + n, {0}, {0}};
+    history h = {.f = tile->unit_history, .g = tile->unit_history + n};
+    float *columns = (float *)(tile->unit_history + 2 * n);
     for (int j = 0; j < DEPTH; j++) {
-        h.dg[j] = tile->unit_history + (size_t)(2 + j) * n;
-        h.df[j] = tile->unit_history + (size_t)(2 + DEPTH + j) * n;
+        h.dg[j] = columns + (size_t)j * n;
+        h.df[j] = columns + (size_t)(DEPTH + j) * n;
     }
     return h;
 }
@@ -65,45 +73,58 @@ static void add(const bt_anderson *a, bt_totals *t, int k, double x) { bt_sum_ad
 
 static int columns(const bt_anderson *a) { return a->depth < DEPTH ? a->depth + 1 : DEPTH; }
 
-void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, const double *x, bt_totals *t)
+static double weighted(const double *restrict weight, const float *restrict x, const float *restrict y, size_t n)
+{
+    double sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (size_t k = 0; k < n; k++) sum += weight[k] * (double)x[k] * (double)y[k];
+    return sum;
+}
+
+static double weighted_f(const double *restrict weight, const float *restrict x, const double *restrict y, size_t n)
+{
+    double sum = 0;
+#pragma omp simd reduction(+ : sum)
+    for (size_t k = 0; k < n; k++) sum += weight[k] * (double)x[k] * y[k];
+    return sum;
+}
+
+void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double *weight, bt_totals *t)
 {
     const history h = history_of(tile);
-    double norm = 0, gram[DEPTH] = {0}, right[DEPTH] = {0};
-    const int n_columns = a->has_column ? columns(a) : 0;
-    for (bt_idx i = 0; i < tile->n_units; i++) {
+    const size_t n = 3 * (size_t)tile->n_units;
+    float *restrict df = h.df[a->column], *restrict dg = h.dg[a->column];
+    double *restrict f = h.f, *restrict g = h.g, norm = 0;
+    for (bt_idx i = 0; i < tile->n_units; i++) { // x becomes f
         const bt_unit *u = &tile->units[i];
-        const double g[3] = {u->ln[0], u->ln[1], u->lt}, weight[3] = {u->w[0], u->w[1], u->wt};
+        double *now = x + 3 * i, *w = weight + 3 * i;
+        const double value[3] = {u->ln[0], u->ln[1], u->lt};
+        w[0] = u->w[0], w[1] = u->w[1], w[2] = u->wt;
         for (int c = 0; c < 3; c++) {
             const size_t k = 3 * (size_t)i + (size_t)c;
-            const double f = g[c] - x[k];
-            norm += weight[c] * f * f;
-            if (!a->recording) continue;
-            if (a->has_column) {
-                const double df = f - h.f[k];
-                h.df[a->column][k] = df;
-                h.dg[a->column][k] = g[c] - h.g[k];
-                for (int j = 0; j < n_columns; j++) {
-                    const double wd = weight[c] * h.df[j][k];
-                    gram[j] += wd * df;
-                    right[j] += wd * f;
-                }
-            }
-            h.f[k] = f;
-            h.g[k] = g[c];
+            if (a->has_column) dg[k] = (float)(value[c] - g[k]);
+            g[k] = value[c];
+            now[c] = value[c] - now[c];
         }
     }
+#pragma omp simd reduction(+ : norm)
+    for (size_t k = 0; k < n; k++) norm += weight[k] * x[k] * x[k];
     add(a, t, 0, norm);
-    for (int j = 0; j < n_columns; j++) {
-        add(a, t, 1 + j, gram[j]);
-        add(a, t, 1 + DEPTH + j, right[j]);
+    if (a->has_column) {
+#pragma omp simd
+        for (size_t k = 0; k < n; k++) df[k] = (float)(x[k] - f[k]);
+        for (int j = 0; j < columns(a); j++) {
+            add(a, t, 1 + j, weighted(weight, h.df[j], df, n));
+            add(a, t, 1 + DEPTH + j, weighted_f(weight, h.df[j], x, n));
+        }
     }
+    memcpy(f, x, n * sizeof *f);
 }
 
 void bt_anderson_collect_scalar(const bt_anderson *a, bt_anderson_scalar *s, double x, double g, double weight, bt_totals *t)
 {
     const double f = g - x;
     add(a, t, 0, weight * f * f);
-    if (!a->recording) return;
     if (a->has_column) {
         s->df[a->column] = f - s->f_before;
         s->dg[a->column] = g - s->g_before;
@@ -141,53 +162,35 @@ static bool solve_spd(int m, double a[DEPTH][DEPTH], double *b)
     return true;
 }
 
-/// Forget the columns and leave the next sweeps plain, twice as many each time: the plain sweep always gets there.
+/// Forget the columns and leave more sweeps plain, 0, 1, 3, 3...: the plain sweep always gets there.
 static void drop(bt_anderson *a)
 {
     a->depth = a->head = 0;
-    a->rest = a->next_rest;
-    a->next_rest = a->next_rest < MAX_REST ? 2 * a->next_rest + 1 : MAX_REST;
-    a->started = a->recording && a->rest == 0; // this iteration is then the first of the next history
+    a->wait += a->rest;
+    a->rest = a->rest < MAX_REST ? 2 * a->rest + 1 : MAX_REST;
 }
 
 bt_anderson_verdict bt_anderson_decide(bt_anderson *a, const bt_totals *t)
 {
     const double norm = bt_sum_value(&t->sum[0]);
-    const bool plain = a->rest > 0;
+    a->wait = PERIOD - 1;
     if (a->has_column && (!isfinite(norm) || norm > GO_BACK * a->before)) {
         drop(a);
         a->started = false;
         return BT_ANDERSON_BACK;
     }
+    a->started = true; // this iteration is the one before of the next
     a->before = norm;
-    bool dropped = false;
-    if (norm > DROP_COLUMNS * a->best) {
-        drop(a);
-        dropped = true;
-        a->best = norm; // the measure from here on: another piece of the problem
-    }
-    a->best = bt_min(a->best, norm);
-    if (norm < 0.25 * a->mark) {
-        a->mark = norm;
-        a->stalled = 0;
-    } else if (!plain && ++a->stalled > STALL) {
-        drop(a);
-        dropped = true;
-        a->started = false;
-        a->rest = a->long_rest;
-        a->long_rest *= 2;
+    const bool grown = norm > DROP_COLUMNS * a->best, better = norm < 0.25 * a->mark;
+    const bool stalled = !better && ++a->stalled > STALL;
+    a->best = grown ? norm : bt_min(a->best, norm); // the measure from here on: another piece of the problem
+    if (better || stalled) {
         a->mark = norm;
         a->stalled = 0;
     }
-    if (plain) {
-        a->rest--;
-        return BT_ANDERSON_STAY;
-    }
-    if (dropped) return BT_ANDERSON_STAY;
-    if (!a->has_column) {
-        a->started = true;
-        return BT_ANDERSON_STAY;
-    }
+    if (stalled && a->effort < MAX_EFFORT) a->effort++;
+    if (grown || stalled) drop(a);
+    if (grown || stalled || !a->has_column) return BT_ANDERSON_STAY;
     a->depth = columns(a);
     a->head = (a->column + 1) % DEPTH;
     double matrix[DEPTH][DEPTH];
@@ -209,12 +212,12 @@ void bt_anderson_move_units(const bt_anderson *a, bt_anderson_verdict v, bt_tile
     const history h = history_of(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         double move[3] = {0, 0, 0};
-        for (int c = 0; c < 3; c++) {
-            const size_t k = 3 * (size_t)i + (size_t)c;
-            if (v == BT_ANDERSON_BACK) move[c] = h.dg[a->column][k];
-            else
-                for (int j = 0; j < a->depth; j++) move[c] += a->gamma[j] * h.dg[j][k];
-        }
+        const size_t k = 3 * (size_t)i;
+        if (v == BT_ANDERSON_BACK)
+            for (size_t c = 0; c < 3; c++) move[c] = h.dg[a->column][k + c];
+        else
+            for (int j = 0; j < a->depth; j++)
+                for (size_t c = 0; c < 3; c++) move[c] += a->gamma[j] * h.dg[j][k + c];
         bt_unit *u = &tile->units[i];
         u->ln[0] -= move[0];
         u->ln[1] -= move[1];
@@ -230,25 +233,23 @@ double bt_anderson_moved(const bt_anderson *a, bt_anderson_verdict v, const bt_a
     return g - move;
 }
 
-void bt_anderson_move_bodies(const bt_anderson *a, bt_anderson_verdict v, bt_tile *tile, bt_vel *vel, const bt_inv *inv)
+void bt_anderson_move_bodies(const bt_anderson *a, bt_anderson_verdict v, bt_tile *tile, bt_vel *vel)
 {
-    const size_t n = 3 * (size_t)tile->cap_body_history;
-    double *before = tile->body_history, *dv[DEPTH];
-    for (int j = 0; j < DEPTH; j++) dv[j] = tile->body_history + (size_t)(1 + j) * n;
-    for (bt_idx i = tile->first; i < tile->end; i++) {
-        if (!(inv[i].m > 0)) continue;
-        const size_t k = 3 * (size_t)(i - tile->first);
-        double x[3] = {vel[i].x, vel[i].y, vel[i].w};
-        for (size_t c = 0; c < 3; c++) {
-            const double now = x[c];
-            if (a->has_column) dv[a->column][k + c] = now - before[k + c];
-            before[k + c] = now;
-            double move = 0;
-            if (v == BT_ANDERSON_BACK) move = dv[a->column][k + c];
-            else if (v == BT_ANDERSON_MOVE)
-                for (int j = 0; j < a->depth; j++) move += a->gamma[j] * dv[j][k + c];
-            x[c] = now - move;
-        }
-        vel[i].x = x[0], vel[i].y = x[1], vel[i].w = x[2];
+    // Velocities as a plain row of numbers; those of bodies of infinite mass do not change, and their columns are zero.
+    _Static_assert(sizeof *vel == 4 * sizeof(double), "a velocity is a row of four");
+    const size_t n = 4 * (size_t)(tile->end - tile->first), cap = 4 * (size_t)tile->cap_body_history;
+    double *restrict x = (double *)(vel + tile->first), *restrict before = tile->body_history;
+    float *columns_of = (float *)(before + cap), *restrict new = columns_of + (size_t)a->column * cap;
+    if (a->has_column) {
+#pragma omp simd
+        for (size_t k = 0; k < n; k++) new[k] = (float)(x[k] - before[k]);
+    }
+    memcpy(before, x, n * sizeof *x);
+    if (v == BT_ANDERSON_STAY) return;
+    for (int j = 0; j < (v == BT_ANDERSON_BACK ? 1 : a->depth); j++) {
+        const float *restrict column = v == BT_ANDERSON_BACK ? new : columns_of + (size_t)j * cap;
+        const double gamma = v == BT_ANDERSON_BACK ? 1 : a->gamma[j];
+#pragma omp simd
+        for (size_t k = 0; k < n; k++) x[k] -= gamma * (double)column[k];
     }
 }

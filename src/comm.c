@@ -6,6 +6,7 @@
 // that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one message.
 #include "bergtow/comm.h"
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -86,11 +87,17 @@ static void on_leaving(int code, void *unused)
 void bt_comm_start(int *argc, char ***argv)
 {
     if (running || (!getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK"))) return;
+    // Threads that MPI starts leave signals to the main thread: METIS must be able to hold SIGTERM back (partition/cut.h).
+    sigset_t block, before;
+    sigemptyset(&block);
+    sigaddset(&block, SIGTERM);
+    pthread_sigmask(SIG_BLOCK, &block, &before);
     int provided;
     if (MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided) != MPI_SUCCESS) {
         fprintf(stderr, "bergtow: MPI cannot be started; check the mpirun call, or start bergtow without it\n");
         exit(BT_ERR_USAGE);
     }
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
     running = true;
     world.mpi = MPI_COMM_WORLD;
     MPI_Comm_rank(world.mpi, &world.rank);

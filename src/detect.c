@@ -159,22 +159,29 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 static void order_tiles(bt_world *w)
 {
     bt_tiles *t = w->tiles;
-    bt_idx n = 0;
+    const bool line = w->tow && w->tow->mode == BT_TOW_LINE;
+    bt_idx next[2 * BT_PHASES + 1] = {0};
     t->n_units = 0;
-    for (int phase = 0; phase < BT_PHASES; phase++) {
-        t->phase_start[phase] = n;
-        for (int inner = 0; inner < 2; inner++) {
-            if (inner) t->phase_inner[phase] = n;
-            for (bt_idx k = 0; k < t->n; k++) {
-                const bt_tile *tile = &t->tile[k];
-                const bool line = k == t->n - 1 && w->tow && w->tow->mode == BT_TOW_LINE;
-                if (!tile->own || tile->phase != phase || (tile->n_units == 0 && !line) || tile->border == inner) continue;
-                t->phase_tile[n++] = k;
+    for (int pass = 0; pass < 2; pass++) {
+        for (bt_idx k = 0; k < t->n; k++) {
+            const bt_tile *tile = &t->tile[k];
+            if (!tile->own || (tile->n_units == 0 && !(line && k == t->n - 1))) continue;
+            const int place = 2 * tile->phase + !tile->border;
+            if (pass == 0) {
+                next[place + 1]++;
                 t->n_units += tile->n_units;
+            } else {
+                t->phase_tile[next[place]++] = k;
             }
         }
+        if (pass == 1) break;
+        for (int i = 0; i < 2 * BT_PHASES; i++) next[i + 1] += next[i];
+        for (int p = 0; p < BT_PHASES; p++) {
+            t->phase_start[p] = next[2 * p];
+            t->phase_inner[p] = next[2 * p + 1];
+        }
+        t->phase_start[BT_PHASES] = next[2 * BT_PHASES];
     }
-    t->phase_start[BT_PHASES] = n;
 }
 
 static void detect(bt_world *w, bool again)

@@ -6,7 +6,7 @@
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
 
-enum { BT_MAX_TOTALS = 12 };
+enum { BT_MAX_TOTALS = 40 };
 
 /// What a pass adds up over tiles, threads and ranks: exact sums, and one maximum.
 typedef struct bt_totals {

@@ -52,6 +52,7 @@ bool bt_restitution_begin(bt_world *w)
     const bt_tiles *ts = w->tiles;
     const bt_bodies *b = &w->bodies;
     islands *s = w->solver->islands;
+    if (!ts->rebounds) return false;
     double any = 0;
     for (bt_idx k = 0; k < ts->n && any == 0; k++)
         for (bt_idx i = 0; i < ts->tile[k].n_units && any == 0; i++) any = b->restitution[ts->tile[k].units[i].b] > 0;

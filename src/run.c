@@ -235,10 +235,24 @@ static int choose_threads(const bt_comm *comm, const bt_case *c, const bt_run_op
     return n > 1 ? n : 1;
 }
 
+/// Start the team, with signals left to the main thread (as in bt_comm_start).
+static void start_threads(int n)
+{
+    omp_set_num_threads(n);
+    sigset_t block, before;
+    sigemptyset(&block);
+    for (int k = 0; k < N_CAUGHT; k++) sigaddset(&block, caught[k]);
+    pthread_sigmask(SIG_BLOCK, &block, &before);
+#pragma omp parallel
+    {
+    }
+    pthread_sigmask(SIG_SETMASK, &before, NULL);
+}
+
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
 {
     const int threads = choose_threads(comm, c, o);
-    omp_set_num_threads(threads);
+    start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     bt_field f;
     bt_field_init(&f);

@@ -143,7 +143,7 @@ const bt_key bt_case_keys[] = {
     REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "sweeps after which a step is left and counted as not converged, assumed"),
-    INT("solver.inner_sweeps", solver.inner_sweeps, "1", "[1, 100]", "times a tile is swept before the next has its turn"),
+    INT("solver.inner_sweeps", solver.inner_sweeps, "3", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
     REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false", "sweeps without acceleration, as a reference"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),

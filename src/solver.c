@@ -15,8 +15,11 @@
 #include "phases.h"
 #include "restitution.h"
 
+#define ENOUGH 0.3 // of the tolerance: a tile that changes less is not swept again in the same turn
+
 bt_solver *bt_solver_create(void)
 {
+
     bt_solver *s = bt_alloc(1, sizeof *s);
     s->anderson = bt_alloc(1, sizeof *s->anderson);
     s->islands = bt_islands_create();
@@ -113,16 +116,22 @@ double bt_solver_residual(bt_world *w, double *rms)
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
 
+/// What a sweep is to do.
+typedef struct {
+    const bt_anderson *record; ///< keep the history of this sweep; NULL: a plain one
+    int64_t times;             ///< sweeps of a tile in its turn
+} sweep_order;
+
 static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    enum { ON_STACK = 256 };
-    const bt_anderson *a = context; // NULL: plain
+    enum { ON_STACK = 192 };
+    const sweep_order *o = context;
     bt_tile *tile = &w->tiles->tile[k];
     bt_vel *v = w->bodies.vel;
     const bt_inv *inv = w->bodies.inv;
-    double few[3 * ON_STACK], *x = few;
-    if (a) {
-        if (tile->n_units > ON_STACK) x = bt_alloc(3 * (size_t)tile->n_units, sizeof *x);
+    double few[6 * ON_STACK], *x = few;
+    if (o->record) {
+        if (tile->n_units > ON_STACK) x = bt_alloc(6 * (size_t)tile->n_units, sizeof *x);
         for (bt_idx i = 0; i < tile->n_units; i++) {
             x[3 * i] = tile->units[i].ln[0];
             x[3 * i + 1] = tile->units[i].ln[1];
@@ -131,22 +140,22 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     }
     bt_tow *line = line_of(w, k);
     const double line_before = line ? line->lambda : 0;
-    for (int64_t n = 0; n == 0 || n < w->par.inner_sweeps; n++) {
+    for (int64_t n = 0; n < o->times; n++) {
         double most = 0;
         for (bt_idx i = 0; i < tile->n_units; i++) most = bt_max(most, bt_update_unit(&tile->units[i], v, inv));
         if (line) most = bt_max(most, bt_tow_update(line, &v[bt_world_towed(w)], inv[bt_world_towed(w)]));
         if (n == 0) t->most = bt_max(t->most, most);
-        if (most == 0) break;
+        if (most <= ENOUGH * w->par.tolerance) break; // more would be for nothing until the neighbours have changed
     }
-    if (a) bt_anderson_collect(a, tile, x, t);
-    if (a && line) bt_anderson_collect_scalar(a, &w->solver->anderson->line, line_before, line->lambda, line->w, t);
+    if (o->record) bt_anderson_collect(o->record, tile, x, x + 3 * (size_t)tile->n_units, t);
+    if (o->record && line) bt_anderson_collect_scalar(o->record, &w->solver->anderson->line, line_before, line->lambda, line->w, t);
     if (x != few) free(x);
 }
 
-/// One sweep; returns the largest update, m/s. With a: sums for the acceleration into *t.
-static double sweep(bt_world *w, const bt_anderson *a, bt_totals *t)
+/// One sweep; returns the largest update, m/s.
+static double sweep(bt_world *w, const bt_anderson *record, int64_t times, bt_totals *t)
 {
-    bt_phases_run(w, sweep_tile, a, w->bodies.vel, t);
+    bt_phases_run(w, sweep_tile, &(sweep_order){record, times}, w->bodies.vel, t);
     bt_domain_reduce(w, t);
     return t->most;
 }
@@ -163,12 +172,11 @@ static void accelerate(bt_world *w, const bt_totals *t)
     bt_tiles *ts = w->tiles;
     bt_anderson *a = w->solver->anderson;
     const bt_anderson_verdict verdict = bt_anderson_decide(a, t);
-    if (!a->recording) return;
 #pragma omp parallel for schedule(static, 8) if (BT_MANY(ts->n_units, 1500))
     for (bt_idx k = 0; k < ts->n; k++) {
         bt_tile *tile = &ts->tile[k];
         if (verdict != BT_ANDERSON_STAY && tile->own && tile->n_units > 0) bt_anderson_move_units(a, verdict, tile);
-        if (k < ts->n - 1 ? ts->awake[k] : tile->own) bt_anderson_move_bodies(a, verdict, tile, w->bodies.vel, w->bodies.inv);
+        if (k < ts->n - 1 ? ts->awake[k] : tile->own) bt_anderson_move_bodies(a, verdict, tile, w->bodies.vel);
     }
     bt_tow *line = ts->tile[ts->n - 1].own ? line_of(w, ts->n - 1) : NULL;
     if (line && verdict != BT_ANDERSON_STAY) line->lambda = bt_anderson_moved(a, verdict, &a->line, line->lambda);
@@ -209,29 +217,29 @@ static void sweep_to_tolerance(bt_world *w)
     bt_step_stats *st = &w->stats;
     const double tolerance = w->par.tolerance;
     const int64_t limit = st->sweeps + w->par.max_sweeps;
+    const int64_t times = w->par.inner_sweeps > 1 ? w->par.inner_sweeps : 1;
     double pressed = warm_start(w);
     bt_domain_maxima(w, &pressed, 1);
     st->residual = bt_solver_residual(w, &st->residual_rms);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
     if (pressed > 0 && st->residual <= tolerance) {
-        sweep(w, NULL, &(bt_totals){0});
+        sweep(w, NULL, times, &(bt_totals){0});
         st->sweeps++;
         st->residual = bt_solver_residual(w, &st->residual_rms);
     }
-    if (st->residual > tolerance && !w->par.plain_sweeps) {
-        bt_anderson_start(a, w->tiles->heaviest * tolerance * tolerance);
-        reserve_history(w);
-    }
+    bt_anderson_start(a, w->tiles->heaviest * tolerance * tolerance);
+    if (st->residual > tolerance && !w->par.plain_sweeps) reserve_history(w);
     while (st->residual > tolerance && st->sweeps < limit) {
-        bt_totals t = {.n_sums = w->par.plain_sweeps ? 0 : bt_anderson_begin(a)};
-        const double change = sweep(w, w->par.plain_sweeps ? NULL : a, &t);
+        bt_totals t = {0};
+        const bool record = !w->par.plain_sweeps && bt_anderson_begin(a, &t);
+        const double change = sweep(w, record ? a : NULL, times << a->effort, &t);
         st->sweeps++;
         if (change <= tolerance || st->sweeps == limit) {
             velocities_from_impulses(w);
             st->residual = bt_solver_residual(w, &st->residual_rms);
             if (st->residual <= tolerance) break;
         }
-        if (!w->par.plain_sweeps && st->sweeps < limit) accelerate(w, &t);
+        if (record && st->sweeps < limit) accelerate(w, &t);
     }
     st->converged = st->residual <= tolerance;
     bt_phases_any_order(w, store, NULL, &(bt_totals){0});

@@ -172,6 +172,15 @@ static void balance(bt_world *w)
     st->overlap = all.most;
 }
 
+/// Add to a phase the time since *t0, less what was spent waiting for other ranks, which has its own entry.
+static void clock_phase(bt_world *w, double *phase, double *t0)
+{
+    const double now = bt_clock(), waited = bt_domain_exchange_time(w);
+    *phase += now - *t0 - waited;
+    w->stats.exchange_s += waited;
+    *t0 = now;
+}
+
 /// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
 /// faster (squeezed out of a wedge, spun, rebounding). When the solution outruns the margin, the step is
 /// detected and solved again with the margin that it needs, from the impulses found so far.
@@ -180,20 +189,17 @@ static void solve_contacts(bt_world *w)
     enum { MAX_REPEATS = 4 };
     bt_step_stats *st = &w->stats;
     bt_bodies *b = &w->bodies;
-    const double t0 = bt_clock();
+    double t0 = bt_clock();
     double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     if (bt_tiles_update(w, bt_contacts_margin(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     int64_t sweeps = 0;
     bool again = false;
     st->repeats = 0;
-    st->detect_s = bt_clock() - t0;
-    st->colour_s = st->solve_s = 0;
     for (bool done = false; !done;) {
-        const double t1 = bt_clock();
         bt_contacts_detect(w, again); // gaps and J at X1
-        const double t2 = bt_clock();
+        clock_phase(w, &st->detect_s, &t0);
         bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
-        const double t3 = bt_clock();
+        clock_phase(w, &st->solve_s, &t0);
         sweeps += st->sweeps;
         fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
         st->outrun = bt_contacts_outrun(w);
@@ -206,9 +212,9 @@ static void solve_contacts(bt_world *w)
                 bt_contacts_bound(w, b->vel, b->vel, true);
             }
         }
-        st->detect_s += t2 - t1 + bt_clock() - t3;
+        clock_phase(w, &st->detect_s, &t0);
         st->colour_s += w->solver->prepare_s;
-        st->solve_s += t3 - t2 - w->solver->prepare_s;
+        st->solve_s -= w->solver->prepare_s;
     }
     st->sweeps = sweeps;
 }
@@ -216,25 +222,23 @@ static void solve_contacts(bt_world *w)
 void bt_world_step(bt_world *w)
 {
     bt_step_stats *st = &w->stats;
-    const double t0 = bt_clock();
+    st->forces_s = st->detect_s = st->colour_s = st->solve_s = st->advance_s = st->exchange_s = 0;
+    double t0 = bt_clock();
     bt_tiles_begin(w);
-    const double t1 = bt_clock();
+    clock_phase(w, &st->detect_s, &t0);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
-    st->forces_s = bt_clock() - t1;
+    clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
-    const double t2 = bt_clock();
+    t0 = bt_clock();
     bt_solver_project(w); // D
     balance(w);
-    const double t3 = bt_clock();
+    clock_phase(w, &st->solve_s, &t0);
     advance(w); // X2 = X1 + U2 Δt + D
     bt_domain_note(w);
     w->step++;
 #ifdef BT_VALIDATE
     if (w->step % BT_VALIDATE_STEPS == 0) bt_domain_validate(w);
 #endif
-    st->exchange_s = bt_domain_exchange_time(w);
-    st->detect_s += t1 - t0;
-    st->solve_s += t3 - t2;
-    st->advance_s = bt_clock() - t3;
+    clock_phase(w, &st->advance_s, &t0);
 }

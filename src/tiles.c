@@ -105,10 +105,11 @@ static void choose(bt_world *w, double margin)
 {
     bt_tiles *t = w->tiles;
     const bt_bodies *b = &w->bodies;
-    // Box of the floes [0..3], largest radius [4] and mass [5], as maxima.
-    double most[6] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0};
+    // Box of the floes [0..3], largest radius [4], mass [5] and restitution [6], as maxima.
+    double most[7] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0, 0};
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], b->mass[i]);
+        most[6] = bt_max(most[6], b->restitution[i]);
         if (b->large[i] || !isfinite(b->pose[i].x + b->pose[i].y)) continue;
         most[0] = bt_max(most[0], -b->pose[i].x);
         most[1] = bt_max(most[1], -b->pose[i].y);
@@ -116,9 +117,10 @@ static void choose(bt_world *w, double margin)
         most[3] = bt_max(most[3], b->pose[i].y);
         most[4] = bt_max(most[4], b->radius[i]);
     }
-    bt_domain_maxima(w, most, 6);
+    bt_domain_maxima(w, most, 7);
     t->reach = most[4];
     t->heaviest = most[5];
+    t->rebounds = most[6] > 0;
     t->margin_max = bt_max(2 * margin, 0.25 * w->par.size);
     const double drift = (double)w->step * w->par.dt;
     const bool any = most[0] + most[2] >= 0;

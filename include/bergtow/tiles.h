@@ -94,6 +94,7 @@ typedef struct bt_tiles {
     double allowance;               ///< m, how far a centroid may stand outside its tile
     double reach;                   ///< largest radius of a floe in a tile, over all ranks, m
     double heaviest;                ///< largest mass, kg
+    bool rebounds;                  ///< some body has a restitution
     double margin_max;              ///< largest margin that these tiles allow, m
     int32_t low_x, low_y, n_x, n_y; ///< the box of tiles that hold floes
     int32_t wrap_x, wrap_y;         ///< tiles around a periodic direction, 0 = open; 1 = one tile, its own neighbour nowhere
