@@ -127,7 +127,7 @@ def test_the_division_is_sound(alone, name, ranks, threads):
 
 def test_threads_within_ranks(tmp_path):
     """So large that each rank has work for a team of threads (1,500 units of two points), with the exchange under way."""
-    case = changed(PRESS, domain__length=100, domain__width=60, run__duration=1.2, solver__max_sweeps=30)
+    case = changed(PRESS, domain__length=100, domain__width=60, run__duration=1.8, solver__max_sweeps=30)
     one = run(tmp_path, case, "--threads", 1, "--quiet")
     assert one.series("contacts").min() > 2 * 1500 and one.series("contacts").max() > 2 * 3000
     assert_same(one, many(tmp_path, 2, 2))
