@@ -238,6 +238,7 @@ void bt_anderson_move_bodies(const bt_anderson *a, bt_anderson_verdict v, bt_til
     // Velocities as a plain row of numbers; those of bodies of infinite mass do not change, and their columns are zero.
     _Static_assert(sizeof *vel == 4 * sizeof(double), "a velocity is a row of four");
     const size_t n = 4 * (size_t)(tile->end - tile->first), cap = 4 * (size_t)tile->cap_body_history;
+    if (n == 0) return; // a tile without bodies has no history
     double *restrict x = (double *)(vel + tile->first), *restrict before = tile->body_history;
     float *columns_of = (float *)(before + cap), *restrict new = columns_of + (size_t)a->column * cap;
     if (a->has_column) {
