@@ -174,8 +174,7 @@ void bt_domain_add_by_name(const bt_world *w, const bt_idx *up, const bt_gid *na
         if (m == 0 || all[m - 1].name != all[k].name) {
             all[m++] = all[k];
         } else {
-            all[m - 1].sum.v += all[k].sum.v;
-            all[m - 1].sum.bad = all[m - 1].sum.bad || all[k].sum.bad;
+            bt_sum_join(&all[m - 1].sum, &all[k].sum);
         }
     }
     for (bt_idx i = 0; i < b->n; i++) {

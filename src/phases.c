@@ -9,10 +9,7 @@ enum { FEW_UNITS = 1500 }; // fewer units are swept faster by one thread: a pass
 
 void bt_totals_merge(bt_totals *into, const bt_totals *from)
 {
-    for (int k = 0; k < into->n_sums; k++) {
-        into->sum[k].v += from->sum[k].v;
-        into->sum[k].bad = into->sum[k].bad || from->sum[k].bad;
-    }
+    for (int k = 0; k < into->n_sums; k++) bt_sum_join(&into->sum[k], &from->sum[k]);
     into->most = bt_max(into->most, from->most);
 }
 

@@ -12,6 +12,7 @@
 #include <stdbool.h>
 
 __extension__ typedef __int128 bt_int128;
+__extension__ typedef unsigned __int128 bt_uint128;
 
 typedef struct bt_sum {
     bt_int128 v; ///< in units of 2⁻⁶⁴
@@ -24,7 +25,14 @@ static inline void bt_sum_add(bt_sum *s, double x)
         s->bad = true;
         return;
     }
-    s->v += (bt_int128)(x * 0x1p64);
+    // Modulo 2¹²⁸: a sum that passes beyond 2⁶³ on the way to a total below is right, in every order.
+    s->v = (bt_int128)((bt_uint128)s->v + (bt_uint128)(bt_int128)(x * 0x1p64));
+}
+
+static inline void bt_sum_join(bt_sum *s, const bt_sum *more)
+{
+    s->v = (bt_int128)((bt_uint128)s->v + (bt_uint128)more->v);
+    s->bad = s->bad || more->bad;
 }
 
 static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
