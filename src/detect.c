@@ -129,7 +129,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
     bt_tile *t = &w->tiles->tile[k];
-    bt_pairs_update(w, k, t->margin, &s->pairs);
+    bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, (size_t)t->n_pairs);
     t->n_points = 0;
     t->overlap = 0;
@@ -249,9 +249,33 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
 
 double bt_world_overlap(bt_world *w)
 {
-    bt_contacts_detect_all(w, w->par.slop);
+    bt_tiles_begin(w);
+    bt_tiles_update(w, w->par.slop);
+    const bt_tiles *t = w->tiles;
     double deepest = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++) deepest = bt_max(deepest, w->tiles->tile[k].overlap);
+    // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
+#pragma omp parallel reduction(max : deepest) if (t->n > FEW_TILES)
+    {
+        bt_pair_scratch s = {0};
+#pragma omp for schedule(dynamic, 4)
+        for (bt_idx k = 0; k < t->n; k++) {
+            if (!t->tile[k].own) continue;
+            bt_tile own = t->tile[k];
+            own.pairs = NULL;
+            own.n_pairs = own.cap_pairs = 0;
+            own.listed = false;
+            bt_pairs_update(w, k, &own, 0, &s);
+            for (bt_idx i = 0; i < own.n_pairs; i++) {
+                bt_manifold m;
+                double gap;
+                int32_t axis = -1;
+                if (!bt_contacts_pair(w, own.pairs[i].a, own.pairs[i].b, 0, -1, &m, &gap, &axis)) continue;
+                for (int j = 0; j < m.n_points; j++) deepest = bt_max(deepest, -m.p[j].gap);
+            }
+            free(own.pairs);
+        }
+        bt_pair_scratch_free(&s);
+    }
     bt_domain_maxima(w, &deepest, 1);
     return deepest;
 }

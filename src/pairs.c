@@ -174,10 +174,9 @@ static void replace(bt_world *w, bt_tile *t, bt_pair_scratch *s, size_t n)
     t->n_pairs = (bt_idx)n;
 }
 
-void bt_pairs_update(bt_world *w, bt_idx k, double margin, bt_pair_scratch *s)
+void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s)
 {
     bt_tiles *ts = w->tiles;
-    bt_tile *t = &ts->tile[k];
     const bool last = k == ts->n - 1;
     const double skin = 0.2 * w->par.size, skin_large = w->par.size;
     const bt_idx block[4] = {k, t->right, t->above, t->diagonal};

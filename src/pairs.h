@@ -14,8 +14,8 @@ typedef struct bt_pair_scratch {
     size_t cap_found;
 } bt_pair_scratch;
 
-/// Make the list of tile k anew unless it holds for this margin.
-void bt_pairs_update(bt_world *w, bt_idx k, double margin, bt_pair_scratch *s);
+/// Make the list of tile k, kept in t, anew unless it holds for this margin.
+void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s);
 
 void bt_pair_scratch_free(bt_pair_scratch *s);
 

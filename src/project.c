@@ -15,19 +15,17 @@
 #include "kernel.h"
 #include "phases.h"
 
-static double gap_after(const bt_world *w, const bt_unit *u, int i)
-{
-    return u->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-}
-
 static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)context;
     bt_tile *tile = &w->tiles->tile[k];
     for (bt_idx j = 0; j < tile->n_units; j++) {
         bt_unit *u = &tile->units[j];
-        u->push[0] = u->push[1] = 0;
-        for (int i = 0; i < u->n; i++) t->most = bt_max(t->most, -gap_after(w, u, i));
+        for (int i = 0; i < u->n; i++) {
+            u->push[i] = 0;
+            u->after[i] = u->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
+            t->most = bt_max(t->most, -u->after[i]);
+        }
     }
 }
 
@@ -39,17 +37,20 @@ static void push_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const bt_inv *inv = w->bodies.inv;
     for (bt_idx j = 0; j < tile->n_units; j++) {
         bt_unit *u = &tile->units[j];
+        bt_vel da = d[u->a], db = d[u->b];
+        bool moved = false;
         for (int i = 0; i < u->n; i++) {
-            bt_vel da = d[u->a], db = d[u->b];
-            const double g2 = gap_after(w, u, i);
-            const double p = bt_max(0, u->push[i] - (bt_normal_velocity(u, i, &da, &db) + g2 + w->par.slop) * u->mn[i]), step = p - u->push[i];
+            const double open = bt_normal_velocity(u, i, &da, &db) + u->after[i] + w->par.slop;
+            const double p = bt_max(0, u->push[i] - open * u->mn[i]), step = p - u->push[i];
             if (step == 0) continue;
             u->push[i] = p;
+            moved = true;
             bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
-            bt_store(&d[u->a], inv[u->a], &da);
-            bt_store(&d[u->b], inv[u->b], &db);
             t->most = bt_max(t->most, fabs(step) * u->w[i]);
         }
+        if (!moved) continue;
+        bt_store(&d[u->a], inv[u->a], &da);
+        bt_store(&d[u->b], inv[u->b], &db);
     }
 }
 

@@ -153,7 +153,7 @@ static bt_status loop(run *r, bt_errors *err)
         bt_world_step(w);
         add_phases(&r->totals.phases, &w->stats);
         const double t0 = bt_clock();
-        if (w->step == r->o->dump_step && r->comm->rank == 0) status = bt_solver_dump(w, r->o->dump_path, err);
+        if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
         bt_sample s;
         bt_observe(w, r->reference_speed, &s);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
@@ -251,6 +251,10 @@ static void start_threads(int n)
 
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
 {
+    if (comm->size > 1 && o->dump_step >= 0) {
+        bt_errors_add(err, "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the step is the same)", comm->size);
+        return BT_ERR_USAGE;
+    }
     const int threads = choose_threads(comm, c, o);
     start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};

@@ -296,6 +296,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     if (!check_inside(c, f, err)) return BT_ERR_CASE;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
+    bt_world_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
     *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size};
     r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
@@ -323,6 +325,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
                       c->path ? c->path : "case", overlap, allowed);
         return BT_ERR_CASE;
     }
+    memset(w->bodies.stirred, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
     return BT_OK;
 }
 

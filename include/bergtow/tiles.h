@@ -55,6 +55,7 @@ typedef struct bt_unit {
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
     double gap[2];         ///< m
+    double after[2];       ///< gaps that U2 leaves at the end of the step, m
     double push[2];        ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the tile
     int32_t n;             ///< points, 1 or 2
