@@ -73,20 +73,40 @@ static void add(const bt_anderson *a, bt_totals *t, int k, double x) { bt_sum_ad
 
 static int columns(const bt_anderson *a) { return a->depth < DEPTH ? a->depth + 1 : DEPTH; }
 
+// Sums in four lanes, by hand: which term goes to which lane is then the same in every build and for any alignment of the arrays.
+typedef struct { double lane[4]; } lanes;
+
+static double total(const lanes *s) { return (s->lane[0] + s->lane[1]) + (s->lane[2] + s->lane[3]); }
+
+/// Σ weight x y
 static double weighted(const double *restrict weight, const float *restrict x, const float *restrict y, size_t n)
 {
-    double sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (size_t k = 0; k < n; k++) sum += weight[k] * (double)x[k] * (double)y[k];
-    return sum;
+    lanes s = {{0}};
+    size_t k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (size_t c = 0; c < 4; c++) s.lane[c] += weight[k + c] * (double)x[k + c] * (double)y[k + c];
+    for (; k < n; k++) s.lane[k & 3] += weight[k] * (double)x[k] * (double)y[k];
+    return total(&s);
 }
 
 static double weighted_f(const double *restrict weight, const float *restrict x, const double *restrict y, size_t n)
 {
-    double sum = 0;
-#pragma omp simd reduction(+ : sum)
-    for (size_t k = 0; k < n; k++) sum += weight[k] * (double)x[k] * y[k];
-    return sum;
+    lanes s = {{0}};
+    size_t k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (size_t c = 0; c < 4; c++) s.lane[c] += weight[k + c] * (double)x[k + c] * y[k + c];
+    for (; k < n; k++) s.lane[k & 3] += weight[k] * (double)x[k] * y[k];
+    return total(&s);
+}
+
+static double weighted_square(const double *restrict weight, const double *restrict x, size_t n)
+{
+    lanes s = {{0}};
+    size_t k = 0;
+    for (; k + 4 <= n; k += 4)
+        for (size_t c = 0; c < 4; c++) s.lane[c] += weight[k + c] * x[k + c] * x[k + c];
+    for (; k < n; k++) s.lane[k & 3] += weight[k] * x[k] * x[k];
+    return total(&s);
 }
 
 void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double *weight, bt_totals *t)
@@ -94,7 +114,7 @@ void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double 
     const history h = history_of(tile);
     const size_t n = 3 * (size_t)tile->n_units;
     float *restrict df = h.df[a->column], *restrict dg = h.dg[a->column];
-    double *restrict f = h.f, *restrict g = h.g, norm = 0;
+    double *restrict f = h.f, *restrict g = h.g;
     for (bt_idx i = 0; i < tile->n_units; i++) { // x becomes f
         const bt_unit *u = &tile->units[i];
         double *now = x + 3 * i, *w = weight + 3 * i;
@@ -107,9 +127,7 @@ void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double 
             now[c] = value[c] - now[c];
         }
     }
-#pragma omp simd reduction(+ : norm)
-    for (size_t k = 0; k < n; k++) norm += weight[k] * x[k] * x[k];
-    add(a, t, 0, norm);
+    add(a, t, 0, weighted_square(weight, x, n));
     if (a->has_column) {
 #pragma omp simd
         for (size_t k = 0; k < n; k++) df[k] = (float)(x[k] - f[k]);

@@ -12,7 +12,7 @@
 #include "pack.h"
 #include "pairs.h"
 
-enum { FEW_TILES = 24 }; // fewer are done by one thread: a team costs microseconds
+enum { FEW_TILES = 64 }; // fewer are done by one thread: a team costs microseconds
 
 double bt_contacts_margin(const bt_world *w, double s)
 {
@@ -72,7 +72,7 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         memset(t->bound, 0, (size_t)t->n * sizeof *t->bound);
         memset(t->awake, 0, (size_t)t->n * sizeof *t->awake);
     }
-#pragma omp parallel for schedule(static) if (BT_MANY(n, FEW_TILES))
+#pragma omp parallel for schedule(static) if (BT_MANY(b->n, 2000))
     for (bt_idx k = 0; k < n; k++) {
         double s = 0;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {

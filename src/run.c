@@ -10,6 +10,7 @@
 #include <omp.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "bergtow/field.h"
@@ -135,6 +136,26 @@ static void add_phases(bt_phases *p, const bt_step_stats *st)
     p->exchange += st->exchange_s;
 }
 
+/// Collective. Peak memory of all ranks, and the bytes of units and velocities that belong to a contact point.
+static void measure_memory(run *r)
+{
+    const bt_tiles *t = r->w->tiles;
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    double units = 0, points = 0;
+    for (bt_idx k = 0; k < t->n; k++) {
+        units += t->tile[k].n_units;
+        points += (double)t->tile[k].n_points;
+    }
+    bt_sum sums[3] = {{0}, {0}, {0}};
+    bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
+    bt_sum_add(&sums[1], units * (double)(sizeof(bt_unit) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
+    bt_sum_add(&sums[2], points);
+    bt_comm_reduce(r->comm, sums, 3, NULL, 0, NULL, 0);
+    r->totals.memory = bt_sum_value(&sums[0]);
+    r->totals.sweep_bytes_per_contact = bt_sum_value(&sums[2]) > 0 ? bt_sum_value(&sums[1]) / bt_sum_value(&sums[2]) : NAN;
+}
+
 static int64_t steps_to_do(const run *r)
 {
     const int64_t n = bt_case_steps(r->c);
@@ -202,6 +223,7 @@ static bt_status run_world(run *r, bt_errors *err)
 
     r->totals.n_steps = r->w->step;
     r->totals.floes_outside = count_outside(r);
+    measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
     note_division(r);
     char stopped[64] = "";

@@ -78,6 +78,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "worst_imbalance", t->worst_imbalance);
     bt_json_number(&j, "edge_cut", t->edge_cut);
     bt_json_number(&j, "halo_share", t->halo_share);
+    bt_json_number(&j, "memory_per_floe_b", n_floes > 0 ? t->memory / (double)n_floes : NAN);
+    bt_json_number(&j, "sweep_bytes_per_contact", t->sweep_bytes_per_contact);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);
