@@ -39,6 +39,7 @@ struct bt_domain {
     double side_x, side_y;   ///< of the tiles it was made for, m
     int large_owner;         ///< rank that owns the large movable bodies
     double large_path;       ///< path of the large movable bodies when the division was made, m
+    double drift;            ///< way of the water through tiles that do not move with it (periodic directions), since then, m
     uint8_t *owned;          ///< [n bodies] this rank answers for the body
     bt_idx cap_owned;
     // links
@@ -47,7 +48,6 @@ struct bt_domain {
     MPI_Request *request;    ///< [2 n_links]
     int n_requests;
     uint8_t *touched;        ///< [n bodies] bit p: a unit of phase p touches it
-    bt_idx cap_touched;
     // work since the last check
     double *work;            ///< [n_y][n_x] of this rank's tiles, s, modelled
     int64_t steps;           ///< since then

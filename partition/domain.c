@@ -97,9 +97,10 @@ bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int
 
 static bool movable_large(const bt_world *w, bt_idx i) { return w->bodies.large[i] && w->bodies.motion[i] == BT_DYNAMIC; }
 
+/// Longest path of a large movable body, −1 = there is none.
 static double large_path(const bt_world *w)
 {
-    double most = 0;
+    double most = -1;
     for (bt_idx i = 0; i < w->bodies.n; i++)
         if (movable_large(w, i)) most = bt_max(most, w->bodies.path[i]);
     return most;
@@ -112,6 +113,7 @@ static void mark_under(bt_world *w)
     bt_domain *d = w->domain;
     memset(d->under, 0, (size_t)d->n_x * (size_t)d->n_y);
     d->large_path = large_path(w);
+    d->drift = 0;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (!movable_large(w, i)) continue;
         const bt_tile_range r = bt_pairs_range(w, i, t->margin_max + 4 * w->par.size + t->reach + t->allowance);
@@ -293,7 +295,9 @@ void bt_domain_note(bt_world *w)
         const double sweeps = UNIT_STEP + UNIT_SWEEP * (double)st->sweeps * inner;
         d->work[last ? large : place(w, tile->x, tile->y)] += tile->n_units * sweeps + tile->n_pairs * PAIR + (tile->end - tile->first) * (last || bt_tiles_moves(t, k) ? BODY : BODY_AT_REST);
     }
-    const bool far = large_path(w) - d->large_path > 2 * w->par.size;
+    d->drift += w->par.dt * ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
+    const double path = large_path(w);
+    const bool far = path >= 0 && path - d->large_path + d->drift > 2 * w->par.size;
     if (++d->steps >= CHECK_STEPS) {
         bt_sum total = {0};
         double mine = 0;

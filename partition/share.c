@@ -41,6 +41,12 @@ void bt_domain_settle(bt_world *w)
 static void *gather(const bt_comm *c, const void *mine, size_t n, size_t size, size_t *n_all)
 {
     int *count = bt_alloc((size_t)c->size, sizeof *count), *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    uint64_t total[1] = {n * size}; // in 64 bits first: a sum beyond 2 GB is an error, not a wrong length
+    MPI_Allreduce(MPI_IN_PLACE, total, 1, MPI_UINT64_T, MPI_SUM, c->mpi);
+    if (total[0] > INT32_MAX) {
+        fprintf(stderr, "bergtow: rank %d: %" PRIu64 " bytes of shared bodies are too many for one message; take fewer ranks\n", c->rank, total[0]);
+        bt_comm_abort(BT_ERR_NUMERIC);
+    }
     const int bytes = (int)(n * size);
     MPI_Allgather(&bytes, 1, MPI_INT, count, 1, MPI_INT, c->mpi);
     for (int r = 0; r < c->size; r++) first[r + 1] = first[r] + count[r];

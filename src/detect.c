@@ -14,15 +14,19 @@
 
 enum { FEW_TILES = 64 }; // fewer are done by one thread: a team costs microseconds
 
+// A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun): a solution that flies apart
+// must not ask for tiles, and pair lists, of the whole field.
+static double most_margin(const bt_world *w) { return 16 * w->par.size; }
+
 double bt_contacts_margin(const bt_world *w, double s)
 {
     const double least = 2 * w->par.dt * s;
+    if (!(least < most_margin(w)) && w->par.size > 0) return most_margin(w);
     if (!(least > w->par.slop)) return w->par.slop;
     return exp2(0.5 * ceil(2 * log2(least)));
 }
 
-/// Speed of the fastest point of body i through the water's frame, m/s.
-static double speed_of(const bt_world *w, bt_idx i, const bt_vel *v)
+double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v)
 {
     const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
     return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
@@ -51,7 +55,7 @@ static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
     double fastest = 0;
     bool movable = false;
     for (bt_idx l = t->n_tiled; l < b->n; l++) {
-        double s = bt_max(speed_of(w, l, &v[l]), speed_of(w, l, &v2[l]));
+        double s = bt_max(bt_contacts_speed(w, l, &v[l]), bt_contacts_speed(w, l, &v2[l]));
         if (b->stirred[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
         movable = movable || b->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
@@ -76,7 +80,7 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
     for (bt_idx k = 0; k < n; k++) {
         double s = 0;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
-            s = bt_max(s, bt_max(speed_of(w, i, &v[i]), speed_of(w, i, &v2[i])));
+            s = bt_max(s, bt_max(bt_contacts_speed(w, i, &v[i]), bt_contacts_speed(w, i, &v2[i])));
             if (b->stirred[i]) s = bt_max(s, stir);
         }
         t->speed[k] = s;
@@ -104,7 +108,8 @@ bool bt_contacts_outrun(const bt_world *w)
     double any = 0;
     for (bt_idx k = 0; k < t->n && any == 0; k++) {
         const bt_tile *tile = &t->tile[k];
-        any = tile->own && t->bound[k] > 0 && (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin);
+        any = tile->own && t->bound[k] > 0 &&
+              (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * most_margin(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;

@@ -119,7 +119,11 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
     // position projection alone acts, and takes that out.
     w->par.position_sweeps = REST_SWEEPS;
     for (int k = 0; k < REST_STEPS; k++) {
-        for (bt_idx i = 0; i < f->n; i++) w->bodies.vel[bt_world_index(w, i)] = (bt_vel){0};
+        for (bt_idx i = 0; i < f->n; i++) {
+            const bt_idx at = bt_world_index(w, i);
+            w->bodies.vel[at] = (bt_vel){0};
+            w->bodies.stirred[at] = 1; // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
+        }
         bt_world_step(w);
         if (w->stats.overlap <= 3 * par.slop) break;
     }

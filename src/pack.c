@@ -91,7 +91,7 @@ static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
     // The friction of the points is one number: it stays with the normal impulses that stay.
     const double before = p->n_points > 1 ? p->ln[0] + p->ln[1] : p->n_points > 0 ? p->ln[0] : 0;
     const double kept = u->ln[0] + u->ln[1];
-    u->lt = kept == before ? p->lt : before > 0 ? p->lt * (kept / before) : 0;
+    u->lt = before == 0 ? 0 : kept == before ? p->lt : p->lt * (kept / before);
 }
 
 static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u)

@@ -58,6 +58,9 @@ bool bt_restitution_begin(bt_world *w)
         for (bt_idx i = 0; i < ts->tile[k].n_units && any == 0; i++) any = b->restitution[ts->tile[k].units[i].b] > 0;
     bt_domain_maxima(w, &any, 1);
     if (any == 0) return false;
+    // Units of an earlier detection in this step may still have the lowered restitution of its solution.
+    for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx i = 0; i < ts->tile[k].n_units; i++) bt_pack_bias(w, &ts->tile[k].units[i], 1);
 
     if (b->n > s->cap) {
         s->cap = b->n;

@@ -19,7 +19,6 @@
 
 bt_solver *bt_solver_create(void)
 {
-
     bt_solver *s = bt_alloc(1, sizeof *s);
     s->anderson = bt_alloc(1, sizeof *s->anderson);
     s->islands = bt_islands_create();
@@ -98,14 +97,15 @@ static void add_residual(bt_world *w, bt_idx k, const void *context, bt_totals *
         sum += r * r;
         rows++;
     }
-    bt_sum_add(&t->sum[0], sum * scale);
+    bt_sum_add(&t->sum[0], bt_min(sum * scale, 0x1p45));
     bt_sum_add(&t->sum[1], (double)rows);
 }
 
 double bt_solver_residual(bt_world *w, double *rms)
 {
-    // Squares in units in which the tolerance has 2³⁰: from 10⁻¹⁴ to 10⁴ times the tolerance is kept to twelve digits.
-    const double tolerance = w->par.tolerance, scale = tolerance > 0 ? exp2(30 - ceil(2 * log2(tolerance))) : 0x1p60;
+    // Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
+    // at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound.
+    const double tolerance = w->par.tolerance, scale = tolerance > 0 ? exp2(20 - ceil(2 * log2(tolerance))) : 0x1p60;
     bt_totals t = {.n_sums = 2};
     bt_phases_any_order(w, add_residual, &scale, &t);
     bt_domain_reduce(w, &t);

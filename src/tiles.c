@@ -105,11 +105,12 @@ static void choose(bt_world *w, double margin)
 {
     bt_tiles *t = w->tiles;
     const bt_bodies *b = &w->bodies;
-    // Box of the floes [0..3], largest radius [4], mass [5] and restitution [6], as maxima.
-    double most[7] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0, 0};
+    // Box of the floes [0..3], largest radius [4], mass [5], restitution [6] and speed [7], as maxima.
+    double most[8] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0, 0, 0};
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], b->mass[i]);
         most[6] = bt_max(most[6], b->restitution[i]);
+        most[7] = bt_max(most[7], bt_contacts_speed(w, i, &b->vel[i]));
         if (b->large[i] || !isfinite(b->pose[i].x + b->pose[i].y)) continue;
         most[0] = bt_max(most[0], -b->pose[i].x);
         most[1] = bt_max(most[1], -b->pose[i].y);
@@ -117,11 +118,11 @@ static void choose(bt_world *w, double margin)
         most[3] = bt_max(most[3], b->pose[i].y);
         most[4] = bt_max(most[4], b->radius[i]);
     }
-    bt_domain_maxima(w, most, 7);
+    bt_domain_maxima(w, most, 8);
     t->reach = most[4];
     t->heaviest = most[5];
     t->rebounds = most[6] > 0;
-    t->margin_max = bt_max(2 * margin, 0.25 * w->par.size);
+    t->margin_max = bt_max(2 * bt_max(margin, bt_contacts_margin(w, most[7])), 0.25 * w->par.size);
     const double drift = (double)w->step * w->par.dt;
     const bool any = most[0] + most[2] >= 0;
     t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : drift * w->par.water_u);
@@ -151,14 +152,17 @@ static void choose(bt_world *w, double margin)
     t->allowance = 0.5 * slack;
 }
 
+/// Only a pose that is not a number lies outside the box of the floes.
+static int32_t within(int32_t c, int32_t low, int32_t n) { return c < low ? low : c >= low + n ? low + n - 1 : c; }
+
 static void label(bt_world *w)
 {
     const bt_tiles *t = w->tiles;
     bt_bodies *b = &w->bodies;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->large[i]) continue;
-        b->tile[i][0] = coordinate(b->pose[i].x, t->x0, t->side_x, t->wrap_x);
-        b->tile[i][1] = coordinate(b->pose[i].y, t->y0, t->side_y, t->wrap_y);
+        b->tile[i][0] = within(coordinate(b->pose[i].x, t->x0, t->side_x, t->wrap_x), t->low_x, t->n_x);
+        b->tile[i][1] = within(coordinate(b->pose[i].y, t->y0, t->side_y, t->wrap_y), t->low_y, t->n_y);
     }
 }
 
@@ -397,7 +401,7 @@ void bt_tiles_begin(bt_world *w)
     bt_tiles *t = w->tiles;
     if (!t->labelled || t->relabel) {
         if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
-        deal(w, true, bt_max(0.5 * t->margin_max, w->par.slop));
+        deal(w, true, w->par.slop);
     } else if (bt_domain_due(w)) {
         deal(w, false, 0);
     }

@@ -19,7 +19,6 @@
 typedef struct bt_point {
     double gap;          ///< m, negative when the bodies overlap
     double ra[2], rb[2]; ///< contact point relative to the centroid of a, of b, m
-    double ln, lt;       ///< impulse on b along the normal, and along the tangent (−n_y, n_x), N s
     uint32_t feature;    ///< which edge and vertex made the point; the same from step to step
 } bt_point;
 
@@ -39,6 +38,9 @@ void bt_contacts_spread(struct bt_tiles *t, int32_t x, int32_t y, double s);
 
 /// Has the bound grown beyond what the last detection was made for? Collective.
 bool bt_contacts_outrun(const bt_world *w);
+
+/// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
+double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v);
 
 /// Margin for speed s: 2 Δt s, rounded up to a power of √2 so that pair lists stay valid while speeds wander; at least the slop. m
 double bt_contacts_margin(const bt_world *w, double s);

@@ -38,7 +38,7 @@ bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
 /// Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
-/// U2, the manifolds get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// U2, units and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive.

@@ -40,7 +40,7 @@ typedef struct bt_drag {
 /// What bt_world_add needs of a body.
 typedef struct bt_body_def {
     bt_motion motion;
-    bool large;             ///< kept out of the grid and tested against all floes near its outline
+    bool large;             ///< in no tile, on every rank, tested against all floes near its outline
     int n_vertices;
     const double *vertices; ///< [n_vertices][2] m, convex, anticlockwise, centroid at the origin
     double x, y, yaw;       ///< m, m, rad
@@ -73,7 +73,8 @@ typedef struct bt_bodies {
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no tile
-    uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity
+    uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
+                          ///< changes a pose or velocity by hand
     int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
@@ -94,7 +95,7 @@ typedef struct bt_params {
     double slop;           ///< overlap left alone, m
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s
-    double size;           ///< mean floe diameter, sets cell and skin, m
+    double size;           ///< mean floe diameter, sets tiles and skin, m
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -163,7 +164,7 @@ void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 /// One step Δt: forces, contacts, solve, advance; see src/step.c.
 void bt_world_step(bt_world *w);
 
-/// Deepest overlap over all pairs at the present poses, m (0 = none). Collective in later versions.
+/// Deepest overlap over all pairs at the present poses, m (0 = none). Collective.
 double bt_world_overlap(bt_world *w);
 
 /// 64-bit hash of all poses and velocities by gid: equal for equal states, however stored or distributed.

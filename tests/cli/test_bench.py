@@ -52,7 +52,7 @@ def test_rows_are_the_runs(small):
         assert abs(floes - asked) < 0.1 * asked and int(r["steps"]) == 3 and int(r["runs"]) == 1
         assert float(r["ns_per_floe_step"]) == pytest.approx(1e9 * wall / 3 / floes, rel=1e-4)
         shares = [float(r[p + "_share"]) for p in bench.PHASES]
-        assert 0.2 < sum(shares) <= 1.001 and float(r["solve_share"]) > 0
+        assert 0 < sum(shares) <= 1.001 and float(r["solve_share"]) > 0
         assert float(r["triad_gb_s"]) > 0.1
         if int(r["ranks"]) == 1:
             assert 300 < float(r["bytes_per_floe"]) < 1e6
