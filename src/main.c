@@ -5,6 +5,8 @@
 #include "revision.h"
 #include "suggest.h"
 
+#include <omp.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,12 +50,31 @@ static int refuse_word(const char *kind, const char *word, const char *const *kn
     return BT_ERR_USAGE;
 }
 
+// With OMP_PROC_BIND libgomp has bound this thread to one place by now, and a program started from here would have that one core for all its
+// threads. Back to all the places it was given.
+static void unbind(void)
+{
+    const int n_places = omp_get_num_places();
+    if (n_places == 0) return;
+    cpu_set_t all;
+    CPU_ZERO(&all);
+    for (int p = 0; p < n_places; p++) {
+        int ids[CPU_SETSIZE];
+        const int n = omp_get_place_num_procs(p);
+        if (n > CPU_SETSIZE) continue;
+        omp_get_place_proc_ids(p, ids);
+        for (int k = 0; k < n; k++) CPU_SET(ids[k], &all);
+    }
+    sched_setaffinity(0, sizeof all, &all);
+}
+
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
 // microseconds, then sleep. libgomp reads its settings before main, hence the second start; the user's own win.
 static void wait_briefly_at_barriers(char **argv)
 {
     if (getenv("OMP_WAIT_POLICY") || getenv("GOMP_SPINCOUNT")) return;
+    unbind();
     if (setenv("GOMP_SPINCOUNT", "5000", 0) == 0) execv("/proc/self/exe", argv);
 }
 
