@@ -6,8 +6,9 @@ import os
 import harness
 import numpy as np
 import pytest
+from scipy.stats import mannwhitneyu
 
-SEEDS = range(1, 7)
+SEEDS = range(1, 25)
 STUDIES = {"base": [], "tolerance / 10": ["solver.tolerance=1e-4"], "dt / 2": ["run.dt=0.05"]}
 
 
@@ -35,8 +36,11 @@ def means(tmp_path_factory):
             own = [runs[c, study, seed].summary for seed in SEEDS]
             table[c, study] = np.array([s["mean_ice_resistance_n"] for s in own])
             print(f"{c} %  {study:15s}  {table[c, study].mean():8.3f} N +- {standard_error(table[c, study]):.3f}  "
-                  f"sweeps {np.mean([s['mean_sweeps'] for s in own]):.1f}  unconverged {sum(s['unconverged_steps'] for s in own)}  "
-                  f"overlap {max(s['max_overlap_relative'] for s in own):.4f}")
+                  f"median {np.median(table[c, study]):.3f} N  highest {table[c, study].max():.3f} N  "
+                  f"tow {np.mean([s['mean_tow_force_n'] for s in own]):.2f} N  sweeps {np.mean([s['mean_sweeps'] for s in own]):.1f}  "
+                  f"unconverged {sum(s['unconverged_steps'] for s in own)} of {sum(s['n_steps'] for s in own)}  residual to "
+                  f"{max(s['max_residual_m_s'] / s['tolerance_m_s'] for s in own):.1f} x tolerance  "
+                  f"overlap {max(s['max_overlap_relative'] for s in own):.4f}  wall {np.mean([s['wall_time_s'] for s in own]):.1f} s")
     return table
 
 
@@ -46,9 +50,13 @@ def standard_error(x):
 
 @pytest.mark.parametrize("concentration", [20, 50, 80])
 def test_tolerance_does_not_move_the_mean(means, concentration):
-    """Tenfold tighter: the mean over the fields moves by less than its standard error between fields."""
+    """Tenfold tighter: the runs over 24 fields rank as if drawn from one distribution (Mann and Whitney, 5 %).
+
+    By ranks, because a jam that locks for good makes one mean of 43,000 N, and with it a standard error under which nothing could
+    fail. A solver that stops at once (solver.tolerance=1) fails it at 20 %.
+    """
     base, tight = means[concentration, "base"], means[concentration, "tolerance / 10"]
-    assert abs(tight.mean() - base.mean()) < np.hypot(standard_error(base), standard_error(tight))
+    assert mannwhitneyu(base, tight).pvalue > 0.05
 
 
 def test_two_thousand_seconds_in_dense_ice(tmp_path):
@@ -61,4 +69,5 @@ def test_two_thousand_seconds_in_dense_ice(tmp_path):
     assert not unconverged.any() or harness.warned(r, "met the sweep limit")
     assert r.series("momentum_residual").max() <= 1e-10
     print(f"long: {r.summary['mean_ice_resistance_n']:.2f} N +- {r.summary['mean_ice_resistance_se_n']:.2f}, overlap "
-          f"{overlap.max():.4f} m, unconverged {int(unconverged.sum())}")
+          f"{overlap.max():.4f} m, unconverged {int(unconverged.sum())}, residual "
+          f"{residual.max() / r.summary['tolerance_m_s']:.1f} x tolerance, wall {r.summary['wall_time_s']:.0f} s")
