@@ -136,7 +136,7 @@ partition-study: $(STUDY) ## cut tile graphs of a million floes into up to 4,096
 	mv partition/quality.csv.new partition/quality.csv
 
 BENCH ?= default
-bench: deps ## time a floe and step over sizes, threads and ranks: 10-15 minutes (BENCH=quick 1-2, BENCH=full to 300,000 floes)
+bench: deps ## time a floe and step over sizes, threads and ranks (BENCH=quick a minute, BENCH=full to 300,000 floes)
 	@$(AGAIN) CONFIG=release all build/release/triad
 	$(PYTHON) cases/scaling/bench.py $(BENCH)
 

@@ -5,8 +5,6 @@
 #include "bergtow/tiles.h"
 #include "domain.h"
 
-enum { FEW_UNITS = 1500 }; // fewer units are swept faster by one thread: a pass has five barriers, of a microsecond or more
-
 void bt_totals_merge(bt_totals *into, const bt_totals *from)
 {
     for (int k = 0; k < into->n_sums; k++) bt_sum_join(&into->sum[k], &from->sum[k]);
@@ -17,7 +15,7 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 {
     const bt_tiles *ts = w->tiles;
     const bool exchange = exchanged && w->domain;
-#pragma omp parallel if (BT_MANY(ts->n_units, FEW_UNITS))
+#pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
         for (int phase = 0; phase < BT_PHASES; phase++) {
@@ -44,7 +42,7 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
     const bt_tiles *ts = w->tiles;
-#pragma omp parallel if (BT_MANY(ts->n_units, FEW_UNITS))
+#pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
 #pragma omp for schedule(dynamic, 4)

@@ -6,7 +6,10 @@
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
 
-enum { BT_MAX_TOTALS = 40 };
+enum {
+    BT_MAX_TOTALS = 12,
+    BT_FEW_UNITS = 1500, ///< fewer units are swept faster by one thread: a pass has five barriers, of a microsecond or more
+};
 
 /// What a pass adds up over tiles, threads and ranks: exact sums, and one maximum.
 typedef struct bt_totals {

@@ -67,7 +67,7 @@ static bool velocities_from_impulses(bt_world *w)
 {
     const bt_tiles *ts = w->tiles;
     bt_bodies *b = &w->bodies;
-#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, 1500))
+#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
     for (bt_idx k = 0; k < ts->n; k++) {
         const bt_tile *tile = &ts->tile[k];
         if (k < ts->n - 1 && !ts->awake[k]) continue;
@@ -172,7 +172,7 @@ static void accelerate(bt_world *w, const bt_totals *t)
     bt_tiles *ts = w->tiles;
     bt_anderson *a = w->solver->anderson;
     const bt_anderson_verdict verdict = bt_anderson_decide(a, t);
-#pragma omp parallel for schedule(static, 8) if (BT_MANY(ts->n_units, 1500))
+#pragma omp parallel for schedule(static, 8) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
     for (bt_idx k = 0; k < ts->n; k++) {
         bt_tile *tile = &ts->tile[k];
         if (verdict != BT_ANDERSON_STAY && tile->own && tile->n_units > 0) bt_anderson_move_units(a, verdict, tile);

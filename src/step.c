@@ -75,13 +75,12 @@ static void advance(bt_world *w)
     const double drift = (double)(w->step + 1) * dt;
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + drift * w->par.water_u;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + drift * w->par.water_v;
-    const bool still = w->par.water_u == 0 && w->par.water_v == 0;
     double farthest = 0, out = 0;
 #pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(w->bodies.n, 2000))
     for (bt_idx k = 0; k < ts->n; k++) {
         const bt_tile *t = &ts->tile[k];
         const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
-        if (!moves && still) continue;
+        if (!moves && ts->still) continue;
         double path = 0;
         for (bt_idx i = t->first; i < t->end; i++) {
             path = bt_max(path, move(w, i, w->solver->shifted && moves));

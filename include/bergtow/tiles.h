@@ -21,7 +21,8 @@
 //
 // Rest. A tile T is idle, and costs nothing, when every floe in its block and in a ring of tiles around it has exactly the
 // velocity of the water, there is no other force (bt_tiles_calm), no large body that moves is near, and the position projection
-// moved nothing there in the last step. The ring is there because contacts hand motion on within a step; what goes farther still is
+// moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
+// never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
 // caught after the solve (step.c).
 #ifndef BERGTOW_TILES_H
 #define BERGTOW_TILES_H
