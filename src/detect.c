@@ -164,7 +164,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 static void order_tiles(bt_world *w)
 {
     bt_tiles *t = w->tiles;
-    const bool line = w->tow && w->tow->mode == BT_TOW_LINE;
+    const bool line = bt_tow_has_line(w->tow);
     bt_idx next[2 * BT_PHASES + 1] = {0};
     t->n_units = 0;
     for (int pass = 0; pass < 2; pass++) {

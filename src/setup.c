@@ -127,11 +127,9 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
         .uy = sin(c->tow.direction),
         .speed = c->tow.speed,
         .ramp = c->tow.ramp,
-        .length0 = c->tow.line_length,
-        .k = c->tow.mode == BT_TOW_LINE ? c->tow.line_stiffness / c->tow.line_length : 0,
-        .c = c->tow.line_damping,
-        .hull_x = c->tow.hull_x,
-        .hull_y = c->tow.hull_y,
+        .branch[0] = {.length0 = c->tow.line_length, .k = c->tow.mode == BT_TOW_LINE ? c->tow.line_stiffness / c->tow.line_length : 0,
+                      .c = c->tow.line_damping, .hull_x = c->tow.hull_x, .hull_y = c->tow.hull_y},
+        .n_branches = c->tow.mode == BT_TOW_LINE,
         .dt = c->run.dt,
         .travel_x = c->body.x,
         .travel_y = c->body.y,
@@ -144,8 +142,9 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
     }
     // The carriage starts a line's length ahead of the fastening point: taut, without tension.
     const double cy = cos(c->body.yaw), sy = sin(c->body.yaw);
-    t->carriage_x = c->body.x + cy * t->hull_x - sy * t->hull_y + t->length0 * t->ux;
-    t->carriage_y = c->body.y + sy * t->hull_x + cy * t->hull_y + t->length0 * t->uy;
+    const bt_branch *b = &t->branch[0];
+    t->carriage_x = c->body.x + cy * b->hull_x - sy * b->hull_y + b->length0 * t->ux;
+    t->carriage_y = c->body.y + sy * b->hull_x + cy * b->hull_y + b->length0 * t->uy;
     w->towed = bt_world_add(w, &d);
     r->thickness[w->towed] = c->body.draft + c->body.sail;
 }

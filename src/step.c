@@ -93,13 +93,7 @@ static void advance(bt_world *w)
     ts->moved_any += farthest;
     bt_domain_maxima(w, &out, 1);
     ts->relabel = out > ts->allowance;
-    if (w->tow) {
-        bt_tow *t = w->tow;
-        double speed = bt_tow_speed(t, t->time + dt);
-        t->carriage_x += dt * speed * t->ux;
-        t->carriage_y += dt * speed * t->uy;
-        t->time = (double)(w->step + 1) * dt;
-    }
+    bt_tow_advance(w);
 }
 
 enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
@@ -152,10 +146,11 @@ static void balance(bt_world *w)
 #pragma omp critical
         bt_totals_merge(&all, &t);
     }
-    if (w->tow && w->tow->mode == BT_TOW_LINE && ts->tile[ts->n - 1].own) {
-        bt_sum_add(&all.sum[APPLIED_X], w->tow->lambda * w->tow->lx);
-        bt_sum_add(&all.sum[APPLIED_Y], w->tow->lambda * w->tow->ly);
-        bt_sum_add(&all.sum[EXCHANGED], w->tow->lambda);
+    for (int k = 0; bt_tow_has_line(w->tow) && ts->tile[ts->n - 1].own && k < w->tow->n_branches; k++) {
+        const bt_branch *b = &w->tow->branch[k];
+        bt_sum_add(&all.sum[APPLIED_X], b->lambda * b->lx);
+        bt_sum_add(&all.sum[APPLIED_Y], b->lambda * b->ly);
+        bt_sum_add(&all.sum[EXCHANGED], b->lambda);
     }
     bt_domain_reduce(w, &all);
     double x[N_BALANCE];

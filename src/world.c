@@ -42,7 +42,8 @@ void bt_world_free(bt_world *w)
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
-    free(w->tow);
+    bt_tow_free(w->tow);
+    bt_events_free(&w->events);
     free(w);
 }
 

@@ -16,6 +16,7 @@
 #define BERGTOW_WORLD_H
 
 #include "bergtow/base.h"
+#include "bergtow/event.h"
 #include "bergtow/shape.h"
 
 typedef enum {
@@ -134,6 +135,7 @@ typedef struct bt_world {
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
+    bt_events events;        ///< what happened when, the same on all ranks
     bt_step_stats stats;
 } bt_world;
 
