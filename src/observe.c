@@ -101,6 +101,17 @@ static void observe_line(const bt_tow *tow, bt_sample *s)
         s->tow_force += t * (tow->branch[k].lx * tow->ux + tow->branch[k].ly * tow->uy);
         s->line_tension = bt_max(s->line_tension, t);
     }
+    s->line_tension_1 = bt_tow_tension(tow, 0);
+    if (tow->n_branches > 1) s->line_tension_2 = bt_tow_tension(tow, 1);
+    if (tow->mode != BT_TOW_THRUST) return;
+    const bt_vessel *v = &tow->vessel;
+    s->vessel_x = tow->carriage_x;
+    s->vessel_y = tow->carriage_y;
+    s->vessel_speed = v->vd2;
+    s->vessel_thrust = v->thrust / tow->dt;
+    s->vessel_drag = v->kd * (v->vd2 - v->ud);
+    s->vessel_inertia = v->mass * (v->vd2 - v->vd1) / tow->dt;
+    s->vessel_line = s->tow_force; // both along the course
 }
 
 static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
@@ -158,6 +169,15 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .line_length = NAN,
         .carriage_x = NAN,
         .carriage_y = NAN,
+        .line_tension_1 = NAN,
+        .line_tension_2 = NAN,
+        .vessel_x = NAN,
+        .vessel_y = NAN,
+        .vessel_speed = NAN,
+        .vessel_thrust = NAN,
+        .vessel_drag = NAN,
+        .vessel_inertia = NAN,
+        .vessel_line = NAN,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);

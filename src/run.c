@@ -178,6 +178,7 @@ static bt_status loop(run *r, bt_errors *err)
         bt_sample s;
         bt_observe(w, r->reference_speed, &s);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
+        if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
         if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
         status = agree(r, status);
         // A frame at the first step at or after each multiple of the interval, and at the end.
@@ -222,6 +223,7 @@ static bt_status run_world(run *r, bt_errors *err)
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
+    r->totals.events = &r->w->events;
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);

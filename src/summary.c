@@ -156,6 +156,18 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
                       "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
 }
 
+/// A line that broke changes what the means stand for.
+static void warn_of_events(bt_summary *s, const bt_events *e)
+{
+    for (int64_t i = 0; e && i < e->n; i++) {
+        if (e->event[i].kind != BT_EVENT_LINE_BROKEN && e->event[i].kind != BT_EVENT_ADRIFT) continue;
+        char text[160];
+        bt_event_describe(&e->event[i], text);
+        bt_errors_add(&s->warnings, "at %g s %s%s", e->event[i].time, text,
+                      s->window.n > 0 && e->event[i].time > s->window.start ? ": within the steady window, whose means mix before and after" : "");
+    }
+}
+
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body)
 {
@@ -196,6 +208,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
+    warn_of_events(s, t->events);
     if (t->floes_outside)
         bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
                       "matters", (long long)t->floes_outside);

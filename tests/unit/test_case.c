@@ -515,7 +515,10 @@ static void fill_randomly(const bt_key *keys, int n, void *members)
         if (k->type == BT_KEY_POINTS) {
             int count = 3 + (int)(random_bits() % 6);
             double *p = bt_alloc((size_t)count, 2 * sizeof *p), *old;
-            for (int j = 0; j < 2 * count; j++) p[j] = random_in(k);
+            for (int j = 0; j < 2 * count; j++) {
+                const bt_key column = bt_schema_column(k, j % 2);
+                p[j] = random_in(&column);
+            }
             memcpy(&old, m, sizeof old);
             free(old);
             memcpy(m, &p, sizeof p);
