@@ -40,7 +40,7 @@ void bt_case_tow_follow(const bt_check *k);
 void bt_case_tow_hull(bt_case *c, int n, const double *v);
 /// Programme, way-points, lines and vessel.
 void bt_case_tow_check(const bt_check *k);
-/// Where the towing end starts. False when two branches of these lengths cannot meet ahead.
+/// Where the towing end starts. False when two branches are too short to meet.
 bool bt_case_tow_start(const bt_case *c, double at[2]);
 /// The planned path; caller frees. Without way-points straight on. False with the reason in why.
 struct bt_path;

@@ -72,16 +72,19 @@ bool bt_case_tow_start(const bt_case *c, double at[2])
     at[0] = p[0] + c->tow.line_length * ux;
     at[1] = p[1] + c->tow.line_length * uy;
     if (c->tow.line.branches < 2 || !has_line(c)) return true;
-    // Two branches: where the circles about their fastening points meet on the side of the tow.
+    // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are just taut may lie far
+    // off the tow's axis, when one point lies ahead of the other.)
     hull_at(c, c->tow.branch2.hull_x, c->tow.branch2.hull_y, q);
-    const double a = c->tow.line_length, b = c->tow.branch2.length, dx = q[0] - p[0], dy = q[1] - p[1], far = hypot(dx, dy);
-    if (far == 0) return a == b;
-    const double along = (far * far + a * a - b * b) / (2 * far), aside2 = a * a - along * along;
-    if (!(aside2 >= 0)) return false;
-    double aside = sqrt(aside2);
-    if (ux * -dy + uy * dx < 0) aside = -aside;
-    at[0] = p[0] + (along * dx - aside * dy) / far;
-    at[1] = p[1] + (along * dy + aside * dx) / far;
+    const double *const hull[2] = {p, q}, length[2] = {c->tow.line_length, c->tow.branch2.length};
+    const double mx = 0.5 * (p[0] + q[0]), my = 0.5 * (p[1] + q[1]);
+    double ahead = INFINITY;
+    for (int k = 0; k < 2; k++) {
+        const double dx = mx - hull[k][0], dy = my - hull[k][1], along = dx * ux + dy * uy, far2 = dx * dx + dy * dy;
+        if (!(length[k] * length[k] > far2)) return false;
+        ahead = bt_min(ahead, sqrt(length[k] * length[k] - far2 + along * along) - along);
+    }
+    at[0] = mx + ahead * ux;
+    at[1] = my + ahead * uy;
     return true;
 }
 
@@ -90,7 +93,7 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
     double start[2];
     *path = (bt_path){0};
     if (!bt_case_tow_start(c, start)) {
-        strcpy(why, "the two branches cannot meet ahead of the body; lengthen the shorter one or move its fastening point");
+        strcpy(why, "the branches do not reach the middle between their fastening points; lengthen the shorter one or move its fastening point");
         return false;
     }
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
@@ -278,7 +281,7 @@ void bt_case_tow_check(const bt_check *k)
     double start[2];
     if (has_line(c) && bt_check_sound(k, "tow.mode tow.line_length tow.line.branches tow.branch2.length tow.hull_x tow.hull_y tow.branch2.hull_x tow.branch2.hull_y") &&
         !bt_case_tow_start(c, start))
-        bt_check_fault(k, "tow.branch2.length", "the two branches, %g and %g m, cannot meet ahead of the body; lengthen the shorter one or move its fastening point", c->tow.line_length,
+        bt_check_fault(k, "tow.branch2.length", "the two branches, %g and %g m, do not both reach the middle between their fastening points; lengthen the shorter one or move its fastening point", c->tow.line_length,
                        c->tow.branch2.length);
     check_waypoints(k);
 }
