@@ -66,7 +66,7 @@ def test_the_governor_and_the_power(towed):
     # Slower than the programme only at full power, of which 2 % are lost at 1.2 m/s; less power only at the programme's speed.
     slower, partial = speed < programme * (1 - 1e-9), (thrust > 0) & (thrust < 0.97 * 1.2e6)
     assert (thrust[slower] > 0.97 * 1.2e6).all() and slower.sum() > 20
-    assert np.abs(speed - programme)[partial].max() < 1e-9 and partial.sum() > 20
+    assert np.abs(speed - programme)[partial].max() < 1e-9 and partial.sum() > 10
 
 
 def test_the_track_is_the_planned_one(towed):
