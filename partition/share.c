@@ -284,6 +284,7 @@ static bt_gid find_fault(const bt_world *w)
             h = (h ^ u) * UINT64_C(0x9e3779b97f4a7c15);
             h ^= h >> 29;
         }
+        if (b->gid[i] == w->towed && w->tow) h ^= bt_tow_hash(w->tow);
         mine[n++] = (copy){b->gid[i], holders, h};
     }
     copy *all = gather(d->comm, mine, n, sizeof *mine, &n_all);

@@ -10,8 +10,9 @@ import pytest
 from harness import changed, run
 from test_ranks import LINE, assert_same, many
 
-BRIDLE = changed(LINE, run__dt=0.1, run__duration=50, ice__restitution=0, tow={
-    "mode": "thrust", "programme": [[0, 0], [2, 0.4], [30, 0.4], [50, 0.2]], "waypoints": [[16, 0], [24, 2], [60, 2]], "turn_radius": 2, "line_length": 3,
+# From the far end back: the berg belongs to the last rank, the record is made by the first.
+BRIDLE = changed(LINE, run__dt=0.1, run__duration=28, body__x=36, ice={"concentration": 0.8, "size": 1, "x_max": 34}, tow={
+    "mode": "thrust", "programme": [[0, 0], [2, 0.4], [20, 0.4], [28, 0.3]], "waypoints": [[26, 0], [18, 2], [-60, 2]], "turn_radius": 2, "line_length": 3,
     "line_stiffness": 2000, "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 120},
     "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}})
 
@@ -22,7 +23,7 @@ def test_a_vessel_on_a_bridle_that_breaks(tmp_path):
         kinds = list(f["events/kind"][:])
     assert kinds.count(0) == 1 and kinds.count(2) >= 1, kinds  # a branch broke while the other held; a way-point was passed
     assert one.series("ice_resistance").max() > 100
-    for ranks, threads in ((1, 4), (2, 2), (3, 1)):
+    for ranks, threads in ((2, 2), (3, 1)):
         r = many(tmp_path, ranks, threads)
         assert_same(one, r)
         assert [e["kind"] for e in r.summary["events"]] == [e["kind"] for e in one.summary["events"]]
