@@ -90,6 +90,12 @@ def test_tensions_of_the_branches(towed):
     assert (one >= 0).all() and (two >= 0).all()
 
 
+def test_a_stop_within_the_window_is_told(towed, tmp_path):
+    assert warned(towed, "speed programme goes from 1.2 to 0 m/s within the steady window")
+    steady = changed(VESSEL, run__duration=600, output={"window_start": 130})
+    assert not warned(run(tmp_path, steady, "--quiet"), "speed programme")
+
+
 def test_the_resolved_case_gives_the_same_run(towed, tmp_path):
     again = run(tmp_path, towed.dir / "case.resolved.yml", "--quiet")
     assert again.hash == towed.hash
