@@ -75,7 +75,7 @@ static bt_estimate dilute(const bt_estimate_input *in)
     const bool thin = in->concentration <= BT_EST_DILUTE_MOST;
     const double force = 4.0 / 3 * (1 + in->restitution) * in->concentration * in->ice_density * in->thickness *
                          (0.5 * in->width + in->floe_radius) * in->along * in->along;
-    return just(force, thin, thin ? "A <= 0.2 (assumed): floes are met one by one" : "A > 0.2 (assumed): floes hit each other");
+    return just(force, thin, thin ? "A <= 0.25 (assumed): floes are met one by one" : "A > 0.25 (assumed): floes hit each other");
 }
 
 bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in)

@@ -75,16 +75,17 @@ void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in,
 
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full)
 {
-    char a[32], b[32], c[32];
     for (int k = 0; k < BT_N_ESTIMATES; k++) {
         const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, in);
         const double ratio = ratio_of(k, &e, simulated);
-        printf("%s%-22s ", indent, bt_estimate_kinds[k].label);
-        if (isnan(e.force)) printf("%-10s", "no value");
-        else printf("%-10s", bt_force_text(a, e.force));
-        if (e.low != e.high && isfinite(e.force)) printf(" %s to %s", bt_force_text(b, e.low), bt_force_text(c, e.high));
-        if (isfinite(ratio)) printf(", simulated / estimate %.3g", ratio);
-        printf("%s%s\n", e.valid ? "  " : "  NOT VALID: ", e.note);
+        char force[32] = "no value", low[32], high[32];
+        if (isfinite(e.force)) bt_force_text(force, e.force);
+        printf("%s%-22s %-12s", indent, bt_estimate_kinds[k].label, force);
+        if (isfinite(ratio)) printf(" %-9.3g", ratio);
+        else if (!isnan(simulated)) printf(" %-9s", "-");
+        printf(" %s%s", e.valid ? "" : "not valid: ", e.note);
+        if (isfinite(e.force) && e.low != e.high) printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
+        printf("\n");
         if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_kinds[k].formula, indent, bt_estimate_kinds[k].source);
     }
 }

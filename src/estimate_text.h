@@ -10,7 +10,8 @@
 /// resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
 void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated);
 
-/// Lines of a table on stdout, each begun with `indent`. full: formula, source and notes of every estimate; otherwise one line each.
+/// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime. full: with formula and
+/// source.
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full);
 
 #endif

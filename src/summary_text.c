@@ -158,7 +158,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
            (long long)t->n_steps, t->dt, s->sim_time);
     if (s->body) print_forces(s, h, c);
     if (s->body && !isnan(s->estimate.along)) {
-        printf("  estimates           for %.4g m/s through the ice%s\n", s->estimate.along, s->window.n ? ", ice resistance of this run over them" : "");
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
     }
     if (h->n)
