@@ -45,12 +45,12 @@ static bt_estimate lichey_hellmer(const bt_estimate_input *in)
                 a >= BT_EST_DENSE ? "A >= 0.9 and P < P_s: drag of the ice" : "0.15 < A < 0.9: drag of the ice");
 }
 
-static const char has_room[] = "A < 0.7 (assumed): the ice has room to give way";
+static const char has_room[] = "A < 0.65 (assumed): the ice has room to give way";
 
 static bt_estimate compaction(const bt_estimate_input *in)
 {
     const bool compact = in->concentration >= BT_EST_COMPACT;
-    return just(bt_estimate_strength(in) * in->width, compact, compact ? "A >= 0.7: compact ice" : has_room);
+    return just(bt_estimate_strength(in) * in->width, compact, compact ? "A >= 0.65: compact ice" : has_room);
 }
 
 static bt_estimate rafting(const bt_estimate_input *in)
@@ -59,7 +59,7 @@ static bt_estimate rafting(const bt_estimate_input *in)
     const double lift = 0.5 * in->ice_density * (1 - in->ice_density / in->water_density) * GRAVITY * in->thickness * in->thickness *
                         in->concentration * in->width;
     return (bt_estimate){.force = in->kappa * lift, .low = in->kappa_low * lift, .high = in->kappa_high * lift, .valid = compact,
-                         .note = compact ? "A >= 0.7: all ice of the strip rafts" : has_room};
+                         .note = compact ? "A >= 0.65: all ice of the strip rafts" : has_room};
 }
 
 static bt_estimate momentum(const bt_estimate_input *in)

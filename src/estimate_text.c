@@ -23,18 +23,26 @@ static void curve_points(double a[N_CURVE])
 
 static void curves(bt_json *j, const bt_estimate_input *in)
 {
-    double a[N_CURVE], force[N_CURVE];
+    double a[N_CURVE], force[N_CURVE], range[BT_N_ESTIMATES][2];
     curve_points(a);
     bt_json_open(j, "curves", '{');
     bt_json_numbers(j, "concentration", N_CURVE, a);
     for (int k = 0; k < BT_N_ESTIMATES; k++) {
+        range[k][0] = range[k][1] = NAN;
         for (int i = 0; i < N_CURVE; i++) {
             bt_estimate_input at = *in;
             at.concentration = a[i];
-            force[i] = bt_estimate_at((bt_estimate_kind)k, &at).force;
+            const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, &at);
+            force[i] = e.force;
+            if (!e.valid || a[i] == 0) continue; // without ice all are
+            if (isnan(range[k][0])) range[k][0] = a[i];
+            range[k][1] = a[i];
         }
         bt_json_numbers(j, bt_estimate_kinds[k].name, N_CURVE, force);
     }
+    bt_json_open(j, "valid_range", '{'); // of the concentration
+    for (int k = 0; k < BT_N_ESTIMATES; k++) bt_json_numbers(j, bt_estimate_kinds[k].name, 2, range[k]);
+    bt_json_close(j, '}');
     bt_json_close(j, '}');
 }
 

@@ -59,6 +59,8 @@ def test_curves_are_the_estimates_over_the_concentration(tmp_path):
                 assert x is None, (name, a)
             elif min(abs(a - 0.15), abs(a - 0.9)) > 1e-9:  # the grid is printed with 7 digits
                 assert x == pytest.approx(y, rel=2e-6, abs=1e-12), (name, a)
+    assert curves["valid_range"] == {"lichey_hellmer": [0.01, 0.98], "marchenko_compaction": [0.65, 0.98], "marchenko_rafting": [0.65, 0.98],
+                                     "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "open_water_drag": [0.01, 0.98]}
     jump = grid.tolist().index(0.9)
     assert curves["lichey_hellmer"][jump] > 10 * curves["lichey_hellmer"][jump - 1] > 0
 
