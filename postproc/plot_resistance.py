@@ -146,9 +146,10 @@ def limits(points, log):
     if not log:
         return min(0.0, seen.min()), 1.1 * max(seen.max(), 1e-12)
     seen = seen[seen > 0]
-    floor = [p.mean for p in points if p.mean > 0] or [seen.max(initial=1.0)]
-    low = max(seen.min(initial=1.0), 0.05 * min(floor))  # an error bar that reaches zero must not stretch the axis
-    return low / 2.5, 2.5 * seen.max(initial=1.0)
+    if not len(seen):
+        return 0.1, 10.0
+    floor = min([p.mean for p in points if p.mean > 0], default=seen.max())
+    return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()  # an error bar that reaches zero must not stretch the axis
 
 
 def draw(points, log=True):

@@ -54,7 +54,9 @@ def test_the_picture_has_points_bars_and_curves(runs):
     mean = lines["mean of the seeds"]
     assert list(mean.get_xdata()) == [0.5] and np.allclose(mean.get_ydata(), [50])
     low, high = axes.get_ylim()
-    assert axes.get_yscale() == "log" and low < 2 and high > 800
+    assert axes.get_yscale() == "log" and 0.04 - 1e-9 < low < 2 and 800 < high < 8000
+    least = points[1].estimate("lichey_hellmer")  # the smallest of what is meant for 50 %
+    assert np.isclose(plot_resistance.limits(points[1:3], True)[0], least / 2.5)
     assert plot_resistance.draw(points, log=False).axes[0].get_yscale() == "linear"
 
 
