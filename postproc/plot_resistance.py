@@ -58,8 +58,9 @@ def read(path):
         made, mean = run.number("concentration"), run.number("mean_ice_resistance_n")
         if not np.isfinite(mean):
             raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no steady window")
-        return Point(path=run.path, title=style.title(run), asked=made if run.case.get("ice.field", "none") != "none" else run.value("ice.concentration", made),
-                     concentration=made, mean=mean, se=run.number("mean_ice_resistance_se_n"), reference=run.number("reference.mean_force_n"),
+        from_file = run.case.get("ice.field", "none") != "none"
+        return Point(path=run.path, title=style.title(run), asked=made if from_file else run.value("ice.concentration", made), concentration=made,
+                     mean=mean, se=run.number("mean_ice_resistance_se_n"), reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
                      warnings=len(run.summary.get("warnings") or []), estimates=estimates)
 
@@ -168,11 +169,12 @@ def draw(points, log=True):
                   markersize=6, capsize=3, linewidth=1.4, zorder=5, label="simulated, 95 % of the run's mean")
     averaged = [r for r in rows(points) if r["runs"] > 1]
     if averaged:
-        axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged], marker="_", markersize=22, markeredgewidth=2.5,
-                  linestyle="none", color=style.INK, zorder=6, label="mean of the seeds")
+        axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged], marker="_", markersize=22,
+                  markeredgewidth=2.5, linestyle="none", color=style.INK, zorder=6, label="mean of the seeds")
     measured = [p for p in points if np.isfinite(p.reference)]
     if measured:
-        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured], "D", color=style.REFERENCE, markersize=6, zorder=6, label="measured")
+        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured], "D", color=style.REFERENCE,
+                  markersize=6, zorder=6, label="measured")
     if log:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -47,8 +47,8 @@ static void refuse_range(const bt_case *c, const bt_key *k, double value, double
 {
     char text[64];
     bt_units_format(value, k->unit, text, sizeof text);
-    bt_errors_add(err, "%s: %s: becomes %s in the twin of scale %g, out of its range %s; take a scale nearer to 1", c->path ? c->path : "case", k->name, text,
-                  ratio, k->range);
+    bt_errors_add(err, "%s: %s: becomes %s in the twin of scale %g, out of its range %s; take a scale nearer to 1",
+                  c->path ? c->path : "case", k->name, text, ratio, k->range);
 }
 
 static void scale_real(const bt_case *c, const bt_key *k, double *v, double ratio, bt_errors *err)
@@ -94,7 +94,8 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
             const char *text;
             memcpy(&text, member, sizeof text);
             if (text && !is_plain(k->name))
-                bt_errors_add(err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin", c->path ? c->path : "case", k->name, text);
+                bt_errors_add(err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
+                              c->path ? c->path : "case", k->name, text);
             break;
         }
         case BT_KEY_INT:

@@ -49,13 +49,15 @@ def same(folder, case, sets, bergtow):
     def keys(text):
         return [line for line in text.splitlines() if not line.startswith("#")]
 
-    return f"({revision}," in version and "dirty" not in revision and keys(twin) == keys((folder / "case.resolved.yml").read_text(encoding="utf-8"))
+    resolved = (folder / "case.resolved.yml").read_text(encoding="utf-8")
+    return f"({revision}," in version and "dirty" not in revision and keys(twin) == keys(resolved)
 
 
 def run(a, name, **values):
     """Run the case with keys (section__key) replaced, unless that has been done. Returns the folder."""
     folder = a.out / name
-    sets = [word for key, value in values.items() for word in ("--set", f"{key.replace('__', '.')}={value}")] + [w for s in a.set for w in ("--set", s)]
+    replaced = [f"{key.replace('__', '.')}={value}" for key, value in values.items()] + a.set
+    sets = [word for text in replaced for word in ("--set", text)]
     if same(folder, a.case, sets, a.bergtow):
         print(f"{folder}: kept", flush=True)
         return folder
@@ -76,7 +78,8 @@ def run(a, name, **values):
 
 def concentration(a):
     """Runs over concentrations and seeds, their table and picture."""
-    folders = [run(a, f"a{value:g}-s{seed}", ice__concentration=f"{value:g}", ice__seed=seed, run__title=f"80 m berg, {100 * value:g} % broken ice, full scale")
+    folders = [run(a, f"a{value:g}-s{seed}", ice__concentration=f"{value:g}", ice__seed=seed,
+                   run__title=f"80 m berg, {100 * value:g} % broken ice, full scale")
                for value in a.concentrations for seed in range(1, a.seeds + 1)]
     points = [plot_resistance.read(folder) for folder in folders]
     text = plot_resistance.table(points)
@@ -87,14 +90,16 @@ def concentration(a):
 
 def dt(a):
     """One field with several time steps: mean, percentiles and peak of the means over a step."""
-    lines = ["| time step, s | ice resistance, N | standard error, N | sd, N | 99 % below, N | largest step mean, N | sweeps a step | steps not converged | overlap / floe size | wall time, s |",
+    lines = ["| time step, s | ice resistance, N | standard error, N | sd, N | 99 % below, N | largest step mean, N | sweeps a step "
+             "| steps not converged | overlap / floe size | wall time, s |",
              "|" + " ---: |" * 10]
     for step in a.steps:
         with Run(run(a, f"dt{step:g}", run__dt=f"{step:g}", ice__concentration=f"{a.concentration:g}")) as r:
             number = r.number
-            cells = [f"{step:g}", f"{number('mean_ice_resistance_n'):.4g}", f"{number('mean_ice_resistance_se_n'):.2g}", f"{number('sd_ice_resistance_n'):.3g}",
-                     f"{number('p99_ice_resistance_n'):.3g}", f"{number('peak_ice_resistance_n'):.3g}", f"{number('mean_sweeps'):.3g}",
-                     f"{100 * number('unconverged_steps') / number('n_steps'):.2g} %", f"{100 * number('max_overlap_relative'):.2g} %", f"{number('wall_time_s'):.0f}"]
+            cells = [f"{step:g}", f"{number('mean_ice_resistance_n'):.4g}", f"{number('mean_ice_resistance_se_n'):.2g}",
+                     f"{number('sd_ice_resistance_n'):.3g}", f"{number('p99_ice_resistance_n'):.3g}", f"{number('peak_ice_resistance_n'):.3g}",
+                     f"{number('mean_sweeps'):.3g}", f"{100 * number('unconverged_steps') / number('n_steps'):.2g} %",
+                     f"{100 * number('max_overlap_relative'):.2g} %", f"{number('wall_time_s'):.0f}"]
         lines.append("| " + " | ".join(cells) + " |")
     text = "\n".join(lines)
     (a.out / "dt.md").write_text(text + "\n", encoding="utf-8")
@@ -117,7 +122,8 @@ def arguments(argv):
     common.add_argument("--out", type=Path, default=ROOT / "out/fullscale", help="folder of the results (default: out/fullscale)")
     common.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a key in every run")
     common.add_argument("--threads", type=positive(int, 1024), help="threads of each run (default: all cores)")
-    common.add_argument("--bergtow", default=os.environ.get("BERGTOW", str(ROOT / "build/release/bergtow")), help="the program (default: build/release/bergtow)")
+    common.add_argument("--bergtow", default=os.environ.get("BERGTOW", str(ROOT / "build/release/bergtow")),
+                        help="the program (default: build/release/bergtow)")
     sub = p.add_subparsers(dest="study", required=True)
     table = sub.add_parser("concentration", parents=[common], help="resistance against concentration")
     table.add_argument("--concentrations", type=positive(float, 0.95), nargs="+", default=CONCENTRATIONS, metavar="A")
