@@ -117,11 +117,9 @@ void bt_case_tow_follow(const bt_check *k)
     }
     if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction"))
         c->tow.direction = atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
-    if (c->tow.line.type != BT_ROPE_NUMBERS) {
-        const bt_rope r = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-        if (!bt_check_given(k, "tow.line_stiffness")) c->tow.line_stiffness = r.stiffness;
-        if (!bt_check_given(k, "tow.line.breaking_load")) c->tow.line.breaking_load = r.breaking;
-    }
+    const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
+    fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
+    fill(&c->tow.line.breaking_load, rope.breaking);
     fill(&c->tow.branch2.length, c->tow.line_length);
     fill(&c->tow.branch2.stiffness, c->tow.line_stiffness);
     fill(&c->tow.branch2.damping, c->tow.line_damping);

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, changed, run, warned
+from harness import CASE, call, changed, run, warned
 
 # A vessel on a bridle round two corners through loose ice with current and Coriolis force.
 VESSEL = {
@@ -138,3 +138,18 @@ def test_a_wall_or_a_pier_on_the_way_is_refused(tmp_path):
     r = run(tmp_path, pier, code=CASE, name="b")
     assert "on its prescribed path" in r.result.stderr
     run(tmp_path, changed(pier, tow__waypoints=[[-200, -200], [-200, 500]]), "--quiet", name="c")
+
+
+def test_the_froude_twin_is_towed_alike(tmp_path):
+    """L = 4: lengths times 4, times times 2, forces times 64, also of programme, way-points, named line and vessel."""
+    case = changed(VESSEL, run__duration=400, water=None)
+    one = run(tmp_path, case, "--quiet")
+    text = call("check", tmp_path / "case.yml", "--scale", 4)
+    assert text.returncode == 0, text.stderr
+    twin = tmp_path / "twin.yml"
+    twin.write_text(text.stdout)
+    four = run(tmp_path, twin, "--quiet", name="four")
+    for name, factor in (("time", 2), ("vessel_x", 4), ("vessel_y", 4), ("vessel_speed", 2), ("vessel_thrust", 64), ("line_tension_2", 64), ("ice_resistance", 64)):
+        a, b = one.series(name) * factor, four.series(name)
+        assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max(), name
+    assert one.series("ice_resistance").max() > 0
