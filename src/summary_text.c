@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "impact_report.h"
 #include "json.h"
 #include "summary.h"
 
@@ -83,6 +84,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);
+    bt_impacts_json(&j, t->impacts);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
     bt_json_int(&j, "unconverged_steps", h->unconverged);
@@ -153,6 +155,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
     if (s->body) print_forces(s, h, c);
+    bt_impacts_print(t->impacts);
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
                (long long)h->unconverged);
