@@ -123,30 +123,73 @@ static void eccentric_impact(void **state)
     }
 }
 
-/// Drag of the water on a floe at speed is push: the collision has the momentum of the bare mass.
+/// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and in λ, but the collision has
+/// the momentum of the mass alone, and the rest is push. From then on the contact carries k V².
 static void drag_is_push(void **state)
 {
     (void)state;
     bt_params p = scene_params(0.5, 1);
     bt_world *w = bt_world_create(&p);
-    p.water_u = -1;
-    w->par.water_u = -1;
     double v[8];
     scene_square(1, v);
     bt_body_def d = scene_prism(4, v, sheet);
-    d.x = 0.5, d.vx = -1, d.drag.water_skin = 200; // drifts with the water onto the body
+    d.x = 0.5, d.vx = -1, d.drag.water_skin = 200;
     bt_world_add(w, &d);
     add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.5}, false, 0);
     bt_impact hit[10];
     assert_int_equal(run(w, 1, hit), 1);
-    const double rise = 1 + speed; // from −1 to the body's speed
-    CHECK_CLOSE(hit[0].impulse, sheet * rise, 1e-6 * sheet);
-    assert_int_equal(run(w, 3, hit), 0);
-    // From then on the contact carries k (V + 1)².
+    CHECK_CLOSE(hit[0].impulse, sheet * (1 + speed), 1e-6 * sheet);
+    CHECK_CLOSE(hit[0].mass, sheet, 1e-6);
+    CHECK_CLOSE(w->impacts->largest_push, 200 * 1 * speed, 1e-4); // K V, K = k |U1|
+    assert_int_equal(run(w, 30, hit), 0);
     bt_sample s;
     bt_observe(w, speed, &s);
-    CHECK_CLOSE(s.ice_resistance, 200 * rise * rise, 1e-4);
+    CHECK_CLOSE(s.ice_resistance, 200 * speed * speed, 1e-4);
     CHECK_CLOSE(s.collision_resistance, 0, 0);
+    bt_world_free(w);
+}
+
+/// Flush, but only a part of the floe's side meets the hull: the body's corner, 0.2 m from the floe's middle, has all of it.
+static void hit_beside_the_middle(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    add_square(w, 0.5, 5.2, 0, 0, 0);
+    add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.1}, false, 0);
+    bt_impact hit[10];
+    assert_int_equal(run(w, 1, hit), 1);
+    const double m_e = sheet / (1 + 0.04 * 6);
+    CHECK_CLOSE(hit[0].mass, m_e, 1e-9 * m_e);
+    CHECK_CLOSE(hit[0].impulse, m_e * speed, 1e-6 * m_e);
+    CHECK_CLOSE(hit[0].y, 5, 1e-9);
+    bt_world_free(w);
+}
+
+/// The body itself, free and turned by a quarter, runs into a wall: it is now the first of the pair. λ = M V, and the force is against the motion.
+static void body_against_a_wall(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 0.5 * BT_PI}, true, 0.5 * BT_PI);
+    scene_wall(w, 0.03, -50, 20, 60, 0);
+    bt_impact hit[10];
+    assert_int_equal(run(w, 1, hit), 0);
+    const bt_panels *panels = &w->impacts->panels;
+    double fx = 0, fy = 0;
+    for (int k = 0; k < panels->n; k++) fx += panels->panel[k].fx, fy += panels->panel[k].fy;
+    const double mass = 900 * 3.0 * 100;
+    CHECK_CLOSE(fy * p.dt, mass * (speed - 0.3), 1e-6 * mass); // body frame: the wall is where its −y points; a gap of 0.03 m is closed
+    CHECK_CLOSE(fx, 0, 1e-9 * mass);
+    assert_int_equal(run(w, 3, hit), 1);
+    CHECK_CLOSE(hit[0].gid, 1, 0);
+    CHECK_CLOSE(hit[0].impulse, mass * speed, 1e-6 * mass);
+    CHECK_CLOSE(hit[0].mass, mass, 1e-6 * mass);
+    CHECK_CLOSE(hit[0].y, -5, 0.02);
+    CHECK_CLOSE(hit[0].x, 0, 0.02);
+    CHECK_CLOSE(hit[0].panel, 30, 0);
+    CHECK_CLOSE(hit[0].peak, speed * sqrt(2 * 1e6 * 3 * mass), 1e-6 * hit[0].peak); // its own height is crushed
     bt_world_free(w);
 }
 
@@ -243,6 +286,10 @@ static void corner_in_contact(void **state)
         bt_impact hit[10];
         assert_true(run(w, 5, hit) >= 1);
         CHECK_CLOSE(hit[0].corner, i == 1 ? BT_PI / 3 : BT_PI / 2, 1e-6);
+        if (i == 2) {
+            CHECK_CLOSE(hit[0].x, 5, 1e-3);
+            CHECK_CLOSE(hit[0].y, -5, 1e-3);
+        }
         const double k = 2 * 1e6 * 0.5 * tan(0.5 * hit[0].corner);
         CHECK_CLOSE(hit[0].peak, speed * sqrt(k * hit[0].mass), 1e-3 * hit[0].peak);
         bt_world_free(w);
@@ -346,6 +393,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(central_impact),        cmocka_unit_test(eccentric_impact),
         cmocka_unit_test(drag_is_push),          cmocka_unit_test(static_push),
+        cmocka_unit_test(hit_beside_the_middle), cmocka_unit_test(body_against_a_wall),
         cmocka_unit_test(pushed_ahead),          cmocka_unit_test(events_in_their_order),
         cmocka_unit_test(corner_in_contact),     cmocka_unit_test(panels_carry_the_ice_force),
         cmocka_unit_test(panels_of_a_square),    cmocka_unit_test(the_largest_peaks_are_kept),
