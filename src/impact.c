@@ -66,9 +66,8 @@ void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
 void bt_impact_describe(const bt_impact_rule *r, char out[160])
 {
     if (r->conversion == BT_IMPACT_CRUSHING)
-        snprintf(out, 160, "crushing of %s at %g Pa", r->real_corner ? "the corner in contact" : "a corner", r->pressure);
+        snprintf(out, 160, "crushing of %s%g deg at %g kPa", r->real_corner ? "the real corner, without one of " : "a corner of ", r->corner_angle * 180 / BT_PI, r->pressure / 1e3);
     else snprintf(out, 160, "half-sine of %g s", r->duration);
-    if (r->conversion == BT_IMPACT_CRUSHING && !r->real_corner) snprintf(out + strlen(out), 160 - strlen(out), ", %g deg", r->corner_angle * 180 / BT_PI);
 }
 
 // --- the largest peaks -----------------------------------------------------------------------------------------------

@@ -14,6 +14,7 @@
 // M is the mass with added mass, without the drag of the step. For one floe that hits by itself this is all of λ; a floe held against the
 // hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points each by itself, λ_i against (v2 − v1)_i / W_ii;
 // a square hit flush then shows 4/5 of its momentum, since the points share it.
+// A blow that comes through a floe already against the hull has no approach there: it is push, and as sharp as Δt makes it.
 // Approaches below a least speed count as push: a contact that has converged to the tolerance still creeps, and one that slides over a corner
 // of the hull meets a new normal every step.
 //

@@ -1,12 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Collisions and panel loads that a run leaves: against its series, against each other, and against formulas written down again here."""
 import re
+import subprocess
+import sys
 
 import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, TOW, changed, differing, run, write_case, call
+from harness import CASE, IO, ROOT, TOW, call, changed, differing, run, write_case
+
+sys.path.insert(0, str(ROOT / "postproc"))
+
+import plot_impacts  # noqa: E402
+from bergtow_read import Run as Folder  # noqa: E402
 
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
 LINE = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4}, body__shape="square", body__length=1.6,
@@ -137,3 +144,28 @@ def test_the_resolved_file_holds_what_follows_from_other_keys(line, tmp_path):
 def test_bad_values_are_refused(tmp_path, key, value):
     r = call("check", write_case(tmp_path, changed(TOW, **{f"impact__{key}": value})))
     assert r.returncode == CASE and f"impact.{key}" in r.stderr
+
+
+def test_the_picture_shows_what_the_file_holds(line, tmp_path):
+    with Folder(line.dir) as folder:
+        outlines = plot_impacts.along_hull(folder)
+        # The pieces are the whole hull, each as long as the others, corners included.
+        lengths = [np.hypot(*np.diff(o, axis=0).T).sum() for o in outlines]
+        np.testing.assert_allclose(lengths, 4 * 1.6 / 24, rtol=1e-9)
+        assert [len(o) for o in outlines] == [3 if k % 6 == 3 else 2 for k in range(24)]
+        figure = plot_impacts.draw(folder)
+        mean, curve = figure.axes[0].collections[0].get_paths(), figure.axes[3].lines[0]
+        reach = [np.hypot(*p.vertices.T).max() - np.hypot(*o.T).max() for p, o in zip(mean, outlines)]
+        load = folder.panels["mean_load"]
+        np.testing.assert_allclose(reach, 0.75 * 0.8 * np.sqrt(2) * load / load.max(), atol=1e-9)
+        hits = folder.impacts
+        late = np.sort(hits["peak"][hits["time"] >= 10])[::-1]
+        assert np.array_equal(curve.get_xdata(), late)
+        np.testing.assert_allclose(curve.get_ydata(), np.arange(1, len(late) + 1) / line.summary["impacts"]["hours"])
+    script = [sys.executable, ROOT / "postproc/plot_impacts.py"]
+    assert subprocess.run([*script, line.dir, "-o", tmp_path / "a.png"]).returncode == 0 and (tmp_path / "a.png").stat().st_size > 20000
+    none = run(tmp_path, changed(TOW, run__duration=0.2, impact={"conversion": "none"}))
+    refused = subprocess.run([*script, none.dir], capture_output=True, text=True)
+    assert refused.returncode == IO and "impact.conversion" in refused.stderr and "Traceback" not in refused.stderr
+    quiet = run(tmp_path, changed(TOW, ice__concentration=0, run__duration=0.2), name="quiet")
+    assert subprocess.run([*script, quiet.dir]).returncode == 0  # nothing met: still a picture

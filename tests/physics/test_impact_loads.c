@@ -166,31 +166,34 @@ static void hit_beside_the_middle(void **state)
     bt_world_free(w);
 }
 
-/// The body itself, free and turned by a quarter, runs into a wall: it is now the first of the pair. λ = M V, and the force is against the motion.
+/// The body itself, free, runs into a wall with its front, or turned by a quarter with its side: it is now the first of the pair. λ = M V, and
+/// the force is against the motion.
 static void body_against_a_wall(void **state)
 {
     (void)state;
-    bt_params p = scene_params(0.1, 1);
-    bt_world *w = bt_world_create(&p);
-    add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 0.5 * BT_PI}, true, 0.5 * BT_PI);
-    scene_wall(w, 0.03, -50, 20, 60, 0);
-    bt_impact hit[10];
-    assert_int_equal(run(w, 1, hit), 0);
-    const bt_panels *panels = &w->impacts->panels;
-    double fx = 0, fy = 0;
-    for (int k = 0; k < panels->n; k++) fx += panels->panel[k].fx, fy += panels->panel[k].fy;
-    const double mass = 900 * 3.0 * 100;
-    CHECK_CLOSE(fy * p.dt, mass * (speed - 0.3), 1e-6 * mass); // body frame: the wall is where its −y points; a gap of 0.03 m is closed
-    CHECK_CLOSE(fx, 0, 1e-9 * mass);
-    assert_int_equal(run(w, 3, hit), 1);
-    CHECK_CLOSE(hit[0].gid, 1, 0);
-    CHECK_CLOSE(hit[0].impulse, mass * speed, 1e-6 * mass);
-    CHECK_CLOSE(hit[0].mass, mass, 1e-6 * mass);
-    CHECK_CLOSE(hit[0].y, -5, 0.02);
-    CHECK_CLOSE(hit[0].x, 0, 0.02);
-    CHECK_CLOSE(hit[0].panel, 30, 0);
-    CHECK_CLOSE(hit[0].peak, speed * sqrt(2 * 1e6 * 3 * mass), 1e-6 * hit[0].peak); // its own height is crushed
-    bt_world_free(w);
+    for (int i = 0; i < 2; i++) {
+        bt_params p = scene_params(0.1, 1);
+        bt_world *w = bt_world_create(&p);
+        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 0.5 * BT_PI}, true, i * 0.5 * BT_PI);
+        scene_wall(w, 0.03, -50, 20, 60, 0);
+        bt_impact hit[10];
+        assert_int_equal(run(w, 1, hit), 0);
+        const bt_panels *panels = &w->impacts->panels;
+        double f[2] = {0, 0};
+        for (int k = 0; k < panels->n; k++) f[0] += panels->panel[k].fx, f[1] += panels->panel[k].fy;
+        // Body frame: the wall is where its x points, or its −y. A gap of 0.03 m is closed in the step.
+        const double mass = 900 * 3.0 * 100, towards[2] = {1 - i, -i};
+        for (int k = 0; k < 2; k++) CHECK_CLOSE(f[k] * p.dt, -towards[k] * mass * (speed - 0.3), 1e-6 * mass);
+        assert_int_equal(run(w, 3, hit), 1);
+        CHECK_CLOSE(hit[0].gid, 1, 0);
+        CHECK_CLOSE(hit[0].impulse, mass * speed, 1e-6 * mass);
+        CHECK_CLOSE(hit[0].mass, mass, 1e-6 * mass);
+        CHECK_CLOSE(hit[0].x, 5 * towards[0], 0.02);
+        CHECK_CLOSE(hit[0].y, 5 * towards[1], 0.02);
+        CHECK_CLOSE(hit[0].panel, i ? 30 : 0, 0);
+        CHECK_CLOSE(hit[0].peak, speed * sqrt(2 * 1e6 * 3 * mass), 1e-6 * hit[0].peak); // its own height is crushed
+        bt_world_free(w);
+    }
 }
 
 /// A floe lies against a body at rest and the wind presses on it: a push of that force, never a collision.
