@@ -125,6 +125,8 @@ static void note_division(run *r)
     r->totals.divisions = s.divisions;
     r->totals.imbalance = s.imbalance;
     r->totals.worst_imbalance = s.worst_imbalance;
+    r->totals.dealt_imbalance = s.dealt_imbalance;
+    r->totals.worst_dealt_imbalance = s.worst_dealt_imbalance;
     r->totals.edge_cut = s.cut;
     r->totals.halo_share = s.halo;
     bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);

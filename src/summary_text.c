@@ -77,6 +77,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_int(&j, "moved_floes", t->moved_floes);
     bt_json_number(&j, "imbalance", t->imbalance);
     bt_json_number(&j, "worst_imbalance", t->worst_imbalance);
+    bt_json_number(&j, "dealt_imbalance", t->dealt_imbalance);
+    bt_json_number(&j, "worst_dealt_imbalance", t->worst_dealt_imbalance);
     bt_json_number(&j, "edge_cut", t->edge_cut);
     bt_json_number(&j, "halo_share", t->halo_share);
     bt_json_number(&j, "memory_per_floe_b", n_floes > 0 ? t->memory / (double)n_floes : NAN);

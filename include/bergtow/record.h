@@ -95,7 +95,7 @@ typedef struct bt_run_totals {
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;
-    double imbalance, worst_imbalance, edge_cut, halo_share;
+    double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
     const struct bt_impacts *impacts; ///< collisions of the towed body, NULL = none told apart
