@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CHUNK 1024 // rows of collisions in a chunk: 8 kB a column
+#define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
 
 static const struct {
     const char *name, *units, *description;

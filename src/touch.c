@@ -111,12 +111,14 @@ bt_touch *bt_touch_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
 {
     const bt_tiles *ts = w->tiles;
     const bt_idx towed = bt_world_towed(w);
+    // A large movable body has its contacts in the last tile; one of infinite mass has them in the tiles of the floes.
+    const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->n - 1 : 0;
     touches all = {0};
-#pragma omp parallel if (BT_MANY(w->bodies.n, 2000))
+#pragma omp parallel if (BT_MANY(w->bodies.n, 2000) && from == 0)
     {
         touches mine = {0};
 #pragma omp for schedule(dynamic, 16)
-        for (bt_idx k = 0; k < ts->n; k++) {
+        for (bt_idx k = from; k < ts->n; k++) {
             const bt_tile *tile = &ts->tile[k];
             for (bt_idx j = 0; tile->own && j < tile->n_units; j++) {
                 const bt_unit *u = &tile->units[j];

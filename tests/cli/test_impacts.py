@@ -30,7 +30,17 @@ def rows(r):
         return {name: d[:] for name, d in f["impacts"].items()}
 
 
-def test_panels_carry_the_ice_force_at_every_sample(line):
+@pytest.fixture(scope="module")
+def prescribed(tmp_path_factory):
+    """Infinite mass: its contacts lie elsewhere than those of a body on a line."""
+    return run(tmp_path_factory.mktemp("speed"), changed(LINE, tow={"speed": 0.13, "ramp": 2}, body__yaw=20))
+
+
+def test_panels_carry_the_ice_force_at_every_sample(line, prescribed):
+    total, fx, fy = prescribed.dataset("/panels/force").sum(axis=1), *prescribed.series("ice_force_x", "ice_force_y")
+    c, s = np.cos(np.pi / 9), np.sin(np.pi / 9)
+    scale = np.abs(fx).max()
+    assert scale > 1 and np.abs(c * total[:, 0] - s * total[:, 1] - fx).max() < 1e-11 * scale and np.abs(s * total[:, 0] + c * total[:, 1] - fy).max() < 1e-11 * scale
     force, load = line.dataset("/panels/force"), line.dataset("/panels/load")
     fx, fy, yaw = line.series("ice_force_x", "ice_force_y", "body_yaw")
     assert force.shape == (300, 24, 2) and load.shape == (300, 24) and np.ptp(yaw) > 0.02
