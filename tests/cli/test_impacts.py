@@ -112,6 +112,7 @@ def test_samples_of_several_steps_hold_means(line, tmp_path):
     assert seven.shape[0] == len(r.series("time")) == 43
     np.testing.assert_allclose(seven[:42], one[:294].reshape(42, 7, 24, 2).mean(axis=1), atol=1e-12)
     np.testing.assert_allclose(seven[42], one[294:].mean(axis=0), atol=1e-12)
+    np.testing.assert_allclose(r.dataset("/panels/load")[:42], line.dataset("/panels/load")[:294].reshape(42, 7, 24).mean(axis=1), atol=1e-12)
     # Rows do not go by samples, nor do counts.
     assert all(np.array_equal(a, b) for a, b in zip(rows(line).values(), rows(r).values()))
     assert r.series("collisions").sum() == line.series("collisions").sum() and r.summary["impacts"] == line.summary["impacts"]

@@ -313,7 +313,7 @@ static void panels_carry_the_ice_force(void **state)
     add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.1}, true, 0.1);
     w->bodies.pose[bt_world_towed(w)].x = -5.6;
     set_contact(w, 0, 0.3);
-    double turned = 0, collided = 0;
+    double turned = 0, collided = 0, in_steps = 0, in_events = 0;
     for (int s = 0; s < 100; s++) {
         bt_sample o;
         const double yaw = w->bodies.pose[bt_world_towed(w)].yaw; // of the start of the step
@@ -329,9 +329,15 @@ static void panels_carry_the_ice_force(void **state)
         CHECK_CLOSE(sin(yaw) * fx + cos(yaw) * fy, o.ice_force_y, 1e-12 * (normal + 1));
         assert_true(normal >= force / hypot(1, 0.3) * (1 - 1e-9));
         assert_true(fabs(o.collision_resistance) <= fabs(o.ice_resistance) * (1 + 1e-9) + 0.4 * normal);
+        for (int64_t i = 0; i < w->impacts->n_touch; i++) in_steps += w->impacts->touch[i].collision;
+        for (int64_t i = 0; i < w->impacts->n_closed; i++) in_events += w->impacts->closed[i].impulse;
         turned = fmax(turned, fabs(yaw - 0.1));
         collided += o.collision_resistance;
     }
+    // No part of a collision is lost or counted twice on the way from steps to events.
+    bt_impacts_end(w->impacts);
+    for (int64_t i = 0; i < w->impacts->n_closed; i++) in_events += w->impacts->closed[i].impulse;
+    CHECK_CLOSE(in_events, in_steps, 1e-9 * in_steps);
     assert_true(turned > 1e-4 && collided > 0 && w->impacts->n_all > 10);
     // Loads only where ice was: panels 35..39 and 0..4 are the front side, 15..24 the rear.
     for (int k = 16; k < 24; k++) CHECK_CLOSE(w->impacts->panels.panel[k].sum_normal, 0, 0);
