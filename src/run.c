@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "bergtow/estimate.h"
 #include "bergtow/field.h"
 #include "bergtow/impact.h"
 #include "bergtow/observe.h"
@@ -293,6 +294,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     bt_status status = make_field(comm, c, &f, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
     const double concentration = f.concentration;
+    double thickness, radius;
+    bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
     if (status == BT_OK) {
         bt_domain_create(r.w, comm);
@@ -302,6 +305,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .threads = threads,
             .dt = c->run.dt,
             .mean_size = r.roster.mean_size,
+            .mean_thickness = thickness,
+            .mean_radius = radius,
             .concentration = concentration,
             .tolerance = r.w->par.tolerance,
         };

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "estimate_text.h"
 #include "impact_report.h"
 #include "json.h"
 #include "summary.h"
@@ -87,6 +88,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);
     bt_impacts_json(&j, t->impacts);
+    if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
+    else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
     bt_json_int(&j, "unconverged_steps", h->unconverged);
@@ -118,7 +121,6 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     return j.text;
 }
 
-/// A force with a prefix that keeps three digits before the point.
 static const char *force(char out[32], double newton)
 {
     const double size = fabs(newton);
@@ -127,6 +129,8 @@ static const char *force(char out[32], double newton)
     else snprintf(out, 32, "%#.4g N", newton);
     return out;
 }
+
+const char *bt_force_text(char out[32], double newton) { return force(out, newton); }
 
 static void print_forces(const bt_summary *s, const bt_history *h, const bt_case *c)
 {
@@ -158,6 +162,10 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
            (long long)t->n_steps, t->dt, s->sim_time);
     if (s->body) print_forces(s, h, c);
     bt_impacts_print(t->impacts);
+    if (s->body && !isnan(s->estimate.along)) {
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
+        bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
+    }
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
                (long long)h->unconverged);

@@ -88,6 +88,7 @@ typedef struct bt_run_totals {
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
+    double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
