@@ -340,6 +340,13 @@ static void check_path(const check *k, int n, const double *v)
     fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
+// After check_tow: the reference speed goes by it.
+static void follow_impact(bt_case *c)
+{
+    fill(&c->impact.duration, c->run.dt);
+    fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
+}
+
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
@@ -408,6 +415,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bool placed = check_body(&k, &n, v);
     follow_hull(c, n, v);
     check_tow(&k);
+    follow_impact(c);
     if (placed) check_path(&k, n, v);
     check_water(&k);
     check_estimate(&k);

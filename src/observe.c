@@ -11,6 +11,7 @@
 #include <math.h>
 
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
@@ -123,6 +124,18 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->contacts_body = bt_sum_value(&seen->sum[TOUCHING]);
 }
 
+/// Collisions of the towed body; on rank 0, which records.
+static void observe_impacts(const bt_world *w, bt_sample *s)
+{
+    const bt_impacts *m = w->impacts;
+    s->collision_resistance = s->collisions = s->impact_peak = NAN;
+    if (!m || !w->tow) return;
+    s->collision_resistance = 0.0 - (m->collision_x * w->tow->ux + m->collision_y * w->tow->uy) / w->par.dt;
+    s->collisions = (double)m->n_closed;
+    s->impact_peak = 0;
+    for (int64_t i = 0; i < m->n_closed; i++) s->impact_peak = bt_max(s->impact_peak, m->closed[i].peak);
+}
+
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
 {
     const bt_step_stats *st = &w->stats;
@@ -150,6 +163,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
+    observe_impacts(w, s);
     if (w->towed >= 0) {
         observe_body(w, &seen, s);
     } else {

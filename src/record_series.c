@@ -40,6 +40,9 @@ const bt_series_field bt_series_fields[] = {
     ROW(repeats, SUM, "1", "times a step was detected and solved again because its solution outran the contact margin"),
     ROW(outrun, SUM, "1", "steps whose last solution still outran the margin: a contact may have been met a step late"),
     ROW(restitution_cut, SUM, "1", "steps whose restitution was lowered so that the contacts add no energy"),
+    ROW(collision_resistance, MEAN, "N", "part of ice_resistance that belongs to collisions, impulse / dt; the rest is push; NaN if not told apart"),
+    ROW(collisions, SUM, "1", "collisions with the towed body that ended in the step; NaN if not told apart"),
+    ROW(impact_peak, MAX, "N", "largest peak force of these collisions by impact.conversion, 0 without a collision; NaN if not told apart"),
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
 };
 

@@ -15,6 +15,7 @@
 
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "bergtow/impact.h"
 #include "bergtow/observe.h"
 #include "bergtow/record.h"
 #include "bergtow/setup.h"
@@ -63,6 +64,9 @@ static bt_status open_record(run *r, bt_errors *err)
     if (status != BT_OK) return status;
     status = bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
     bt_handover_free(&b);
+    if (status != BT_OK || !r->w->impacts) return status;
+    status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    if (status != BT_OK) bt_record_close(r->record, NULL, err);
     return status;
 }
 
@@ -225,6 +229,8 @@ static bt_status run_world(run *r, bt_errors *err)
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
+    if (r->w->impacts) bt_impacts_end(r->w->impacts);
+    r->totals.impacts = r->w->impacts;
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);

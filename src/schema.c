@@ -27,6 +27,8 @@ static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
 static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
 static const char *const tow_modes[] = {"none", "speed", "line", NULL};
+static const char *const conversions[] = {"none", "duration", "crushing", NULL};
+static const char *const corners[] = {"given", "real", NULL};
 static const char *const tilts[] = {"none", "slope", "geostrophic", NULL};
 
 #define AT(member) .offset = offsetof(bt_case, member)
@@ -153,10 +155,21 @@ const bt_key bt_case_keys[] = {
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
+    CHOICE("impact.conversion", impact.conversion, conversions, "duration",
+           "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a corner at a pressure; none: collisions are not told apart"),
+    REAL("impact.duration", impact.duration, TIME, "= run.dt", "(0, 1000]",
+         "duration of a collision for conversion duration; assumed, the time step being chosen about as long as a collision [Yulmetov & Løset 2017]"),
+    REAL("impact.pressure", impact.pressure, PRESSURE, "1 MPa", "(0, 1e9]", "pressure of crushed ice for conversion crushing, assumed; at model scale divided by the length ratio"),
+    CHOICE("impact.corner", impact.corner, corners, "given", "crushed corner for conversion crushing: the given angle, or the real one of the corner in contact"),
+    REAL("impact.corner_angle", impact.corner_angle, ANGLE, "90 deg", "(0, 179]", "angle of the crushed corner, assumed"),
+    REAL("impact.least_speed", impact.least_speed, SPEED, "= 0.05 x reference speed of the solver", "[0, 100]", "approach of a floe to the body below which its contact counts as a push, assumed"),
+    INT("impact.panels", impact.panels, "36", "[1, 1000]", "pieces of equal length that the hull's perimeter is cut into for loads, the first centred on the body's own x axis"),
+
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+    BOOL("output.panels", output.panels, "false", "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
 
     REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
     REAL("estimate.p_s", estimate.p_s, LINE_LOAD, "13 kN/m", "[0, 1e9]", "strength P at which dense ice captures a berg, at full scale [Lichey & Hellmer 2001; FESOM2 takes 10 kN/m]"),

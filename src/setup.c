@@ -8,6 +8,7 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/tow.h"
 #include "case_check.h"
 
@@ -309,6 +310,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
         add_towed_body(c, w, r);
         r->names[n++] = "towed body";
     }
+    w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
     *out = w;

@@ -4,6 +4,7 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
@@ -233,6 +234,7 @@ void bt_world_step(bt_world *w)
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
+    bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
     bt_domain_note(w);
     w->step++;

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "estimate_text.h"
+#include "impact_report.h"
 #include "json.h"
 #include "summary.h"
 
@@ -86,6 +87,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);
+    bt_impacts_json(&j, t->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
     else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
@@ -159,6 +161,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
     if (s->body) print_forces(s, h, c);
+    bt_impacts_print(t->impacts);
     if (s->body && !isnan(s->estimate.along)) {
         printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/impact.h"
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
@@ -42,6 +43,7 @@ void bt_world_free(bt_world *w)
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
+    bt_impacts_free(w->impacts);
     free(w->tow);
     free(w);
 }

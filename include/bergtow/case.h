@@ -18,6 +18,9 @@ typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE } bt_tow_mode;         // none, speed, line
 typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC } bt_tilt;   // none, slope, geostrophic
 
+typedef enum { BT_IMPACT_NONE, BT_IMPACT_DURATION, BT_IMPACT_CRUSHING } bt_impact_conversion; // none, duration, crushing
+typedef enum { BT_CORNER_GIVEN, BT_CORNER_REAL } bt_corner;                  // given, real
+
 /// Drag coefficients of a class of bodies (ice: floes; body: the towed body).
 typedef struct bt_drag_coefs {
     double water_form; ///< C_w, on ½ρ draft×width
@@ -132,10 +135,20 @@ typedef struct bt_case {
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
     struct {
+        bt_impact_conversion conversion; ///< of the impulse of a collision into a force
+        double duration;         ///< T_c of a collision, s
+        double pressure;         ///< p of crushed ice, Pa
+        bt_corner corner;        ///< which angle the crushed corner has
+        double corner_angle;     ///< φ when given, or without a corner, rad
+        double least_speed;      ///< approach below this is a push, m/s
+        int64_t panels;          ///< pieces of the hull's perimeter
+    } impact;
+    struct {
         int64_t sample_every;    ///< steps per entry of the series
         double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
+        bool panels;             ///< series of the loads on the hull's panels
     } output;
     struct {
         double p_star, p_s;      ///< ice strength Pa and capture threshold N/m of Lichey and Hellmer, at full scale

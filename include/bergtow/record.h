@@ -35,6 +35,9 @@ typedef struct bt_sample {
     double repeats;         ///< times the step was solved again because floes outran the contact margin
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
+    double collision_resistance; ///< N, the part of ice_resistance that collisions have (impact.h); the rest is push
+    double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
+    double impact_peak;     ///< largest peak force of these, N; 0 without
     double moving;          ///< floes faster than 1 % of the reference speed
 } bt_sample;
 
@@ -53,6 +56,8 @@ extern const int bt_n_series_fields;
 typedef struct bt_phases {
     double detect, colour, forces, solve, advance, exchange, output;
 } bt_phases;
+
+struct bt_impacts;
 
 /// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order of their
 /// ids; the other bodies are the last rank's. first: [size + 1].
@@ -94,6 +99,7 @@ typedef struct bt_run_totals {
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    const struct bt_impacts *impacts; ///< collisions of the towed body, NULL = none told apart
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
 
@@ -104,6 +110,10 @@ typedef struct bt_record bt_record;
 /// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
 bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
                          const char *command_line, bt_errors *err);
+
+/// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left in m, which must stay
+/// valid until the record is closed. Before the first sample. The status is that of rank 0: agree on it.
+bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err);
 
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
 /// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, so that a

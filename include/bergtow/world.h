@@ -107,6 +107,7 @@ struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
+struct bt_impacts;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
@@ -132,6 +133,7 @@ typedef struct bt_world {
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
+    struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
     bt_step_stats stats;
