@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/environment.h"
 #include "bergtow/forces.h"
 #include "bergtow/tow.h"
 #include "case_check.h"
@@ -21,6 +22,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
     // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
     // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
     const double turn = c->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;
+    double water[2], air[2]; // at time zero; where they change, each step sets its own
+    bt_environment_at(c, true, 0, water);
+    bt_environment_at(c, false, 0, air);
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -37,15 +41,15 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
-        .water_u = c->water.current_x,
-        .water_v = c->water.current_y,
-        .air_u = c->air.wind_x,
-        .air_v = c->air.wind_y,
+        .water_u = water[0],
+        .water_v = water[1],
+        .air_u = air[0],
+        .air_v = air[1],
         .coriolis = turn,
     };
-    if (c->water.tilt == BT_TILT_GEOSTROPHIC) {
-        p.balance_u = c->water.current_x;
-        p.balance_v = c->water.current_y;
+    if (c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC) {
+        p.balance_u = water[0];
+        p.balance_v = water[1];
     } else if (c->water.tilt == BT_TILT_SLOPE) {
         p.tilt_ax = -GRAVITY * c->water.slope_x;
         p.tilt_ay = -GRAVITY * c->water.slope_y;
@@ -296,6 +300,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     if (!check_inside(c, f, err)) return BT_ERR_CASE;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    w->environment = bt_environment_create(c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_world_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;

@@ -30,11 +30,13 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, co
     bt_json_number(j, "mean_tow_force_n", s->tow.mean);
     bt_json_number(j, "mean_tow_force_se_n", s->tow.se);
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
+    bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
+    bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
     bt_json_number(j, "peak_line_tension_n", s->body ? h->peak_tension : NAN);
     bt_json_open(j, "budget", '{');
-    bt_json_number(j, "tow_minus_drag_minus_inertia_n", s->balance);
+    bt_json_number(j, "tow_minus_other_forces_n", s->balance);
     bt_json_number(j, "closure_n", s->closure);
     bt_json_number(j, "closure_relative", s->closure_relative);
     bt_json_number(j, "ice_momentum_closure_relative", s->budget_closure_relative);
@@ -137,7 +139,7 @@ static void print_forces(const bt_summary *s, const bt_history *h, const bt_case
            force(d, s->ice.sd));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95),
            force(b, s->p99), force(d, s->peak));
-    printf("    from balances     %s by tow - drag - inertia, %s by the momentum of the ice\n", force(a, s->balance),
+    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
            force(b, s->budget.mean));
     printf("  tow force           %s +- %s, drag %s", force(a, s->tow.mean), force(b, s->tow.se), force(d, s->drag.mean));
     if (!isnan(h->peak_tension)) printf(", peak line tension %s", force(a, h->peak_tension));

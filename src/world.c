@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/environment.h"
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
@@ -42,6 +43,7 @@ void bt_world_free(bt_world *w)
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
+    bt_environment_free(w->environment);
     free(w->tow);
     free(w);
 }
@@ -152,5 +154,6 @@ uint64_t bt_world_hash(const bt_world *w)
         sum += h;
     }
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

@@ -122,7 +122,7 @@ static void every_doubt_is_told(void **state)
     static const char *const told[] = {"stopped early: SIGTERM", "200 of 600 steps met the sweep limit",
                                        "120 of 600 steps the contacts added energy", "overlap by up to 0.1 m",
                                        "momentum is conserved only to 0.001", "2 floes left",
-                                       "differs from tow - drag - inertia", "by the momentum of the ice"};
+                                       "differs from tow - drag - Coriolis - tilt - inertia", "by the momentum of the ice"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++)
         if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
     assert_null(strstr(json, "the steady window is short"));
