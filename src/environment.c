@@ -101,11 +101,10 @@ void bt_environment_begin(bt_world *w)
     velocity(&e->water, t, water);
     velocity(&e->air, t, air);
     double balance[2] = {0, 0}, tilt[2] = {p->tilt_ax, p->tilt_ay};
-    if (e->tilt == BT_TILT_GEOSTROPHIC || e->tilt == BT_TILT_DYNAMIC) memcpy(balance, water, sizeof balance);
+    if (e->tilt == BT_TILT_GEOSTROPHIC) memcpy(balance, water, sizeof balance);
     if (e->tilt == BT_TILT_DYNAMIC) {
-        double before[2];
-        velocity(&e->water, w->step > 0 ? ((double)w->step - 0.5) * p->dt : 0, before);
-        for (int k = 0; k < 2; k++) tilt[k] = (water[k] - before[k]) / p->dt;
+        velocity(&e->water, w->step > 0 ? ((double)w->step - 0.5) * p->dt : 0, balance);
+        for (int k = 0; k < 2; k++) tilt[k] = (water[k] - balance[k]) / p->dt;
     }
     const bool same = water[0] == p->water_u && water[1] == p->water_v && air[0] == p->air_u && air[1] == p->air_v && tilt[0] == p->tilt_ax && tilt[1] == p->tilt_ay;
     p->water_u = water[0], p->water_v = water[1];

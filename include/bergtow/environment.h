@@ -16,7 +16,8 @@
 //     geostrophic   −g∇η = f k×U_w at that time: balances Coriolis on the current, and nothing accelerates the body with the water but drag
 //     dynamic       −g∇η = dU_w/dt + f k×U_w: the tilt that a current without friction, uniform in space, has. A body that
 //                   moves with the water goes on doing so without drag. dU_w/dt is taken from the middle of the last step (from
-//                   t = 0 in the first) to the middle of this one
+//                   t = 0 in the first) to the middle of this one, and Coriolis acts about the current of the last step: so it is
+//                   exact in the scheme of forces.h, U' = U_b + R (U1 − U_b) + Δt (−g∇η)
 //
 // Rest. A floe is at rest when it has the water's velocity of that step (tiles.h). When water, wind or balance differ from those of the
 // step before, no tile rests: every body is looked at and feels the forces again. Tiles move along with the water:
