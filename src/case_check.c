@@ -407,6 +407,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     if (placed) check_path(&k, n, v);
     check_water(&k);
     bt_case_check_environment(c, from, err);
+    bt_case_check_lead(c, n, v, from, err);
     for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }

@@ -25,6 +25,9 @@ bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
 /// Checks of current and wind in time, as bt_case_check.
 void bt_case_check_environment(const bt_case *c, const bt_origin *from, bt_errors *err);
 
+/// Width and length of the lead that follow from the body and the tow; checks of the lead. The waterline is v [n][2], n = 0 without a body.
+void bt_case_check_lead(bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err);
+
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 

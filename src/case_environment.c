@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Current and wind in time: tables that a case names, and checks of their keys.
+// What surrounds the body: tables of current and wind that a case names, the lead ahead, and checks of their keys.
 #include "case_check.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "bergtow/shape.h"
 #include "schema.h"
 #include "table.h"
 
@@ -65,4 +66,22 @@ void bt_case_check_environment(const bt_case *c, const bt_origin *from, bt_error
                       where(&k, "water.tide.minor", at), c->water.tide.minor, c->water.tide.major);
     check_table(&k, "water.current_table", &c->water.table, current);
     check_table(&k, "air.wind_table", &c->air.table, wind);
+}
+
+void bt_case_check_lead(bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err)
+{
+    const check k = {.c = c, .from = from, .err = err};
+    char at[256];
+    const double ahead = c->tow.direction - c->body.yaw;
+    if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, cos(ahead), sin(ahead)) : 0;
+    if (isnan(c->lead.length)) c->lead.length = c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;
+    if (c->lead.mode == BT_LEAD_NONE || !sound(&k, "lead.mode") || !sound(&k, "body.shape") || !sound(&k, "tow.mode")) return;
+    if (c->body.shape == BT_BODY_ABSENT || c->tow.mode == BT_TOW_NONE) {
+        bt_errors_add(err, "%s: a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode", where(&k, "lead.mode", at));
+        return;
+    }
+    if (!(c->lead.width > 0) && sound(&k, "lead.width")) bt_errors_add(err, "%s: is %g m; give the width of the lead, as in 20 m", where(&k, "lead.width", at), c->lead.width);
+    if (!(c->lead.length > 0) && sound(&k, "lead.length")) bt_errors_add(err, "%s: is %g m; give the length of the lead, as in 500 m", where(&k, "lead.length", at), c->lead.length);
+    if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && sound(&k, "lead.floe_size"))
+        bt_errors_add(err, "%s: is %g m and a managed lead needs the size of its pieces; give it, as in 10 m", where(&k, "lead.floe_size", at), c->lead.floe_size);
 }

@@ -277,9 +277,11 @@ static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall
 /// Floes of a field that was read may belong to another domain.
 static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
 {
+    // A managed lead may cut a floe that reaches over an open edge, and leave a piece beyond it.
+    const bool over_x = c->lead.mode == BT_LEAD_MANAGED && c->domain.ends == BT_BOUND_OPEN, over_y = c->lead.mode == BT_LEAD_MANAGED && c->domain.sides == BT_BOUND_OPEN;
     for (bt_idx i = 0; i < f->n; i++) {
         const double x = f->pose[3 * (size_t)i], y = f->pose[3 * (size_t)i + 1];
-        if (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length && y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width) continue;
+        if ((over_x || (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length)) && (over_y || (y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width))) continue;
         bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
                       c->ice.field ? c->ice.field : c->path ? c->path : "case", (int)i, x, y);
         return false;

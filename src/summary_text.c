@@ -18,6 +18,27 @@ static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
     for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
 }
 
+static const char *const lead_names[] = {"none", "channel", "managed"};
+
+static void json_lead(bt_json *j, const bt_lead_stats *l)
+{
+    if (l->mode == BT_LEAD_NONE) {
+        bt_json_string(j, "lead", NULL);
+        return;
+    }
+    bt_json_open(j, "lead", '{');
+    bt_json_string(j, "mode", lead_names[l->mode]);
+    bt_json_number(j, "width_m", l->width);
+    bt_json_number(j, "length_m", l->length);
+    bt_json_int(j, l->mode == BT_LEAD_CHANNEL ? "floes_removed" : "floes_cut", l->taken);
+    bt_json_number(j, l->mode == BT_LEAD_CHANNEL ? "area_removed_m2" : "area_cut_m2", l->area_taken);
+    bt_json_int(j, "pieces", l->pieces);
+    bt_json_number(j, "mean_piece_m", l->pieces > 0 ? l->mean_piece : NAN);
+    bt_json_number(j, "concentration_before", l->concentration_before);
+    bt_json_number(j, "concentration_after", l->concentration_after);
+    bt_json_close(j, '}');
+}
+
 static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
 {
     bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
@@ -84,6 +105,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "sweep_bytes_per_contact", t->sweep_bytes_per_contact);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
+    json_lead(&j, &t->lead);
     json_forces(&j, s, h, c);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
@@ -154,6 +176,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
+    bt_lead_stats_print(&t->lead);
     if (s->body) print_forces(s, h, c);
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,

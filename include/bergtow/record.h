@@ -6,6 +6,7 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/lead.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
@@ -87,6 +88,7 @@ typedef struct bt_run_totals {
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
     double concentration;        ///< as made
+    bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     uint64_t state_hash;
