@@ -56,6 +56,20 @@ void bt_environment_at(const bt_case *c, bool water, double t, double v[2])
     velocity(&f, t, v);
 }
 
+void bt_environment_mean(const bt_case *c, bool water, double v[2])
+{
+    enum { SAMPLES = 1000 };
+    const flow f = flow_of(c, water);
+    v[0] = f.u, v[1] = f.v;
+    if (!changes(&f)) return;
+    double sum[2] = {0, 0};
+    for (int i = 0; i < SAMPLES; i++) {
+        velocity(&f, (i + 0.5) / SAMPLES * c->run.duration, v);
+        sum[0] += v[0], sum[1] += v[1];
+    }
+    v[0] = sum[0] / SAMPLES, v[1] = sum[1] / SAMPLES;
+}
+
 double bt_environment_fastest(const bt_case *c, bool water)
 {
     const bt_table *t = water ? &c->water.table : &c->air.table;

@@ -41,6 +41,16 @@ static void ellipse_by_hand(void **state)
         CHECK_CLOSE(v[1], -0.05 + want[k % 4][1], 1e-12);
     }
     CHECK_CLOSE(bt_environment_fastest(&c, true), hypot(0.1, 0.05) + 0.5, 1e-15);
+    // The mean: of whole periods the constant part; of the half in which the current goes along the axis 2/π of the largest more.
+    double mean[2];
+    c.run.duration = 24 * hour;
+    bt_environment_mean(&c, true, mean);
+    CHECK_CLOSE(mean[0], 0.1, 1e-9);
+    CHECK_CLOSE(mean[1], -0.05, 1e-9);
+    c.run.duration = 6 * hour, c.water.tide.phase = 90 * deg;
+    bt_environment_mean(&c, true, mean);
+    CHECK_CLOSE(mean[0], 0.1 + 2 / BT_PI * 0.5 * x, 1e-6);
+    CHECK_CLOSE(mean[1], -0.05 + 2 / BT_PI * 0.5 * y, 1e-6);
     bt_case_free(&c);
 }
 
