@@ -48,8 +48,9 @@ SEAMS = {
 # A berg that goes round a channel without ends.
 ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ice={"concentration": 0.5, "size": 1}, run__duration=50, run__dt=0.1,
                 body__x=3, tow__speed=0.8)
-# The same where the tide turns: nothing rests, and between the walls the tiles go with the water.
-TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}}, tow__mode="line")
+# The same where the tide turns, in a managed lead: nothing rests, and between the walls the tiles go with the water.
+TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}}, tow__mode="line",
+               lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
 CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
 PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
