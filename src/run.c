@@ -46,11 +46,12 @@ typedef struct {
     bt_run_totals totals;
 } run;
 
-/// Collective. Rank 0 makes or reads the field, with all its threads; then every rank has it.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_errors *err)
+/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it. lead: on rank 0.
+static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
     if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) bt_field_share(comm, f);
@@ -291,9 +292,10 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     bt_field f;
     bt_field_init(&f);
-    bt_status status = make_field(comm, c, &f, err);
+    bt_lead_stats lead = {0};
+    bt_status status = make_field(comm, c, &f, &lead, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
-    const double concentration = f.concentration;
+    const double concentration = lead.mode == BT_LEAD_NONE ? f.concentration : lead.concentration_before;
     double thickness, radius;
     bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
@@ -308,6 +310,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .mean_thickness = thickness,
             .mean_radius = radius,
             .concentration = concentration,
+            .lead = lead,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);

@@ -29,7 +29,8 @@ static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship",
 static const char *const tow_modes[] = {"none", "speed", "line", NULL};
 static const char *const conversions[] = {"none", "duration", "crushing", NULL};
 static const char *const corners[] = {"given", "real", NULL};
-static const char *const tilts[] = {"none", "slope", "geostrophic", NULL};
+static const char *const tilts[] = {"none", "slope", "geostrophic", "dynamic", NULL};
+static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 
 #define AT(member) .offset = offsetof(bt_case, member)
 #define REAL(key, member, kind, preset_, range_, doc_) \
@@ -132,17 +133,33 @@ const bt_key bt_case_keys[] = {
     REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own x"),
     REAL("tow.hull_y", tow.hull_y, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
 
+    CHOICE("lead.mode", lead.mode, lead_modes, "none",
+           "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that reach into it; or those floes cut into pieces"),
+    REAL("lead.width", lead.width, LENGTH, "= width of the body across the tow", "[0, 1e5]", "width of the lead"),
+    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length", "[0, 1e7]", "length of the lead from the body's place at time zero"),
+    REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]", "diameter of the circle of the area of the largest piece, needed by mode managed"),
+
     REAL("water.density", water.density, DENSITY, "1027 kg/m3", "[500, 2000]", "density of the water [Hunke & Comeau 2011]"),
     REAL("water.current_x", water.current_x, SPEED, "0 m/s", ANY_SPEED, "current along x"),
     REAL("water.current_y", water.current_y, SPEED, "0 m/s", ANY_SPEED, "current along y"),
+    REAL("water.tide.major", water.tide.major, SPEED, "0 m/s", "[0, 100]", "tidal ellipse, added to the current: largest speed"),
+    REAL("water.tide.minor", water.tide.minor, SPEED, "0 m/s", ANY_SPEED,
+         "tidal ellipse: speed across the major axis a quarter period later, positive when the current turns from x towards y"),
+    REAL("water.tide.inclination", water.tide.inclination, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: angle of the major axis from the x axis towards y"),
+    REAL("water.tide.period", water.tide.period, TIME, "44714.164 s", "(0, 1e9]", "tidal ellipse: period; the default is that of the constituent M2, 28.9841042 deg an hour"),
+    REAL("water.tide.phase", water.tide.phase, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: lag; the current is largest along the major axis at phase / 360 deg x period"),
+    TEXT("water.current_table", water.current_table, "none",
+         "CSV file with the header t,u,v: current along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
     REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]", "latitude of the Coriolis force, 0 = no Coriolis force"),
-    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none, given by its slope, or in geostrophic balance with the current"),
+    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none; given by its slope; in geostrophic balance with the current of the moment; or dynamic: it also accelerates the water where that changes"),
     REAL("water.slope_x", water.slope_x, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along x, for tilt slope"),
     REAL("water.slope_y", water.slope_y, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along y, for tilt slope"),
 
     REAL("air.density", air.density, DENSITY, "1.29 kg/m3", "[0, 10]", "density of the air [Hunke & Comeau 2011]"),
     REAL("air.wind_x", air.wind_x, SPEED, "0 m/s", ANY_SPEED, "wind along x"),
     REAL("air.wind_y", air.wind_y, SPEED, "0 m/s", ANY_SPEED, "wind along y"),
+    TEXT("air.wind_table", air.wind_table, "none",
+         "CSV file with the header t,u,v: wind along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
 
     REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),

@@ -9,6 +9,7 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/impact.h"
+#include "bergtow/environment.h"
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
@@ -44,6 +45,7 @@ void bt_world_free(bt_world *w)
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
+    bt_environment_free(w->environment);
     free(w->tow);
     free(w);
 }
@@ -154,5 +156,6 @@ uint64_t bt_world_hash(const bt_world *w)
         sum += h;
     }
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

@@ -6,21 +6,25 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/lead.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
-/// tow direction; resisting components are positive against it, so that tow = ice + drag + inertia.
+/// tow direction; resisting components are positive against it, so that
+/// tow = ice + drag + Coriolis + tilt + inertia.
 typedef struct bt_sample {
     double time;            ///< s, end of the step
     double tow_force;       ///< N along
     double ice_resistance;  ///< N, contact force against the tow direction
     double ice_force_x, ice_force_y; ///< N, contact force on the body
     double ice_moment;      ///< N m, contact moment on the body about its centroid
-    double drag_force;      ///< N, all external forces (water, air, Coriolis, tilt) against the tow direction
+    double drag_force;      ///< N, drag of water and air against the tow direction
+    double coriolis_force, tilt_force; ///< N, Coriolis force and that of the sea-surface tilt against the tow direction
     double inertia_force;   ///< N, (M + added mass) × acceleration along the tow direction
     double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
     double line_tension, line_length, carriage_x, carriage_y; ///< N, m, m, m (NaN without a line)
+    double current_x, current_y, wind_x, wind_y; ///< m/s, of the step (its middle, where they change)
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
@@ -90,6 +94,7 @@ typedef struct bt_run_totals {
     double mean_size;            ///< mean equivalent diameter of the floes, m
     double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
+    bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     uint64_t state_hash;
