@@ -48,7 +48,7 @@ typedef struct {
 static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    if (comm->rank == 0) status = bt_field_load(c, f, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) bt_field_share(comm, f);
@@ -285,6 +285,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     bt_status status = make_field(comm, c, &f, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
     const double concentration = f.concentration;
+    const bt_outline_counts outlines = f.outlines;
     bt_field_free(&f);
     if (status == BT_OK) {
         bt_domain_create(r.w, comm);
@@ -295,6 +296,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .dt = c->run.dt,
             .mean_size = r.roster.mean_size,
             .concentration = concentration,
+            .outlines = outlines,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);

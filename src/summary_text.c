@@ -18,6 +18,21 @@ static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
     for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
 }
 
+static void json_outlines(bt_json *j, const bt_outline_counts *o)
+{
+    bt_json_open(j, "outlines", '{');
+    bt_json_int(j, "read", o->read);
+    bt_json_int(j, "turned", o->turned);
+    bt_json_int(j, "dropped_vertices", o->dropped);
+    bt_json_int(j, "hulled", o->hulled);
+    bt_json_number(j, "hull_area_added_m2", o->hull_area);
+    bt_json_int(j, "split", o->split);
+    bt_json_int(j, "parts", o->parts);
+    bt_json_number(j, "origin_lon_deg", o->read ? o->lon * 180 / BT_PI : NAN);
+    bt_json_number(j, "origin_lat_deg", o->read ? o->lat * 180 / BT_PI : NAN);
+    bt_json_close(j, '}');
+}
+
 static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
 {
     bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
@@ -82,6 +97,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "sweep_bytes_per_contact", t->sweep_bytes_per_contact);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
+    json_outlines(&j, &t->outlines);
     json_forces(&j, s, h, c);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
@@ -152,6 +168,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
+    const bt_outline_counts *o = &t->outlines;
+    if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
+    if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, h, c);
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
