@@ -113,7 +113,7 @@ static const char *project(const reader *s, int n, double *v)
     const double degree = BT_PI / 180;
     for (int i = 0; i < n; i++) {
         const double lon = v[2 * i], lat = v[2 * i + 1];
-        if (!(fabs(lon) <= 360 && fabs(lat) <= 89)) return "a vertex is not longitude and latitude in degrees, in this order, within 89 degrees of the equator; "
+        if (!(fabs(lon) <= 360 && fabs(lat) <= 90)) return "a vertex is not longitude and latitude in degrees, in this order; "
                                                            "for metres leave out ice.outlines_crs";
         double north, east;
         bt_outline_project(lon * degree, lat * degree, s->lon0, s->lat0, &north, &east);

@@ -208,20 +208,25 @@ bool bt_outline_split(int n, const double *v, bt_parts *p)
 #define WGS84_A 6378137.0               // m
 #define WGS84_E2 6.69437999014131705734e-3 // e² = f (2 − f), 1/f = 298.257223563
 
-/// Length of the meridian from the equator to latitude φ [Snyder 1987, (3-21)], m. Good to 0.1 mm.
-static double meridian(double phi)
+/// Place on the ellipsoid, from the centre of the earth, m.
+static void on_ellipsoid(double lon, double lat, double p[3])
 {
-    const double e2 = WGS84_E2, e4 = e2 * e2, e6 = e4 * e2;
-    return WGS84_A * ((1 - e2 / 4 - 3 * e4 / 64 - 5 * e6 / 256) * phi - (3 * e2 / 8 + 3 * e4 / 32 + 45 * e6 / 1024) * sin(2 * phi) +
-                      (15 * e4 / 256 + 45 * e6 / 1024) * sin(4 * phi) - 35 * e6 / 3072 * sin(6 * phi));
+    const double s = sin(lat), normal = WGS84_A / sqrt(1 - WGS84_E2 * s * s);
+    p[0] = normal * cos(lat) * cos(lon);
+    p[1] = normal * cos(lat) * sin(lon);
+    p[2] = normal * (1 - WGS84_E2) * s;
 }
 
 void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east)
 {
-    double turn = fmod(lon - lon0, 2 * BT_PI); // the shorter way round, also across 180°
-    if (turn > BT_PI) turn -= 2 * BT_PI;
-    if (turn < -BT_PI) turn += 2 * BT_PI;
-    const double s = sin(lat), root = sqrt(1 - WGS84_E2 * s * s);
-    *east = WGS84_A * turn * cos(lat) / root;
-    *north = meridian(lat) - meridian(lat0) + *east * *east * tan(lat) * root / (2 * WGS84_A);
+    double p[3], o[3];
+    on_ellipsoid(lon, lat, p);
+    on_ellipsoid(lon0, lat0, o);
+    const double dx = p[0] - o[0], dy = p[1] - o[1], dz = p[2] - o[2];
+    const double e = cos(lon0) * dy - sin(lon0) * dx, n = cos(lat0) * dz - sin(lat0) * (cos(lon0) * dx + sin(lon0) * dy);
+    const double s = sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s); // √(M N), mean curvature there
+    const double level = hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
+    const double stretch = level > 0 ? chord * (1 + chord * chord / (24 * radius * radius)) / level : 0;
+    *east = e * stretch;
+    *north = n * stretch;
 }

@@ -6,7 +6,6 @@
 //   [Hunke & Comeau 2011]    J. Geophys. Res. 116, C05008: icebergs in sea ice, drag coefficients
 //   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
 //   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
-//   [Snyder 1987]            USGS Prof. Paper 1395, p. 199: azimuthal equidistant projection of a small area
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
 // "assumed" is a choice of this program without a measurement behind it.
 #include "schema.h"
@@ -99,9 +98,9 @@ const bt_key bt_case_keys[] = {
     TEXT("ice.outlines", ice.outlines, "none",
          "GeoJSON file of floe outlines (FeatureCollection of Polygons; properties thickness in m and id are optional) read instead of making a field; relative to the folder of the case file"),
     CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "metres",
-           "coordinates of the outlines: metres in the case's frame, or longitude and latitude in degrees (WGS84), projected about ice.origin_lon, ice.origin_lat [Snyder 1987]"),
+           "coordinates of the outlines: metres in the case's frame, or longitude and latitude in degrees (WGS84), projected about ice.origin_lon, ice.origin_lat (azimuthal equidistant, within 100 km)"),
     REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]", "longitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
-    REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-89, 89]", "latitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
+    REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
     CHOICE("ice.nonconvex", ice.nonconvex, nonconvexes, "refuse",
            "outlines of a file that are not convex: refused, replaced by their hull (the area grows), or split into convex parts that move as one floe"),
 

@@ -36,10 +36,10 @@ bool bt_outline_convex(int n, const double *v);
 /// convex polygon [Hertel & Mehlhorn 1983, LNCS 158: at most four times the least number of parts]. False when rounding leaves no ear.
 bool bt_outline_split(int n, const double *v, bt_parts *p);
 
-/// North and east of (lon0, lat0) in metres of a place (lon, lat), all in radians, on the WGS84 ellipsoid: azimuthal equidistant, by the
-/// small-area formula of Snyder 1987 (USGS Prof. Paper 1395, p. 199, "Guam projection"):
-///     east  = a Δλ cos φ / √(1 − e² sin² φ),   north = M(φ) − M(φ0) + east² tan φ √(1 − e² sin² φ) / (2a)
-/// with M the length of the meridian. At 75° N distances are good to 4 mm at 10 km and 0.5 m at 50 km (measured against geodesics).
+/// North and east of (lon0, lat0) in metres of a place (lon, lat), all in radians, on the WGS84 ellipsoid. Azimuthal equidistant for a small area: the
+/// direction is that of the place seen from the origin (e, n: its chord's components east and north), the distance the arc over the chord c,
+///     (east, north) = (e, n)/√(e² + n²) · c (1 + c²/(24 R²)),   R² = M N, the radii of curvature at the origin.
+/// No latitude is special, nor the 180th meridian. Against geodesics, from 60° to 89° N: within 1 mm at 10 km, 2 cm at 100 km.
 void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east);
 
 #endif
