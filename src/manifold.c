@@ -25,7 +25,9 @@ typedef struct {
 static polygon polygon_of(const bt_bodies *b, bt_idx i, int part, double x, double y)
 {
     int64_t first = b->offset[i] + part;
-    return (polygon){b->outline + 2 * first, b->per_length + first, b->mark[first].count, x, y};
+    // The whole of a convex body without a look at its marks: they would be one more line of memory in every pair.
+    const int count = part == 0 ? (int)(b->offset[i + 1] - first) : b->mark[first].count;
+    return (polygon){b->outline + 2 * first, b->per_length + first, count, x, y};
 }
 
 /// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a floe's memory.

@@ -39,7 +39,7 @@ static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double bo
     }
 }
 
-static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX]) { box_of_part(b, i, 0, bt_body_corners(b, i), box); }
+static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX]) { box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box); }
 
 /// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the nearest image
 /// of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole period.

@@ -139,6 +139,16 @@ def test_overlap_of_shores_not_of_hulls(tmp_path):
     assert "feature 0 and feature 1 overlap" in field(tmp_path, BASE, code=CASE), "one inside the other"
 
 
+@pytest.mark.parametrize("x, y", [(6.5, 0.35), (6.5, 1.25), (5.35, 0.8)])
+@pytest.mark.parametrize("last", [True, False])
+def test_overlap_with_every_part(tmp_path, x, y, last):
+    """A small floe a little in each arm of the C, and in its back; whichever of them comes first."""
+    small = feature([[x, y], [x + 0.4, y], [x + 0.4, y + 0.4], [x, y + 0.4]])
+    c = feature(at(C_SHAPE, 5, 0))
+    write(tmp_path, *([c, small] if last else [small, c]))
+    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+
+
 def test_hull_and_split_are_counted(tmp_path):
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
     rings, _, areas, _ = field(tmp_path, changed(BASE, ice__nonconvex="hull"))

@@ -186,10 +186,15 @@ static void detect_equals_brute_force_with_parts(void **state)
             const int n = i % 3 ? random_star(&rng, 0.8, v) : scene_random_polygon(&rng, 0.6, v);
             add_outline(w, n, v, box * scene_uniform(&rng), box * scene_uniform(&rng), 7 * scene_uniform(&rng), 0, 0);
         }
-        bt_body_def d = scene_prism(random_star(&rng, 3, v), v, 900);
+        // A large one, with bays: in the last tile, with floes of any other.
+        int n_large;
+        do n_large = random_star(&rng, 3, v);
+        while (bt_outline_convex(n_large, v));
+        bt_body_def d = scene_prism(n_large, v, 900);
+        bt_parts parts;
+        assert_true(bt_outline_split(n_large, v, &parts));
+        d.parts = &parts;
         d.large = true;
-        d.n_vertices = bt_shape_hull(d.n_vertices, v);
-        bt_shape_centre(d.n_vertices, v);
         d.x = d.y = 0.5 * box;
         bt_world_add(w, &d);
         for (int step = 0; step < 25; step++) {

@@ -537,7 +537,7 @@ static void compare(const bt_key *keys, int n, const void *a, const void *b)
             const char *ta, *tb;
             memcpy(&ta, ma, sizeof ta), memcpy(&tb, mb, sizeof tb);
             same = ta && tb ? !strcmp(ta, tb) : ta == tb;
-            if (k->offset == offsetof(bt_case, ice.field) && keys == bt_case_keys) same = true; // becomes absolute; compared as text below
+            if ((k->offset == offsetof(bt_case, ice.field) || k->offset == offsetof(bt_case, ice.outlines)) && keys == bt_case_keys) same = true; // becomes absolute; compared as text below
         }
         if (k->type == BT_KEY_POINTS) {
             const double *pa, *pb;
