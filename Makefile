@@ -40,7 +40,7 @@ TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long validate bench clean install tests lint asan partition-study FORCE
+.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint asan partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -139,6 +139,10 @@ BENCH ?= default
 bench: deps ## time a floe and step over sizes, threads and ranks (BENCH=quick a minute, BENCH=full to 300,000 floes)
 	@$(AGAIN) CONFIG=release all build/release/triad
 	$(PYTHON) cases/scaling/bench.py $(BENCH)
+
+fullscale: deps ## resistance of an 80 m berg at 20 to 95 % ice beside the estimates, at full scale: table and picture in out/fullscale
+	@$(AGAIN) CONFIG=release all
+	$(PYTHON) cases/fullscale/study.py concentration
 
 lint: all ## names of external symbols, licence lines, syntax
 	@tests/lint.sh

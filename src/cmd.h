@@ -12,6 +12,7 @@
 int bt_cmd_run(int argc, char **argv);
 int bt_cmd_check(int argc, char **argv);
 int bt_cmd_field(int argc, char **argv);
+int bt_cmd_estimate(int argc, char **argv);
 
 /// The case file and the overrides that every command takes.
 typedef struct bt_cmd_case {

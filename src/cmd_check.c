@@ -24,15 +24,42 @@ static double seconds_per_floe_step(double concentration)
 }
 static const double gravity = 9.81;
 
+typedef struct {
+    bt_cmd_case file;
+    double scale; ///< length ratio of the twin to print, 0 = none
+} options;
+
+// A number, or a fraction as in 1/30.
+static double parse_scale(const struct argp_state *state, const char *text)
+{
+    char *end;
+    double up = strtod(text, &end), down = 1;
+    if (end != text && *end == '/') {
+        const char *rest = end + 1;
+        down = strtod(rest, &end);
+        if (end == rest) end = (char *)"?";
+    }
+    const double ratio = up / down;
+    if (end == text || *end || !isfinite(up) || !isfinite(down) || !(ratio >= 1e-4 && ratio <= 1e4))
+        argp_error(state, "--scale %s: give a length ratio from 1e-4 to 1e4, as in 30 or 1/30", text);
+    return ratio;
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    (void)arg;
-    if (key != ARGP_KEY_INIT) return ARGP_ERR_UNKNOWN;
-    state->child_inputs[0] = state->input;
-    return 0;
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'l': o->scale = parse_scale(state, arg); return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
 }
+static const struct argp_option check_options[] = {
+    {"scale", 'l', "L", 0, "print the Froude-scaled twin with all lengths times L as a case file instead", 0},
+    {0},
+};
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp check_argp = {.parser = parse, .args_doc = "CASE.yml", .children = children,
+static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
                                        .doc = "Validate a case and print the numbers that follow from it. Nothing is computed or written."};
 
 static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
@@ -126,30 +153,43 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
     printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
 }
 
+static void print_numbers(const char *path, const bt_case *c, const bt_field *f)
+{
+    const ice_numbers n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    printf("%s: valid\n", path);
+    if (c->run.title) printf("title                %s\n", c->run.title);
+    printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
+    print_ice(c, &n);
+    print_outlines(&f->outlines);
+    print_body(c);
+    print_step(c, &n);
+    print_cost(c, &n);
+}
+
+static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
+{
+    const bt_status status = bt_case_scale(c, ratio, err);
+    if (status != BT_OK) return status;
+    char *text = bt_case_scaled_text(c, ratio);
+    if (text) fputs(text, stdout);
+    free(text);
+    return BT_OK;
+}
+
 int bt_cmd_check(int argc, char **argv)
 {
-    bt_cmd_case file = {0};
-    bt_cmd_parse(&check_argp, argc, argv, &file);
+    options o = {0};
+    bt_cmd_parse(&check_argp, argc, argv, &o);
     bt_case c;
     bt_field f;
     bt_errors err = {0};
     bt_field_init(&f);
-    bt_status status = bt_case_read(&c, file.path, file.set, file.n_set, &err);
-    const bool read = status == BT_OK && (c.ice.field || c.ice.outlines);
-    if (read) status = bt_field_load(&c, &f, &err);
-    if (status == BT_OK) {
-        ice_numbers n = read ? ice_of_field(&c, &f) : ice_of_case(&c);
-        printf("%s: valid\n", file.path);
-        if (c.run.title) printf("title                %s\n", c.run.title);
-        printf("domain               %g x %g m\n", c.domain.length, c.domain.width);
-        print_ice(&c, &n);
-        print_outlines(&f.outlines);
-        print_body(&c);
-        print_step(&c, &n);
-        print_cost(&c, &n);
-    }
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
+    if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
+    else if (status == BT_OK) print_numbers(o.file.path, &c, &f);
     bt_field_free(&f);
     bt_case_free(&c);
-    free(file.set);
+    free(o.file.set);
     return bt_cmd_end(&bt_comm_alone, status, &err);
 }
