@@ -90,7 +90,7 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libjansson-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev \
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-pytest ffmpeg
 

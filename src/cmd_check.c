@@ -7,6 +7,7 @@
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
+#include "cost.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -14,14 +15,6 @@
 #include <stdlib.h>
 
 static const double bytes_per_floe = 2048;     // body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice
-// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 us at 20, 50 and 80 %, where
-// force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is linear.
-// A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.
-static double seconds_per_floe_step(double concentration)
-{
-    const double x = bt_min(0.95, bt_max(0, concentration));
-    return x < 0.5 ? 0.5e-6 * pow(4, (x - 0.2) / 0.3) : 2e-6 * pow(7.5, (x - 0.5) / 0.3);
-}
 static const double gravity = 9.81;
 
 typedef struct {
@@ -145,7 +138,7 @@ static void print_step(const bt_case *c, const ice_numbers *n)
 
 static void print_cost(const bt_case *c, const ice_numbers *n)
 {
-    const double per_step = seconds_per_floe_step(n->concentration);
+    const double per_step = bt_cost_floe_step(n->concentration);
     double seconds = n->count * (double)bt_case_steps(c) * per_step;
     double frames = c->run.duration / c->output.frame_interval;
     printf("memory               about %.3g MB\n", n->count * bytes_per_floe / 1e6 + 20);
