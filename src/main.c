@@ -21,6 +21,7 @@ static const struct {
     {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
     {"check", "validate a case and print the numbers that follow from it", bt_cmd_check, false},
     {"field", "make the ice field of a case only", bt_cmd_field, false},
+    {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble, true},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };

@@ -153,3 +153,19 @@ def test_the_froude_twin_is_towed_alike(tmp_path):
         a, b = one.series(name) * factor, four.series(name)
         assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max(), name
     assert one.series("ice_resistance").max() > 0
+
+
+def test_a_lead_goes_round_the_corners(tmp_path):
+    """A channel along the way-points: no floe is left near either leg, and there were some without it."""
+    case = changed(VESSEL, run__duration=2, lead={"mode": "channel", "width": 60, "length": 800})
+    near = []
+    for name, c in (("with", case), ("without", changed(case, lead=None))):
+        centre = run(tmp_path, c, "--quiet", name=name).dataset("/frames/pose")[0][:, :2]
+        distance = np.full(len(centre), np.inf)
+        # 500 m from (-600, -200) to the first way-point, and 300 of the 390 m to the second.
+        for p, q in (((-600, -200), (-100, -200)), ((-100, -200), (-100 + 300 * 250 / np.hypot(250, 300), -200 + 300 * 300 / np.hypot(250, 300)))):
+            p, d = np.array(p), np.subtract(q, p)
+            s = np.clip((centre - p) @ d / (d @ d), 0, 1)
+            distance = np.minimum(distance, np.hypot(*(centre - p - s[:, None] * d).T))
+        near.append((distance < 29).sum())
+    assert near[0] == 0 and near[1] > 5
