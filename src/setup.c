@@ -37,6 +37,8 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
+        .crush_pressure = c->ice.crushing_pressure,
+        .crush_least = c->ice.crushing_least,
         .water_u = c->water.current_x,
         .water_v = c->water.current_y,
         .air_u = c->air.wind_x,
@@ -64,6 +66,7 @@ static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body
     d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
     d->friction = c->ice.friction;
     d->restitution = c->ice.restitution;
+    d->thickness = h;
     d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
                              c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
 }

@@ -18,7 +18,7 @@ typedef enum {
     BT_UNIT_MASS,     ///< kg
     BT_UNIT_DENSITY,  ///< kg/m3
     BT_UNIT_DAMPING,  ///< N s/m
-    BT_UNIT_PRESSURE, ///< Pa; no key has it, but messages can name it
+    BT_UNIT_PRESSURE, ///< Pa
     BT_UNIT_KINDS
 } bt_unit;
 
