@@ -15,6 +15,13 @@ static inline double bt_limit_point(const bt_limit *l, const bt_unit *u, int i, 
     return bt_max(0, bt_min(-b * u->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
 }
 
+/// Bound of point i at these velocities, N s.
+static inline double bt_limit_bound(const bt_limit *l, const bt_unit *u, int i, const bt_vel *v)
+{
+    const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
+    return bt_min(l->most[i], bt_max(l->flat[i], l->base[i] + l->slope[i] * bt_max(0, approach)));
+}
+
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose multiplier has
 /// the right sign, and of sides that rounding leaves in doubt the one of least value.
 static inline void bt_limit_rim(const bt_unit *u, const double b[2], const double c[2], double l[2])

@@ -41,6 +41,9 @@ const bt_series_field bt_series_fields[] = {
     ROW(outrun, SUM, "1", "steps whose last solution still outran the margin: a contact may have been met a step late"),
     ROW(restitution_cut, SUM, "1", "steps whose restitution was lowered so that the contacts add no energy"),
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
+    ROW(crushing, MEAN, "1", "contact points that crush: their normal force is at the limit pressure x thickness x length"),
+    ROW(crushed_work, SUM, "J", "work taken by contact points that crush"),
+    ROW(crushed_depth, MAX, "m", "deepest crush of a pair of bodies in contact"),
 };
 
 const int bt_n_series_fields = sizeof bt_series_fields / sizeof *bt_series_fields;

@@ -6,6 +6,7 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/stall.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that tow = ice + drag + inertia.
@@ -36,6 +37,9 @@ typedef struct bt_sample {
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
     double moving;          ///< floes faster than 1 % of the reference speed
+    double crushing;        ///< contact points that crush (crush.h)
+    double crushed_work;    ///< taken by them in the step, J
+    double crushed_depth;   ///< deepest crush of a pair in contact, m
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -86,6 +90,7 @@ typedef struct bt_run_totals {
     double concentration;        ///< as made
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
+    bt_stall stall;              ///< of the towed body
     uint64_t state_hash;
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
