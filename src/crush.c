@@ -11,6 +11,8 @@
 #include "kernel.h"
 #include "phases.h"
 
+#define LEAST_WAY 0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
+
 // --- memory ----------------------------------------------------------------------------------------------------------
 
 static int by_gids(const void *p, const void *q)
@@ -45,58 +47,60 @@ void bt_crush_add(bt_tile *t, const bt_scar *s)
 
 // --- geometry --------------------------------------------------------------------------------------------------------
 
-/// Tangents of the angles of the two edges at a corner from a direction, and how far the edges reach across it.
+/// Part of the tangent line that a contact bears on.
 typedef struct {
-    double tan, reach;
-} wedge;
+    double length, middle; ///< m, m from the centroid of a along the tangent
+} patch;
 
-/// Corner k of body i; (x, y): unit vector out of the body into what it is pressed on.
-static wedge wedge_of(const bt_bodies *s, bt_idx i, int k, double x, double y)
+/// Where a and b overlap when b has come nearer by `way` along the normal: their intersection (Sutherland & Hodgman 1974, Comm. ACM 17: a cut by
+/// the edges of b one after the other), seen along the tangent.
+static patch patch_of(const bt_world *w, const bt_manifold *m, double way)
 {
-    const double *v = s->outline + 2 * s->offset[i];
-    const int n = (int)(s->offset[i + 1] - s->offset[i]);
-    k %= n;
-    wedge c = {0, 0};
-    const int ends[2] = {(k + 1) % n, (k + n - 1) % n};
-    for (int e = 0; e < 2; e++) {
-        const double ex = v[2 * ends[e]] - v[2 * k], ey = v[2 * ends[e] + 1] - v[2 * k + 1];
-        const double across = fabs(x * ey - y * ex), inward = -(x * ex + y * ey);
-        c.tan += across / bt_max(inward, 1e-9 * (across + fabs(inward)));
-        c.reach += across;
+    const bt_bodies *s = &w->bodies;
+    double off[2], v[2][4 * BT_MAX_VERTICES];
+    bt_world_offset(w, m->a, m->b, off);
+    off[0] -= way * m->nx, off[1] -= way * m->ny;
+    const double *q = s->outline + 2 * s->offset[m->b];
+    const int n_b = (int)(s->offset[m->b + 1] - s->offset[m->b]);
+    int n = (int)(s->offset[m->a + 1] - s->offset[m->a]), from = 0;
+    memcpy(v[0], s->outline + 2 * s->offset[m->a], 2 * (size_t)n * sizeof(double));
+    for (int e = 0; e < n_b && n > 0; e++, from = 1 - from) {
+        const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n_b ? e + 1 : 0);
+        const double ex = p1[0] - p0[0], ey = p1[1] - p0[1], x0 = p0[0] + off[0], y0 = p0[1] + off[1];
+        const double *in = v[from], *last = in + 2 * (n - 1);
+        double *out = v[1 - from], before = ex * (last[1] - y0) - ey * (last[0] - x0);
+        int kept = 0;
+        for (int k = 0; k < n; k++) {
+            const double *now = in + 2 * k, inside = ex * (now[1] - y0) - ey * (now[0] - x0);
+            if ((inside >= 0) != (before >= 0)) {
+                const double f = before / (before - inside);
+                out[2 * kept] = last[0] + f * (now[0] - last[0]);
+                out[2 * kept++ + 1] = last[1] + f * (now[1] - last[1]);
+            }
+            if (inside >= 0) {
+                out[2 * kept] = now[0];
+                out[2 * kept++ + 1] = now[1];
+            }
+            last = now, before = inside;
+        }
+        n = kept;
     }
-    return c;
-}
-
-/// Outward normal of the edge of body i that faces (x, y) most squarely: the one that bt_contacts_pair has clipped.
-static void facing_normal(const bt_bodies *s, bt_idx i, double x, double y, double out[2])
-{
-    const double *v = s->outline + 2 * s->offset[i];
-    const int n = (int)(s->offset[i + 1] - s->offset[i]);
-    double least = INFINITY;
+    double low = INFINITY, high = -INFINITY;
     for (int k = 0; k < n; k++) {
-        const double *p = v + 2 * k, *q = v + 2 * ((k + 1) % n), per = s->per_length[s->offset[i] + k];
-        const double nx = (q[1] - p[1]) * per, ny = (p[0] - q[0]) * per;
-        if (nx * x + ny * y >= least) continue;
-        least = nx * x + ny * y;
-        out[0] = nx, out[1] = ny;
+        const double t = m->nx * v[from][2 * k + 1] - m->ny * v[from][2 * k];
+        low = bt_min(low, t), high = bt_max(high, t);
     }
+    return n > 0 ? (patch){high - low, 0.5 * (low + high)} : (patch){0, NAN};
 }
 
-/// The corner that makes contact point i of a manifold, by its feature (manifold.c).
-static wedge corner_of(const bt_bodies *s, const bt_manifold *m, int i)
+/// Length of a patch that falls to point i of the manifold: uniform pressure on it, as forces at the points. NaN: to each alike.
+static double share_of(const bt_manifold *m, int i, patch c)
 {
-    const uint32_t f = m->p[i].feature;
-    if ((f & 0xfff00000u) == 0x7ff00000u) { // two corners that point at each other
-        const wedge a = wedge_of(s, m->a, (int)(f >> 10 & 0x3ff), m->nx, m->ny), b = wedge_of(s, m->b, (int)(f & 0x3ff), -m->nx, -m->ny);
-        return (wedge){1 / (1 / a.tan + 1 / b.tan), bt_min(a.reach, b.reach)};
-    }
-    const bool ref_b = f >> 31, own = f & 1; // own: the corner is an end of the reference edge
-    const int corner = (int)(f >> 1 & 0x7ffff);
-    const double sign = ref_b ? -1 : 1, x = sign * m->nx, y = sign * m->ny; // out of the reference polygon
-    if (!own) return wedge_of(s, ref_b ? m->a : m->b, corner, -x, -y);
-    double facing[2] = {-x, -y};
-    facing_normal(s, ref_b ? m->a : m->b, x, y, facing);
-    return wedge_of(s, ref_b ? m->b : m->a, corner, -facing[0], -facing[1]);
+    if (m->n_points == 1) return 1;
+    const double t0 = m->nx * m->p[0].ra[1] - m->ny * m->p[0].ra[0], t1 = m->nx * m->p[1].ra[1] - m->ny * m->p[1].ra[0];
+    if (!(t1 != t0) || isnan(c.middle)) return 0.5;
+    const double second = bt_max(0, bt_min(1, (c.middle - t0) / (t1 - t0)));
+    return i ? second : 1 - second;
 }
 
 /// Thickness that is crushed when a and b are pressed together, m; 0 = neither is ice.
@@ -140,22 +144,25 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_manifold *m
         l->scar = scar ? (int32_t)(scar - t->scars) : -1;
         inherit(t, m, l);
     }
+    double gap = INFINITY, approach = 0;
     for (int i = 0; i < m->n_points; i++) {
         u->gap[i] += l->depth[i];
         l->place[i] = bt_max(u->gap[i], 0) / dt;
-        if (!(h > 0)) continue;
-        const wedge c = corner_of(s, m, i);
-        double length = c.reach;
-        if (m->n_points > 1) // half of the overlapping part: the points are its ends
-            length = 0.5 * fabs((m->p[1].ra[1] - m->p[0].ra[1]) * m->nx - (m->p[1].ra[0] - m->p[0].ra[0]) * m->ny);
-        const double per_length = w->par.crush_pressure * h * dt, least = w->par.crush_least * h / m->n_points;
-        l->most[i] = per_length * bt_max(length, least);
-        const bool parallel = length < c.tan * w->par.slop;
-        const double wide = parallel ? length : bt_min(length, c.tan * l->depth[i]);
-        l->flat[i] = per_length * bt_max(wide, least);
-        if (wide >= length) continue; // as long as it gets
-        const double k = w->par.crush_pressure * h * c.tan;
-        l->base[i] = k * dt * l->depth[i];
+        gap = bt_min(gap, bt_max(u->gap[i], 0));
+        const double before = bt_normal_velocity(u, i, &s->vel_start[m->a], &s->vel_start[m->b]);
+        approach = bt_max(approach, -bt_min(before, bt_normal_velocity(u, i, &s->vel_free[m->a], &s->vel_free[m->b])));
+    }
+    if (!(h > 0)) return;
+    const double per_length = w->par.crush_pressure * h * dt, least = w->par.crush_least * h / m->n_points;
+    const double way = bt_max(dt * approach - gap, LEAST_WAY * w->par.size);
+    const patch now = patch_of(w, m, gap + w->par.slop), then = patch_of(w, m, gap + w->par.slop + way);
+    for (int i = 0; i < m->n_points; i++) {
+        const double length = now.length * share_of(m, i, now), later = bt_max(length, then.length * share_of(m, i, then));
+        l->flat[i] = per_length * bt_max(length, least);
+        l->most[i] = per_length * bt_max(later, least);
+        if (later <= bt_max(length, least)) continue; // as long as it gets
+        const double k = w->par.crush_pressure * h * (later - length) / way;
+        l->base[i] = per_length * length;
         l->slope[i] = k * dt * dt / (1 + sqrt(1 + dt * dt * k * u->w[i]));
     }
 }

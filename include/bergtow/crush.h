@@ -8,23 +8,24 @@
 // crushed surfaces, g + d, so that neither the position projection nor the statistics of overlap take crushed ice for an
 // error, and bodies that part and come back meet where they crushed each other last. The mass of crushed ice stays where it was.
 //
-// Contact length. A corner that is crushed to the depth d against a surface is as wide as the polygon there,
-//     ℓ(d) = d (tan α1 + tan α2),   α: angles of its two edges from the normal of the surface
-// which is 2 d tan(φ/2) for a corner of angle φ that meets it squarely; at most the extent of the edges. The two points of a manifold
-// are two such corners, each for at most half of the overlapping part of the edges. Edges that are parallel (to within the
-// slop over the length they overlap) bear on all of it from the first touch. No contact is shorter than ℓ_min =
-// least_length × h (a manifold of two points: together), or a corner at its first touch would bear nothing; assumed.
-// Two corners that point at each other are as one with 1/tan = 1/tan_a + 1/tan_b.
+// Contact length. ℓ is the width, across the normal, of the overlap of the two outlines as they are when the crushed surfaces
+// touch: the overlapping part for two edges; for a corner of angle φ that was crushed squarely to the depth d, 2 d tan(φ/2); the chord
+// for a disc. Two points share it as the forces at their places that are equivalent to a uniform pressure on it: half each for two edges that lie
+// on each other, nearly all for the end of an edge that has come in tilted. It is looked at one slop deeper, so that edges
+// that lie on each other bear from the first touch. No contact is shorter than ℓ_min = least_length × h (half of it for each
+// of two points), or a corner at its first touch would bear nothing; assumed.
 //
 // Implicit length. A step can be long against the crushing itself (Δt = 5 s; a floe of 30 m stops in 1 s): with the length of the start
 // of the step a corner would go in by v Δt as if it bore nothing. So the bound is a function of the approach in the step,
-//     λ <= max(p h Δt ℓ_min, k Δt (d − θ Δt w)),   k = p h (tan α1 + tan α2),   w < 0
-// With X2 = X1 + U2 Δt and h² = Δt² k W (W: inverse mass of the row) a free body of speed v that meets the surface crushes d1 = Δt v /
-// (1 + θ h²) in its first step; that the energy it took, ½ k d1², is what the impulse took from the body, gives
-//     θ = 1 / (1 + √(1 + h²))
-// i.e. the mean over the step where it resolves the crushing, and the whole depth v/√(k W) in one step where it does not; in
-// between the depth of a stop comes out up to 30 % too small (at h = 1) [D].
-// Rejected: θ = ½ (a third of the depth at h = 8) and θ = 0 (eight times the depth).
+//     λ <= max(p h Δt ℓ_min, p h Δt (ℓ1 + θ κ (−w) Δt)) and <= p h Δt ℓ2,   κ = (ℓ2 − ℓ1)/D
+// ℓ1: length now, ℓ2: after the approach D that the pair would make in the step by itself. With X2 = X1 + U2 Δt and g² = Δt² p h κ W
+// (W: inverse mass of the row) a corner of speed v that meets the surface, ℓ1 = 0, crushes d1 = Δt v/(1 + θ g²) in its first step; that the
+// energy it took, ½ p h κ d1², is what the impulse took from the body, gives
+//     θ = 1 / (1 + √(1 + g²))
+// i.e. the mean over the step where it resolves the crushing, and the whole depth v/√(p h κ W) in one step where it does not; in
+// between the depth of a stop comes out up to 30 % too small (at g = 1) [D].
+// Rejected: θ = ½ (a fourth of the depth at g = 8) and θ = 0 (eight times the depth); lengths from the corner's angle, or from the clipped
+// points of the manifold: a disc of 32 short edges bears on one of them then, however deep it is in.
 //
 // Memory. A pair keeps its depths, by contact feature, while its gap is at most BT_CRUSH_MEMORY mean floe sizes; then they are forgotten, and
 // the ice is sharp again (assumed). A point whose feature is new (the corner has slid on to the next edge) has the overlap that
@@ -43,9 +44,9 @@
 /// Bounds of the points of one unit; all INFINITY (and slope 0) between bodies that are no ice.
 typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach, N s
-    double base[2];  ///< k Δt d, N s
-    double slope[2]; ///< θ k Δt², kg
-    double most[2];  ///< the bound at full length, N s
+    double base[2];  ///< p h Δt ℓ1, N s
+    double slope[2]; ///< θ p h κ Δt², kg
+    double most[2];  ///< p h Δt ℓ2, N s
     double place[2]; ///< max(g + d, 0)/Δt: approach that closes the gap and crushes nothing, m/s
     double depth[2]; ///< d, m
     double grown[2]; ///< by how much it grows in this step, m

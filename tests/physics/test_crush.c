@@ -148,6 +148,7 @@ static void corner(void **state)
             const double dt = steps[j] * sqrt(m / k);
             bt_params p = params(dt);
             p.crush_least = 0;
+            p.slop = 1e-11; // lengths are looked at one slop deeper
             bt_world *w = bt_world_create(&p);
             add_floe(w, 4, kite, 0, 0, 0, v, h);
             scene_wall(w, kite[2], -50, kite[2] + 5, 50, 0);
@@ -159,7 +160,7 @@ static void corner(void **state)
                 depth = bt_max(depth, w->stats.crushed_depth); // of pairs in contact: none where all rests
                 if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
                 if (s == 1) { // takes from the floe the energy that this depth costs
-                    CHECK_CLOSE(w->stats.crushed_work, 0.5 * k * pow(w->stats.crushed_depth, 2), 1e-9 * m * v * v);
+                    CHECK_CLOSE(w->stats.crushed_work, 0.5 * k * pow(w->stats.crushed_depth, 2), 1e-8 * m * v * v);
                     CHECK_CLOSE(w->stats.crushed_depth, v * dt / sqrt(1 + dt * dt * k / m), 1e-9);
                 }
             }
