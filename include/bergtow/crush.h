@@ -44,7 +44,7 @@
 /// Bounds of the points of one unit; all INFINITY (and slope 0) between bodies that are no ice.
 typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach, N s
-    double base[2];  ///< p h Δt ℓ1, N s
+    double base[2];  ///< p h Δt ℓ1, N s; never above flat
     double slope[2]; ///< θ p h κ Δt², kg
     double most[2];  ///< p h Δt ℓ2, N s
     double place[2]; ///< max(g + d, 0)/Δt: approach that closes the gap and crushes nothing, m/s

@@ -48,10 +48,12 @@ SEAMS = {
 # A berg that goes round a channel without ends.
 ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ice={"concentration": 0.5, "size": 1}, run__duration=50, run__dt=0.1,
                 body__x=3, tow__speed=0.8)
-CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND}
+# Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
+CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
+CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "crush": CRUSH}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
 PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
-         "round": [(2, 1), (3, 2), (4, 1)]}
+         "round": [(2, 1), (3, 2), (4, 1)], "crush": [(1, 4), (2, 2), (3, 1)]}
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
@@ -99,6 +101,8 @@ def test_the_cases_show_what_they_are_for(alone, name):
         assert (np.abs(np.diff(pose[:, :, 0], axis=0)) > 15).any() and (np.abs(np.diff(pose[:, :, 1], axis=0)) > 12).any()
         area = r.dataset("/floes/area")
         assert area.max() > 15 * area.min()
+    if name == "crush":
+        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.5, r.summary
     if name == "round":
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 
