@@ -16,6 +16,8 @@ typedef struct bt_domain_stats {
     double imbalance;        ///< work of the busiest rank / mean − 1 over the checks, mean of those after the first division
     double worst_imbalance;  ///< largest of them
     int64_t checks;
+    double dealt_imbalance;  ///< the same of the work that a division was made from, just after it: mean of those after the first division
+    double worst_dealt_imbalance;
     double cut;              ///< share of neighbouring tile pairs that lie on different ranks, last division
     double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
     int64_t moved;           ///< bodies that went to another rank
@@ -48,6 +50,9 @@ void bt_domain_maxima(const bt_world *w, double *x, int n);
 void bt_domain_reduce(const bt_world *w, bt_totals *t);
 /// Sum modulo 2⁶⁴ over the ranks. Collective.
 uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x);
+
+/// Rows of doubles [n][width] of all ranks to rank 0, see bt_comm_gather; only with a division. Collective.
+double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total);
 
 /// Is a new division due?
 bool bt_domain_due(const bt_world *w);

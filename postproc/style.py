@@ -29,6 +29,8 @@ ICE = "#0072b2"       # ice resistance
 TOW = "#d55e00"       # tow force
 DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
+CORIOLIS = "#b8860b"  # Coriolis force
+TILT = "#4d4d4d"      # force of the sea-surface tilt
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 
@@ -87,7 +89,9 @@ def conditions(run):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
         words.append(f"{run.n_floes} floes")
-        if np.isfinite(run.value("ice.thickness")):
+        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):  # floes of their own thickness
+            words.append(f"{np.mean(run.thickness):.3g} m thick")
+        elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")
     mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
     if run.towed is not None and mode != "none" and np.isfinite(speed):

@@ -6,6 +6,7 @@
 #include "case_check.h"
 
 #include "bergtow/shape.h"
+#include "bergtow/environment.h"
 #include "schema.h"
 
 #include <math.h>
@@ -130,17 +131,17 @@ static char outside(const bt_case *c, box b, double x, double y)
 
 // ---- defaults that follow from other keys ----
 
-// The field file relative to the folder of the case file, as an absolute path: the resolved file lies elsewhere.
-static void follow_field(bt_case *c)
+// A file that the case names, relative to the folder of the case file, as an absolute path: the resolved file lies elsewhere.
+static void follow_file(const bt_case *c, char **file)
 {
-    if (!c->ice.field || c->ice.field[0] == '/') return;
+    if (!*file || **file == '/') return;
     const char *slash = c->path ? strrchr(c->path, '/') : NULL;
     char *folder = slash == c->path && slash ? strdup("/") : slash ? strndup(c->path, (size_t)(slash - c->path)) : strdup(".");
     char *absolute = folder ? realpath(folder, NULL) : NULL;
     char *joined = NULL;
-    if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", c->ice.field) >= 0) {
-        free(c->ice.field);
-        c->ice.field = joined;
+    if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", *file) >= 0) {
+        free(*file);
+        *file = joined;
     }
     free(absolute);
     free(folder);
@@ -182,7 +183,10 @@ static void follow(bt_case *c)
         fill(&f->thickness, c->ice.thickness);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
-    follow_field(c);
+    follow_file(c, &c->ice.field);
+    follow_file(c, &c->water.current_table);
+    follow_file(c, &c->air.wind_table);
+    follow_file(c, &c->ice.outlines);
 }
 
 // ---- checks ----
@@ -240,7 +244,7 @@ static void check_region(const check *k)
 static void check_sizes(const check *k)
 {
     const bt_case *c = k->c;
-    if (c->ice.field || c->ice.concentration == 0) return;
+    if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
     if (!sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
     double lo = c->ice.size_min, hi = c->ice.size_max;
     bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
@@ -259,6 +263,19 @@ static void check_sizes(const check *k)
     double n = bt_case_expected_floes(c);
     if (n > largest_number_of_floes)
         fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %g are simulated; take larger floes or a smaller region", n, largest_number_of_floes);
+}
+
+static void check_outlines(const check *k)
+{
+    const bt_case *c = k->c;
+    if (!sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.nonconvex")) return;
+    if (c->ice.field && c->ice.outlines) fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
+    const bool lonlat = c->ice.outlines && c->ice.outlines_crs == BT_CRS_LONLAT, lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat);
+    if (lon != lat) fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
+    else if (lon && !lonlat) fault(k, "ice.origin_lon", "has no effect unless ice.outlines are read with ice.outlines_crs: lonlat; remove the origin or set it");
+    if (c->ice.outlines_crs == BT_CRS_LONLAT && !c->ice.outlines) fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
+    if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
+        fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
 }
 
 static void check_polygon(const check *k, const char *key, bt_body_shape shape, int n, const char *shape_key)
@@ -340,6 +357,13 @@ static void check_path(const check *k, int n, const double *v)
     fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
+// After check_tow: the reference speed goes by it.
+static void follow_impact(bt_case *c)
+{
+    fill(&c->impact.duration, c->run.dt);
+    fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
+}
+
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
@@ -348,6 +372,15 @@ static void check_water(const check *k)
         fault(k, "water.tilt", "geostrophic balance needs the Coriolis force; give water.latitude");
     if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && sound(k, "water.slope_x")) fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
     if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && sound(k, "water.slope_y")) fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
+}
+
+static void check_estimate(const check *k)
+{
+    const bt_case *c = k->c;
+    if (sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
+        fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa, c->estimate.kappa_low);
+    if (sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
+        fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa, c->estimate.kappa_high);
 }
 
 static void check_floe(const check *k, int index)
@@ -390,19 +423,26 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
     follow(c);
+    bt_status loaded = bt_case_load_tables(c, err);
+    size_t at_files = err->n;
     check_run(&k);
     check_domain(&k);
     check_region(&k);
     check_sizes(&k);
+    check_outlines(&k);
     double v[2 * BT_MAX_VERTICES];
     int n;
     bool placed = check_body(&k, &n, v);
     follow_hull(c, n, v);
     check_tow(&k);
+    follow_impact(c);
     if (placed) check_path(&k, n, v);
     check_water(&k);
+    bt_case_check_environment(c, from, err);
+    bt_case_check_lead(c, n, v, from, err);
+    check_estimate(&k);
     for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
-    return err->n == before ? BT_OK : BT_ERR_CASE;
+    return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 
 bt_status bt_case_finish(bt_case *c, bt_errors *err) { return bt_case_check(c, NULL, err); }
@@ -421,7 +461,7 @@ static double mean_square_size(const bt_case *c)
 
 double bt_case_expected_floes(const bt_case *c)
 {
-    if (c->ice.field) return 0;
+    if (c->ice.field || c->ice.outlines) return 0;
     double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
     double v[2 * BT_MAX_VERTICES];
     int n = bt_case_waterline(c, v);
@@ -456,10 +496,10 @@ double bt_case_reference_speed(const bt_case *c)
     if (c->solver.reference_speed > 0) return c->solver.reference_speed;
     if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
-    u = bt_max(u, hypot(c->water.current_x, c->water.current_y));
+    u = bt_max(u, bt_environment_fastest(c, true));
     u = bt_max(u, hypot(c->body.vx, c->body.vy));
     for (bt_idx i = 0; i < c->n_floes; i++) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
-    u = bt_max(u, 0.02 * hypot(c->air.wind_x, c->air.wind_y));
+    u = bt_max(u, 0.02 * bt_environment_fastest(c, false));
     return u > 0 ? u : 0.1;
 }

@@ -3,18 +3,16 @@
 #include "case_check.h"
 
 #include "bergtow/shape.h"
+#include "fileio.h"
 #include "schema.h"
+#include "table.h"
 #include "tree.h"
 #include "value.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-
-enum { LARGEST_FILE = 16 << 20 };
 
 typedef struct {
     bt_case *c;
@@ -28,45 +26,6 @@ void bt_case_defaults(bt_case *c)
 {
     *c = (bt_case){0};
     bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
-}
-
-static bt_status read_file(bt_case *c, const char *path, size_t *size, bt_errors *err)
-{
-    struct stat st;
-    if (stat(path, &st)) {
-        bt_errors_add(err, "%s: cannot be read: %s; give the path of a case file", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    if (S_ISDIR(st.st_mode)) {
-        bt_errors_add(err, "%s: is a folder; give the path of a case file in it", path);
-        return BT_ERR_IO;
-    }
-    FILE *f = fopen(path, "rb");
-    if (!f) {
-        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    // Read to the end rather than st_size bytes: /dev/stdin and pipes have no size.
-    size_t cap = 1 << 14, n = 0;
-    char *text = bt_alloc(cap, 1);
-    for (size_t got; n <= LARGEST_FILE && (got = fread(text + n, 1, cap - n - 1, f)) > 0;) {
-        n += got;
-        if (n == cap - 1) text = bt_realloc(text, cap *= 2, 1);
-    }
-    bool broken = ferror(f);
-    fclose(f);
-    text[n] = 0;
-    c->text = text;
-    *size = n;
-    if (broken) {
-        bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    if (n > LARGEST_FILE) {
-        bt_errors_add(err, "%s: larger than 16 MiB, which no case file is; put large fields into an HDF5 file and name it in ice.field", path);
-        return BT_ERR_CASE;
-    }
-    return BT_OK;
 }
 
 static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
@@ -265,7 +224,7 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     size_t n_path = strlen(path);
     c->path = bt_alloc(n_path + 1, 1);
     memcpy(c->path, path, n_path);
-    bt_status status = read_file(c, path, &size, err);
+    bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
     if (status != BT_OK) return status;
 
     bt_node *root = bt_tree_parse(c->text, size, path, err);
@@ -282,17 +241,21 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     for (int i = 0; i < n; i++) read_override(&r, overrides[i]);
     read_given(&r);
     read_floes(&r);
-    bt_case_check(c, r.from, err);
+    size_t in_file = err->n;
+    status = bt_case_check(c, r.from, err);
+    if (in_file > before) status = BT_ERR_CASE;
     free(r.from);
     free(r.given);
     bt_tree_free(root);
-    return err->n == before ? BT_OK : BT_ERR_CASE;
+    return status;
 }
 
 void bt_case_free(bt_case *c)
 {
     bt_schema_release(bt_case_keys, bt_n_case_keys, c);
     for (bt_idx i = 0; i < c->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
+    bt_table_free(&c->water.table);
+    bt_table_free(&c->air.table);
     free(c->floes);
     free(c->path);
     free(c->text);

@@ -3,10 +3,13 @@
 //
 // Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full scale) and
 // much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
+#include "bergtow/environment.h"
 #include "bergtow/field.h"
+#include "bergtow/lead.h"
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
+#include "cost.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -14,25 +17,44 @@
 #include <stdlib.h>
 
 static const double bytes_per_floe = 2048;     // body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice
-// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 us at 20, 50 and 80 %, where
-// force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is linear.
-// A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.
-static double seconds_per_floe_step(double concentration)
-{
-    const double x = bt_min(0.95, bt_max(0, concentration));
-    return x < 0.5 ? 0.5e-6 * pow(4, (x - 0.2) / 0.3) : 2e-6 * pow(7.5, (x - 0.5) / 0.3);
-}
 static const double gravity = 9.81;
+
+typedef struct {
+    bt_cmd_case file;
+    double scale; ///< length ratio of the twin to print, 0 = none
+} options;
+
+// A number, or a fraction as in 1/30.
+static double parse_scale(const struct argp_state *state, const char *text)
+{
+    char *end;
+    double up = strtod(text, &end), down = 1;
+    if (end != text && *end == '/') {
+        const char *rest = end + 1;
+        down = strtod(rest, &end);
+        if (end == rest) end = (char *)"?";
+    }
+    const double ratio = up / down;
+    if (end == text || *end || !isfinite(up) || !isfinite(down) || !(ratio >= 1e-4 && ratio <= 1e4))
+        argp_error(state, "--scale %s: give a length ratio from 1e-4 to 1e4, as in 30 or 1/30", text);
+    return ratio;
+}
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    (void)arg;
-    if (key != ARGP_KEY_INIT) return ARGP_ERR_UNKNOWN;
-    state->child_inputs[0] = state->input;
-    return 0;
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'l': o->scale = parse_scale(state, arg); return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
 }
+static const struct argp_option check_options[] = {
+    {"scale", 'l', "L", 0, "print the Froude-scaled twin with all lengths times L as a case file instead", 0},
+    {0},
+};
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp check_argp = {.parser = parse, .args_doc = "CASE.yml", .children = children,
+static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
                                        .doc = "Validate a case and print the numbers that follow from it. Nothing is computed or written."};
 
 static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
@@ -65,9 +87,19 @@ static void print_ice(const bt_case *c, const ice_numbers *n)
 {
     printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
-    printf("floes                %s%.0f%s\n", c->ice.field ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : "");
+    const bool read = c->ice.field || c->ice.outlines;
+    printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : read ? " (read from the outlines)" : "");
     if (n->count < 1) return;
     printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
+}
+
+static void print_outlines(const bt_outline_counts *o)
+{
+    if (o->read)
+        printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64 " double or collinear vertices dropped\n", o->read, o->turned, o->dropped);
+    if (o->read && isfinite(o->lon)) printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI, o->lat * 180 / BT_PI);
+    if (o->hulled) printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled, o->hull_area);
+    if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);
 }
 
 static void print_body(const bt_case *c)
@@ -102,6 +134,37 @@ static void print_crushing(const bt_case *c, const ice_numbers *n)
     printf("crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n", line, line * c->ice.crushing_least * n->thickness, line * n->size);
 }
 
+/// With a field file as it will be; of a field that is still to be made, the strip.
+static bt_status print_lead(const bt_case *c, bt_field *f, bt_errors *err)
+{
+    if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
+    printf("lead                 %s, %.4g m wide, %.4g m long, %.4g m2 of strip", c->lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed", c->lead.width, c->lead.length,
+           c->lead.width * c->lead.length);
+    if (c->lead.mode == BT_LEAD_MANAGED) printf(", pieces of at most %.4g m", c->lead.floe_size);
+    printf("\n");
+    if (!c->ice.field) return BT_OK;
+    bt_lead_stats s;
+    bt_status status = bt_lead_open(c, f, &s, err);
+    if (status == BT_OK) bt_lead_stats_print(&s);
+    return status;
+}
+
+static void print_environment(const bt_case *c)
+{
+    static const char *const names[] = {"wind", "current"};
+    for (int water = 1; water >= 0; water--) {
+        double v[2];
+        bt_environment_at(c, water, 0, v);
+        const double most = bt_environment_fastest(c, water);
+        const bt_table *t = water ? &c->water.table : &c->air.table;
+        if (most == 0) continue;
+        printf("%-20s (%.4g, %.4g) m/s at the start", names[water], v[0], v[1]);
+        if (t->n > 0) printf(", table of %" PRId64 " rows to %g s, at most %.4g m/s", t->n, t->row[3 * (t->n - 1)], most);
+        else if (water && c->water.tide.major > 0) printf(", tide of %.4g m/s in %.4g h", c->water.tide.major, c->water.tide.period / 3600);
+        printf("\n");
+    }
+}
+
 static void print_step(const bt_case *c, const ice_numbers *n)
 {
     double speed = bt_case_reference_speed(c), dt = c->run.dt;
@@ -110,13 +173,14 @@ static void print_step(const bt_case *c, const ice_numbers *n)
     double longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5;
     printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(dt <= longest));
     if (n->count < 1) return;
-    double passed = dt * speed / n->size;
-    printf("time step, floes     moves %.3g floe sizes a step, at most 0.1 (%.3g s to pass a floe): %s\n", passed, n->size / speed, verdict(passed <= 0.1));
+    const bool pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size;
+    const double size = pieces ? c->lead.floe_size : n->size, passed = dt * speed / size;
+    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", passed, pieces ? "pieces of the lead" : "floe sizes", size / speed, verdict(passed <= 0.1));
 }
 
 static void print_cost(const bt_case *c, const ice_numbers *n)
 {
-    const double per_step = seconds_per_floe_step(n->concentration);
+    const double per_step = bt_cost_floe_step(n->concentration);
     double seconds = n->count * (double)bt_case_steps(c) * per_step;
     double frames = c->run.duration / c->output.frame_interval;
     printf("memory               about %.3g MB\n", n->count * bytes_per_floe / 1e6 + 20);
@@ -124,29 +188,47 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
     printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
 }
 
+static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
+{
+    const ice_numbers n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    printf("%s: valid\n", path);
+    if (c->run.title) printf("title                %s\n", c->run.title);
+    printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
+    print_ice(c, &n);
+    print_crushing(c, &n);
+    print_outlines(&f->outlines);
+    print_body(c);
+    print_environment(c);
+    const bt_status status = print_lead(c, f, err);
+    print_step(c, &n);
+    print_cost(c, &n);
+    return status;
+}
+
+static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
+{
+    const bt_status status = bt_case_scale(c, ratio, err);
+    if (status != BT_OK) return status;
+    char *text = bt_case_scaled_text(c, ratio);
+    if (text) fputs(text, stdout);
+    free(text);
+    return BT_OK;
+}
+
 int bt_cmd_check(int argc, char **argv)
 {
-    bt_cmd_case file = {0};
-    bt_cmd_parse(&check_argp, argc, argv, &file);
+    options o = {0};
+    bt_cmd_parse(&check_argp, argc, argv, &o);
     bt_case c;
     bt_field f;
     bt_errors err = {0};
     bt_field_init(&f);
-    bt_status status = bt_case_read(&c, file.path, file.set, file.n_set, &err);
-    if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
-    if (status == BT_OK) {
-        ice_numbers n = c.ice.field ? ice_of_field(&c, &f) : ice_of_case(&c);
-        printf("%s: valid\n", file.path);
-        if (c.run.title) printf("title                %s\n", c.run.title);
-        printf("domain               %g x %g m\n", c.domain.length, c.domain.width);
-        print_ice(&c, &n);
-        print_crushing(&c, &n);
-        print_body(&c);
-        print_step(&c, &n);
-        print_cost(&c, &n);
-    }
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
+    if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
+    else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
     bt_field_free(&f);
     bt_case_free(&c);
-    free(file.set);
+    free(o.file.set);
     return bt_cmd_end(&bt_comm_alone, status, &err);
 }

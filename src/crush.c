@@ -19,7 +19,9 @@ static int by_gids(const void *p, const void *q)
 {
     const bt_scar *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    return a->b < b->b ? -1 : a->b > b->b;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    return (a->part[1] > b->part[1]) - (a->part[1] < b->part[1]);
 }
 
 void bt_crush_prune(const bt_world *w, bt_tile *t)
@@ -31,7 +33,7 @@ void bt_crush_prune(const bt_world *w, bt_tile *t)
         bt_manifold m;
         double gap;
         int32_t axis = -1;
-        if (a >= 0 && b >= 0 && bt_contacts_pair(w, a, b, memory, -1, &m, &gap, &axis)) t->scars[kept++] = t->scars[k];
+        if (a >= 0 && b >= 0 && bt_contacts_parts(w, a, b, t->scars[k].part, memory, -1, &m, &gap, &axis)) t->scars[kept++] = t->scars[k];
     }
     t->n_scars = kept;
 }
@@ -54,16 +56,17 @@ typedef struct {
 
 /// Where a and b overlap when b has come nearer by `way` along the normal: their intersection (Sutherland & Hodgman 1974, Comm. ACM 17: a cut by
 /// the edges of b one after the other), seen along the tangent.
-static patch patch_of(const bt_world *w, const bt_manifold *m, double way)
+static patch patch_of(const bt_world *w, const uint16_t part[2], const bt_manifold *m, double way)
 {
     const bt_bodies *s = &w->bodies;
     double off[2], v[2][4 * BT_MAX_VERTICES];
     bt_world_offset(w, m->a, m->b, off);
     off[0] -= way * m->nx, off[1] -= way * m->ny;
-    const double *q = s->outline + 2 * s->offset[m->b];
-    const int n_b = (int)(s->offset[m->b + 1] - s->offset[m->b]);
-    int n = (int)(s->offset[m->a + 1] - s->offset[m->a]), from = 0;
-    memcpy(v[0], s->outline + 2 * s->offset[m->a], 2 * (size_t)n * sizeof(double));
+    const int64_t first_a = s->offset[m->a] + part[0], first_b = s->offset[m->b] + part[1];
+    const double *q = s->outline + 2 * first_b;
+    const int n_b = part[1] ? s->mark[first_b].count : (int)(s->offset[m->b + 1] - first_b);
+    int n = part[0] ? s->mark[first_a].count : (int)(s->offset[m->a + 1] - first_a), from = 0;
+    memcpy(v[0], s->outline + 2 * first_a, 2 * (size_t)n * sizeof(double));
     for (int e = 0; e < n_b && n > 0; e++, from = 1 - from) {
         const double *p0 = q + 2 * e, *p1 = q + 2 * (e + 1 < n_b ? e + 1 : 0);
         const double ex = p1[0] - p0[0], ey = p1[1] - p0[1], x0 = p0[0] + off[0], y0 = p0[1] + off[1];
@@ -131,7 +134,7 @@ static void inherit(const bt_tile *t, const bt_manifold *m, bt_limit *l)
     }
 }
 
-void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_manifold *m)
+void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     const bt_bodies *s = &w->bodies;
     bt_unit *u = &t->units[j];
@@ -139,7 +142,7 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_manifold *m
     *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .scar = -1};
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
     if (h > 0) {
-        const bt_scar name = {.a = s->gid[m->a], .b = s->gid[m->b]};
+        const bt_scar name = {.a = s->gid[m->a], .b = s->gid[m->b], .part = {p->part[0], p->part[1]}};
         const bt_scar *scar = t->n_scars > 0 ? bsearch(&name, t->scars, (size_t)t->n_scars, sizeof name, by_gids) : NULL;
         l->scar = scar ? (int32_t)(scar - t->scars) : -1;
         inherit(t, m, l);
@@ -155,7 +158,7 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_manifold *m
     if (!(h > 0)) return;
     const double per_length = w->par.crush_pressure * h * dt, least = w->par.crush_least * h / m->n_points;
     const double way = bt_max(dt * approach - gap, LEAST_WAY * w->par.size);
-    const patch now = patch_of(w, m, gap + w->par.slop), then = patch_of(w, m, gap + w->par.slop + way);
+    const patch now = patch_of(w, p->part, m, gap + w->par.slop), then = patch_of(w, p->part, m, gap + w->par.slop + way);
     for (int i = 0; i < m->n_points; i++) {
         const double length = now.length * share_of(m, i, now), later = bt_max(length, then.length * share_of(m, i, then));
         l->flat[i] = per_length * bt_max(length, least);
@@ -202,8 +205,9 @@ static void grow_tile(bt_world *w, bt_idx k, const void *context, bt_totals *tot
         }
         if (deepest == 0) continue;
         totals->most = bt_max(totals->most, deepest);
-        bt_scar s = {.a = gid[u->a], .b = gid[u->b], .n = u->n, .depth = {l->depth[0], l->depth[1]}};
-        memcpy(s.feature, t->pairs[u->pair].feature, (size_t)u->n * sizeof *s.feature);
+        const bt_pair *p = &t->pairs[u->pair];
+        bt_scar s = {.a = gid[u->a], .b = gid[u->b], .part = {p->part[0], p->part[1]}, .n = u->n, .depth = {l->depth[0], l->depth[1]}};
+        memcpy(s.feature, p->feature, (size_t)u->n * sizeof *s.feature);
         if (l->scar >= 0) t->scars[l->scar] = s;
         else bt_crush_add(t, &s);
     }

@@ -166,7 +166,7 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
         bt_unit *u = &t->units[next[s->colour[i]]++];
         fill_unit(w, &s->man[i], s->pair[i], p, u);
         if (crush) {
-            bt_crush_fill(w, t, (bt_idx)(u - t->units), &s->man[i]);
+            bt_crush_fill(w, t, (bt_idx)(u - t->units), p, &s->man[i]);
             bt_pack_bias(w, u, 1); // the gaps are others now
         }
         p->n_points = u->n;

@@ -13,7 +13,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "bergtow/impact.h"
 #include "bergtow/observe.h"
 #include "bergtow/record.h"
 #include "bergtow/setup.h"
@@ -45,11 +47,12 @@ typedef struct {
     bt_run_totals totals;
 } run;
 
-/// Collective. Rank 0 makes or reads the field, with all its threads; then every rank has it.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_errors *err)
+/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it. lead: on rank 0.
+static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    if (comm->rank == 0) status = bt_field_load(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) bt_field_share(comm, f);
@@ -63,6 +66,9 @@ static bt_status open_record(run *r, bt_errors *err)
     if (status != BT_OK) return status;
     status = bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
     bt_handover_free(&b);
+    if (status != BT_OK || !r->w->impacts) return status;
+    status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    if (status != BT_OK) bt_record_close(r->record, NULL, err);
     return status;
 }
 
@@ -122,6 +128,8 @@ static void note_division(run *r)
     r->totals.divisions = s.divisions;
     r->totals.imbalance = s.imbalance;
     r->totals.worst_imbalance = s.worst_imbalance;
+    r->totals.dealt_imbalance = s.dealt_imbalance;
+    r->totals.worst_dealt_imbalance = s.worst_dealt_imbalance;
     r->totals.edge_cut = s.cut;
     r->totals.halo_share = s.halo;
     bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);
@@ -224,6 +232,8 @@ static bt_status run_world(run *r, bt_errors *err)
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
+    if (r->w->impacts) bt_impacts_end(r->w->impacts);
+    r->totals.impacts = r->w->impacts;
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
@@ -284,9 +294,13 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     bt_field f;
     bt_field_init(&f);
-    bt_status status = make_field(comm, c, &f, err);
+    bt_lead_stats lead = {0};
+    bt_status status = make_field(comm, c, &f, &lead, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
-    const double concentration = f.concentration;
+    const double concentration = lead.mode == BT_LEAD_NONE ? f.concentration : lead.concentration_before;
+    const bt_outline_counts outlines = f.outlines;
+    double thickness, radius;
+    bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
     if (status == BT_OK) {
         bt_domain_create(r.w, comm);
@@ -296,7 +310,11 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .threads = threads,
             .dt = c->run.dt,
             .mean_size = r.roster.mean_size,
+            .mean_thickness = thickness,
+            .mean_radius = radius,
             .concentration = concentration,
+            .lead = lead,
+            .outlines = outlines,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);

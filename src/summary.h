@@ -3,14 +3,15 @@
 #ifndef BT_SUMMARY_H
 #define BT_SUMMARY_H
 
+#include "bergtow/estimate.h"
 #include "bergtow/record.h"
 #include "bergtow/stats.h"
 
-/// What the summary keeps of every step, whatever output.sample_every says: 48 bytes a step.
+/// What the summary keeps of every step, whatever output.sample_every says: 64 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     double *time;    ///< [n] s
-    double *ice, *tow, *drag, *inertia, *budget; ///< [n] N, as in bt_sample
+    double *ice, *tow, *drag, *coriolis, *tilt, *inertia, *budget; ///< [n] N, as in bt_sample
     double sum_contacts, sum_sweeps, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double peak_tension;             ///< NaN until there is a line
@@ -36,13 +37,14 @@ typedef struct bt_summary {
         int64_t first, n;             ///< steps
         const char *warning;          ///< into warnings, or NULL
     } window;
-    bt_mean ice, tow, drag, inertia, budget; ///< N, over the window
+    bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double balance;                   ///< mean tow − drag − inertia, N
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps;          ///< means over all steps
     double ns_per_floe_step;
+    bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
     double reference_ratio;           ///< mean ice / measured mean, NaN without a reference
     bt_errors warnings;
 } bt_summary;
@@ -52,6 +54,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 /// summary.json as text; the caller frees it.
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
 void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+/// A force with a prefix that keeps three digits before the point; returns out.
+const char *bt_force_text(char out[32], double newton);
 void bt_summary_free(bt_summary *s);
 
 #endif

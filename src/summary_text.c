@@ -4,6 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "estimate_text.h"
+#include "impact_report.h"
 #include "json.h"
 #include "summary.h"
 
@@ -18,6 +20,42 @@ static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
     for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
 }
 
+static const char *const lead_names[] = {"none", "channel", "managed"};
+
+static void json_lead(bt_json *j, const bt_lead_stats *l)
+{
+    if (l->mode == BT_LEAD_NONE) {
+        bt_json_string(j, "lead", NULL);
+        return;
+    }
+    bt_json_open(j, "lead", '{');
+    bt_json_string(j, "mode", lead_names[l->mode]);
+    bt_json_number(j, "width_m", l->width);
+    bt_json_number(j, "length_m", l->length);
+    bt_json_int(j, l->mode == BT_LEAD_CHANNEL ? "floes_removed" : "floes_cut", l->taken);
+    bt_json_number(j, l->mode == BT_LEAD_CHANNEL ? "area_removed_m2" : "area_cut_m2", l->area_taken);
+    bt_json_int(j, "pieces", l->pieces);
+    bt_json_number(j, "mean_piece_m", l->pieces > 0 ? l->mean_piece : NAN);
+    bt_json_number(j, "concentration_before", l->concentration_before);
+    bt_json_number(j, "concentration_after", l->concentration_after);
+    bt_json_close(j, '}');
+}
+
+static void json_outlines(bt_json *j, const bt_outline_counts *o)
+{
+    bt_json_open(j, "outlines", '{');
+    bt_json_int(j, "read", o->read);
+    bt_json_int(j, "turned", o->turned);
+    bt_json_int(j, "dropped_vertices", o->dropped);
+    bt_json_int(j, "hulled", o->hulled);
+    bt_json_number(j, "hull_area_added_m2", o->hull_area);
+    bt_json_int(j, "split", o->split);
+    bt_json_int(j, "parts", o->parts);
+    bt_json_number(j, "origin_lon_deg", o->read ? o->lon * 180 / BT_PI : NAN);
+    bt_json_number(j, "origin_lat_deg", o->read ? o->lat * 180 / BT_PI : NAN);
+    bt_json_close(j, '}');
+}
+
 static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
 {
     bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
@@ -30,11 +68,13 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, co
     bt_json_number(j, "mean_tow_force_n", s->tow.mean);
     bt_json_number(j, "mean_tow_force_se_n", s->tow.se);
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
+    bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
+    bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
     bt_json_number(j, "peak_line_tension_n", s->body ? h->peak_tension : NAN);
     bt_json_open(j, "budget", '{');
-    bt_json_number(j, "tow_minus_drag_minus_inertia_n", s->balance);
+    bt_json_number(j, "tow_minus_other_forces_n", s->balance);
     bt_json_number(j, "closure_n", s->closure);
     bt_json_number(j, "closure_relative", s->closure_relative);
     bt_json_number(j, "ice_momentum_closure_relative", s->budget_closure_relative);
@@ -76,13 +116,20 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_int(&j, "moved_floes", t->moved_floes);
     bt_json_number(&j, "imbalance", t->imbalance);
     bt_json_number(&j, "worst_imbalance", t->worst_imbalance);
+    bt_json_number(&j, "dealt_imbalance", t->dealt_imbalance);
+    bt_json_number(&j, "worst_dealt_imbalance", t->worst_dealt_imbalance);
     bt_json_number(&j, "edge_cut", t->edge_cut);
     bt_json_number(&j, "halo_share", t->halo_share);
     bt_json_number(&j, "memory_per_floe_b", n_floes > 0 ? t->memory / (double)n_floes : NAN);
     bt_json_number(&j, "sweep_bytes_per_contact", t->sweep_bytes_per_contact);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
+    json_lead(&j, &t->lead);
+    json_outlines(&j, &t->outlines);
     json_forces(&j, s, h, c);
+    bt_impacts_json(&j, t->impacts);
+    if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
+    else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
     bt_json_int(&j, "unconverged_steps", h->unconverged);
@@ -120,7 +167,6 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     return j.text;
 }
 
-/// A force with a prefix that keeps three digits before the point.
 static const char *force(char out[32], double newton)
 {
     const double size = fabs(newton);
@@ -129,6 +175,8 @@ static const char *force(char out[32], double newton)
     else snprintf(out, 32, "%#.4g N", newton);
     return out;
 }
+
+const char *bt_force_text(char out[32], double newton) { return force(out, newton); }
 
 static void print_forces(const bt_summary *s, const bt_history *h, const bt_case *c)
 {
@@ -143,7 +191,7 @@ static void print_forces(const bt_summary *s, const bt_history *h, const bt_case
            force(d, s->ice.sd));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95),
            force(b, s->p99), force(d, s->peak));
-    printf("    from balances     %s by tow - drag - inertia, %s by the momentum of the ice\n", force(a, s->balance),
+    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
            force(b, s->budget.mean));
     printf("  tow force           %s +- %s, drag %s", force(a, s->tow.mean), force(b, s->tow.se), force(d, s->drag.mean));
     if (!isnan(h->peak_tension)) printf(", peak line tension %s", force(a, h->peak_tension));
@@ -158,7 +206,16 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
+    bt_lead_stats_print(&t->lead);
+    const bt_outline_counts *o = &t->outlines;
+    if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
+    if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, h, c);
+    bt_impacts_print(t->impacts);
+    if (s->body && !isnan(s->estimate.along)) {
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
+        bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
+    }
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
                (long long)h->unconverged);

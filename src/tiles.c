@@ -30,7 +30,7 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->phase_tile, t};
+    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -126,10 +126,9 @@ static void choose(bt_world *w, double margin)
     t->heaviest = most[5];
     t->rebounds = most[6] > 0;
     t->margin_max = bt_max(2 * bt_max(margin, bt_contacts_margin(w, most[7])), 0.25 * w->par.size);
-    const double drift = (double)w->step * w->par.dt;
     const bool any = most[0] + most[2] >= 0;
-    t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : drift * w->par.water_u);
-    t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : drift * w->par.water_v);
+    t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
+    t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
     double side = bt_max((w->par.tile > 0 ? w->par.tile : TILE_DIAMETERS) * w->par.size, 2 * t->reach + t->margin_max + 0.5 * w->par.size);
     if (!(side > 0)) side = 1;
     for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 tiles a floe, by larger tiles
@@ -200,15 +199,13 @@ static void permute(bt_bodies *b, const sort_key *key)
     int64_t *offset = bt_realloc(NULL, (size_t)b->cap + 1, sizeof *offset);
     offset[0] = 0;
     for (size_t i = 0; i < n; i++) offset[i + 1] = offset[i] + (b->offset[key[i].from + 1] - b->offset[key[i].from]);
-    double **arrays[] = {&b->vertices, &b->outline, &b->per_length};
-    const size_t width[] = {2, 2, 1};
-    for (int k = 0; k < 3; k++) {
-        double *new = bt_realloc(NULL, width[k] * (size_t)b->cap_vertices, sizeof *new);
+    for (int k = 0; k < bt_n_vertex_fields; k++) {
+        const size_t size = bt_vertex_fields[k].size;
+        char **array = (char **)((char *)b + bt_vertex_fields[k].array), *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (int64_t)width[k] * offset[i], *arrays[k] + (int64_t)width[k] * b->offset[key[i].from],
-                   width[k] * sizeof *new * (size_t)(offset[i + 1] - offset[i]));
-        free(*arrays[k]);
-        *arrays[k] = new;
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size, size * (size_t)(offset[i + 1] - offset[i]));
+        free(*array);
+        *array = new;
     }
     free(b->offset);
     b->offset = offset;
@@ -293,7 +290,7 @@ static void make_tiles(bt_world *w)
     t->moved = bt_realloc(t->moved, n, sizeof *t->moved);
     t->rest = bt_realloc(t->rest, n, sizeof *t->rest);
     t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
-    t->phase_tile = bt_realloc(t->phase_tile, n, sizeof *t->phase_tile);
+    t->order = bt_realloc(t->order, n, sizeof *t->order);
     for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->rest[k] = t->awake[k] = 0;
 }
 
@@ -313,12 +310,12 @@ bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n)
     for (bt_idx k = 0; k < t->n; k++) {
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_scars; i++) {
             const bt_scar *s = &t->tile[k].scars[i];
-            trace[(*n)++] = (bt_trace){s->a, s->b, s->n, {s->feature[0], s->feature[1]}, {s->depth[0], s->depth[1]}, 0, true};
+            trace[(*n)++] = (bt_trace){s->a, s->b, {s->part[0], s->part[1]}, s->n, {s->feature[0], s->feature[1]}, {s->depth[0], s->depth[1]}, 0, true};
         }
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) {
             const bt_pair *p = &t->tile[k].pairs[i];
             if (p->n_points > 0)
-                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt, false};
+                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], {p->part[0], p->part[1]}, p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt, false};
         }
     }
     return trace;
@@ -340,7 +337,9 @@ static int by_gids(const void *p, const void *q)
 {
     const bt_trace *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    return a->b < b->b ? -1 : a->b > b->b;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    return a->part[1] < b->part[1] ? -1 : a->part[1] > b->part[1];
 }
 
 void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
@@ -352,7 +351,7 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
         if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
         bt_tile *tile = &t->tile[bt_tiles_of_pair(w, a, b)];
         if (trace[k].scar) {
-            bt_crush_add(tile, &(bt_scar){trace[k].a, trace[k].b, trace[k].n_points, {trace[k].feature[0], trace[k].feature[1]}, {trace[k].ln[0], trace[k].ln[1]}});
+            bt_crush_add(tile, &(bt_scar){trace[k].a, trace[k].b, {trace[k].part[0], trace[k].part[1]}, trace[k].n_points, {trace[k].feature[0], trace[k].feature[1]}, {trace[k].ln[0], trace[k].ln[1]}});
             continue;
         }
         if (tile->n_pairs == tile->cap_pairs) {
@@ -361,6 +360,7 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
         }
         bt_pair *p = &tile->pairs[tile->n_pairs++];
         *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].lt};
+        memcpy(p->part, trace[k].part, sizeof p->part);
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
         memcpy(p->ln, trace[k].ln, sizeof p->ln);
     }

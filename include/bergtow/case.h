@@ -13,10 +13,16 @@ typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // b
 typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN } bt_bound;   // wall, periodic, open
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
+typedef enum { BT_CRS_METRES, BT_CRS_LONLAT } bt_crs;                            // metres, lonlat
+typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
 typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE } bt_tow_mode;         // none, speed, line
-typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC } bt_tilt;   // none, slope, geostrophic
+typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC, BT_TILT_DYNAMIC } bt_tilt; // none, slope, geostrophic, dynamic
+typedef enum { BT_LEAD_NONE, BT_LEAD_CHANNEL, BT_LEAD_MANAGED } bt_lead_mode;    // none, channel, managed
+
+typedef enum { BT_IMPACT_NONE, BT_IMPACT_DURATION, BT_IMPACT_CRUSHING } bt_impact_conversion; // none, duration, crushing
+typedef enum { BT_CORNER_GIVEN, BT_CORNER_REAL } bt_corner;                  // given, real
 
 /// Drag coefficients of a class of bodies (ice: floes; body: the towed body).
 typedef struct bt_drag_coefs {
@@ -25,6 +31,12 @@ typedef struct bt_drag_coefs {
     double air_form;   ///< C_a, on ½ρ sail×width
     double air_skin;   ///< C_as, on ρ A
 } bt_drag_coefs;
+
+/// A velocity in time, read from a file: rows of time, x and y component; linear between them.
+typedef struct bt_table {
+    int64_t n;
+    double *row;   ///< [n][3] s, m/s, m/s; ascending in time
+} bt_table;
 
 /// One floe or body given by hand (list `floes:`).
 typedef struct bt_floe_def {
@@ -82,6 +94,10 @@ typedef struct bt_case {
         int64_t seed;
         double shake;                   ///< relaxation length of the generator, in mean free gaps (0 = none)
         char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
+        char *outlines;                 ///< GeoJSON file of outlines instead of a generator, or NULL; relative to the case file
+        bt_crs outlines_crs;            ///< what its coordinates are
+        double origin_lon, origin_lat;  ///< place of x = y = 0 for crs lonlat, rad; NaN: the middle of the outlines
+        bt_nonconvex nonconvex;         ///< what is done with an outline that is not convex
     } ice;
     bt_floe_def *floes;   ///< [n_floes] given by hand
     bt_idx n_floes;
@@ -111,8 +127,21 @@ typedef struct bt_case {
         double hull_x, hull_y;   ///< fastening point, body frame, m; default the foremost point of the waterline
     } tow;
     struct {
+        bt_lead_mode mode;       ///< what the vessel has done to the ice ahead
+        double width;            ///< m
+        double length;           ///< of the path from the body's place, m
+        double floe_size;        ///< diameter of the circle of the area of the largest piece, managed, m
+    } lead;
+    struct {
         double density;          ///< ρ_w, kg/m³
-        double current_x, current_y; ///< U_w, m/s
+        double current_x, current_y; ///< U_w, its constant part, m/s
+        struct {
+            double major, minor;     ///< semi-axes of the tidal ellipse, m/s; minor > 0 turns from x towards y
+            double inclination;      ///< of the major axis from x towards y, rad
+            double period, phase;    ///< s; rad: the current is largest along the major axis at time phase/2π × period
+        } tide;
+        char *current_table;     ///< CSV file of the current in time, or NULL; relative to the case file
+        bt_table table;          ///< what it holds
         double latitude;         ///< rad; Coriolis parameter f = 2Ω sin(latitude); 0 = off
         bt_tilt tilt;
         double slope_x, slope_y; ///< ∇η for tilt: slope
@@ -120,6 +149,8 @@ typedef struct bt_case {
     struct {
         double density;          ///< ρ_a, kg/m³
         double wind_x, wind_y;   ///< U_a, m/s
+        char *wind_table;        ///< CSV file of the wind in time, or NULL; relative to the case file
+        bt_table table;          ///< what it holds
     } air;
     struct {
         double tolerance;        ///< natural-map residual / reference speed at which a step has converged
@@ -134,11 +165,28 @@ typedef struct bt_case {
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
     struct {
+        bt_impact_conversion conversion; ///< of the impulse of a collision into a force
+        double duration;         ///< T_c of a collision, s
+        double pressure;         ///< p of crushed ice, Pa
+        bt_corner corner;        ///< which angle the crushed corner has
+        double corner_angle;     ///< φ when given, or without a corner, rad
+        double least_speed;      ///< approach below this is a push, m/s
+        int64_t panels;          ///< pieces of the hull's perimeter
+    } impact;
+    struct {
         int64_t sample_every;    ///< steps per entry of the series
         double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
+        bool panels;             ///< series of the loads on the hull's panels
     } output;
+    struct {
+        double p_star, p_s;      ///< ice strength Pa and capture threshold N/m of Lichey and Hellmer, at full scale
+        double c_si;             ///< drag coefficient of ice on the body
+        double kappa, kappa_low, kappa_high; ///< work of rafting / potential energy gained
+        double phi_j;            ///< concentration to which ice is swept together
+        double length_scale;     ///< full scale / this case
+    } estimate;
     struct {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
         char *source;            ///< where it was published
@@ -157,6 +205,16 @@ bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
 /// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
+
+/// The same below comment lines of one's own. Caller frees.
+char *bt_case_text(const bt_case *c, const char *head);
+
+/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/froude.c): the twin moves alike in
+/// times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for keys that name files of numbers with a dimension.
+bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
+
+/// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
+char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
 /// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0 without body.
 int bt_case_waterline(const bt_case *c, double *v);

@@ -34,6 +34,10 @@ int bt_comm_end(int code);
 /// Ends all ranks now, from any one, without waiting for the others. Flushes stdout and stderr first.
 _Noreturn void bt_comm_abort(int code);
 
+/// Collective. The ranks of c that name the same group, as ranks of their own. Release with bt_comm_split_end (collective over the group).
+void bt_comm_split(const bt_comm *c, int group, bt_comm *part);
+void bt_comm_split_end(bt_comm *part);
+
 /// Collective. The worst status of all ranks. From bad to worse: done, signal, usage, case, numeric, input/output: a file that
 /// cannot be written decides how the run may end, and what the user has to do first.
 bt_status bt_comm_agree(const bt_comm *c, bt_status status);
@@ -66,5 +70,9 @@ static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n) { ret
 /// status on all ranks): BT_ERR_NUMERIC, naming ids that are missing, doubled, or outside.
 bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width, const double *rows,
                               double *block, bt_errors *err);
+
+/// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there, to be freed; NULL and
+/// *total = 0 elsewhere.
+double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total);
 
 #endif

@@ -53,9 +53,10 @@ typedef struct bt_limit {
     int32_t scar;    ///< in the tile, −1 = the pair has crushed nothing yet
 } bt_limit;
 
-/// What a pair has crushed: state of the world, kept in the tile that owns the pair, sorted by (a, b).
+/// What a pair has crushed: state of the world, kept in the tile that owns the pair, sorted by (a, b, part).
 typedef struct bt_scar {
     bt_gid a, b;
+    uint16_t part[2]; ///< as in bt_pair
     int32_t n;
     uint32_t feature[2];
     double depth[2]; ///< m
@@ -69,8 +70,8 @@ void bt_crush_prune(const bt_world *w, bt_tile *t);
 /// Room for the bounds of the units of a tile.
 void bt_crush_reserve(bt_tile *t);
 
-/// Bounds of unit j of tile t, made from manifold m; its gaps become those between the crushed surfaces.
-void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_manifold *m);
+/// Bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the crushed surfaces.
+void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
 
 /// Deepest overlap of the crushed surfaces in a tile, m.
 double bt_crush_overlap(const bt_tile *t);
@@ -78,7 +79,7 @@ double bt_crush_overlap(const bt_tile *t);
 /// After the solve: depths grow where the bound holds; work, number and depth of crushing contacts into stats. Collective.
 void bt_crush_grow(bt_world *w);
 
-/// Append a scar to a tile, in the order of (a, b).
+/// Append a scar to a tile, in the order of (a, b, part).
 void bt_crush_add(bt_tile *t, const bt_scar *s);
 
 #endif
