@@ -121,16 +121,33 @@ void bt_crush_reserve(bt_tile *t)
     t->limits = bt_alloc_aligned((size_t)t->cap_limits, sizeof *t->limits);
 }
 
-/// Depth of each point from what the pair has crushed before.
-static void inherit(const bt_tile *t, const bt_manifold *m, bt_limit *l)
+static int by_bodies(const void *p, const void *q)
 {
-    if (l->scar < 0) return;
-    const bt_scar *s = &t->scars[l->scar];
-    const double deepest = bt_max(s->depth[0], s->n > 1 ? s->depth[1] : 0);
+    const bt_scar *a = p, *b = q;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    return a->b < b->b ? -1 : a->b > b->b;
+}
+
+/// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on from part to part is
+/// sliding.
+static void inherit(const bt_tile *t, const bt_scar *name, const bt_manifold *m, bt_limit *l)
+{
+    if (t->n_scars == 0) return;
+    const bt_scar *any = bsearch(name, t->scars, (size_t)t->n_scars, sizeof *name, by_bodies);
+    if (!any) return;
+    const bt_scar *end = any + 1, *own = NULL;
+    while (any > t->scars && by_bodies(any - 1, name) == 0) any--;
+    while (end < t->scars + t->n_scars && by_bodies(end, name) == 0) end++;
+    double deepest = 0;
+    for (const bt_scar *s = any; s < end; s++) {
+        deepest = bt_max(deepest, bt_max(s->depth[0], s->n > 1 ? s->depth[1] : 0));
+        if (by_gids(s, name) == 0) own = s;
+    }
+    if (own) l->scar = (int32_t)(own - t->scars);
     for (int i = 0; i < m->n_points; i++) {
         l->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
-        for (int j = 0; j < s->n; j++)
-            if (s->feature[j] == m->p[i].feature) l->depth[i] = s->depth[j];
+        for (int j = 0; own && j < own->n; j++)
+            if (own->feature[j] == m->p[i].feature) l->depth[i] = own->depth[j];
     }
 }
 
@@ -143,9 +160,7 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
     if (h > 0) {
         const bt_scar name = {.a = s->gid[m->a], .b = s->gid[m->b], .part = {p->part[0], p->part[1]}};
-        const bt_scar *scar = t->n_scars > 0 ? bsearch(&name, t->scars, (size_t)t->n_scars, sizeof name, by_gids) : NULL;
-        l->scar = scar ? (int32_t)(scar - t->scars) : -1;
-        inherit(t, m, l);
+        inherit(t, &name, m, l);
     }
     double gap = INFINITY, approach = 0;
     for (int i = 0; i < m->n_points; i++) {
