@@ -126,6 +126,14 @@ static void print_body(const bt_case *c)
         printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(mass * (1 + c->body.added_mass) * c->tow.line_length / c->tow.line_stiffness));
 }
 
+/// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.
+static void print_crushing(const bt_case *c, const ice_numbers *n)
+{
+    if (!(c->ice.crushing_pressure > 0) || n->count < 1) return;
+    const double line = c->ice.crushing_pressure * n->thickness;
+    printf("crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n", line, line * c->ice.crushing_least * n->thickness, line * n->size);
+}
+
 /// With a field file as it will be; of a field that is still to be made, the strip.
 static bt_status print_lead(const bt_case *c, bt_field *f, bt_errors *err)
 {
@@ -187,6 +195,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
+    print_crushing(c, &n);
     print_outlines(&f->outlines);
     print_body(c);
     print_environment(c);

@@ -42,6 +42,8 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
+        .crush_pressure = c->ice.crushing_pressure,
+        .crush_least = c->ice.crushing_least,
         .water_u = water[0],
         .water_v = water[1],
         .air_u = air[0],
@@ -69,6 +71,7 @@ static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body
     d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
     d->friction = c->ice.friction;
     d->restitution = c->ice.restitution;
+    d->thickness = h;
     d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
                              c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
 }

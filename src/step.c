@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/crush.h"
 #include "bergtow/environment.h"
 #include "bergtow/forces.h"
 #include "bergtow/impact.h"
@@ -233,6 +234,7 @@ void bt_world_step(bt_world *w)
     clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
+    bt_crush_grow(w);
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);

@@ -86,6 +86,8 @@ typedef struct bt_case {
         double density;                 ///< ρ_i, kg/m³
         double friction;                ///< μ ice–ice
         double restitution;             ///< e
+        double crushing_pressure;       ///< Pa; 0 = rigid contact
+        double crushing_least;          ///< least contact length / thickness
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;

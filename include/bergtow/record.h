@@ -8,6 +8,7 @@
 #include "bergtow/comm.h"
 #include "bergtow/field.h"
 #include "bergtow/lead.h"
+#include "bergtow/stall.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
@@ -44,6 +45,9 @@ typedef struct bt_sample {
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
     double moving;          ///< floes faster than 1 % of the reference speed
+    double crushing;        ///< contact points that crush (crush.h)
+    double crushed_work;    ///< taken by them in the step, J
+    double crushed_depth;   ///< deepest crush of a pair in contact, m
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -98,6 +102,7 @@ typedef struct bt_run_totals {
     bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
+    bt_stall stall;              ///< of the towed body
     bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
     bt_phases phases;

@@ -57,6 +57,7 @@ typedef struct bt_body_def {
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
     double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
     double friction, restitution;
+    double thickness;       ///< of ice, m; 0 = no ice: it is never crushed (crush.h)
     bt_drag drag;
 } bt_body_def;
 
@@ -81,6 +82,7 @@ typedef struct bt_bodies {
     double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
     double *friction, *restitution; ///< [n]
+    double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no tile
@@ -107,6 +109,8 @@ typedef struct bt_params {
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets tiles and skin, m
+    double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
+    double crush_least;    ///< least length of a contact / ice thickness
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -133,6 +137,9 @@ typedef struct bt_step_stats {
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
+    double crushed_work;     ///< taken by contact points that crush, J
+    int64_t n_crushing;      ///< contact points that crush
+    double crushed_depth;    ///< deepest crush of a pair in contact, at the end, m
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
     double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s
