@@ -165,6 +165,7 @@ static void follow_hull(bt_case *c, int n, const double *v)
 static void follow(bt_case *c)
 {
     bool basin = c->domain.frame == BT_FRAME_BASIN;
+    if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
     fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
     fill(&c->domain.y0, -c->domain.width / 2);
     fill(&c->ice.x_min, c->domain.x0);
@@ -173,6 +174,7 @@ static void follow(bt_case *c)
     fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
     fill(&c->body.width, c->body.length);
     fill(&c->body.x, basin ? c->domain.x0 + 2 * c->body.length : 0);
+    fill(&c->domain.ahead, bt_case_window_ahead(c));
     fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
     fill(&c->body.friction, c->ice.friction);
     fill(&c->body.restitution, c->ice.restitution);
@@ -340,6 +342,17 @@ static void check_path(const check *k, int n, const double *v)
     fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
+static void check_window(const check *k, int n, const double *v)
+{
+    const bt_case *c = k->c;
+    if (!sound(k, "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction tow.speed water.current_x body.x body.shape ice.size")) return;
+    if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // reported by check_body
+    box b = n ? bounds_of(n, v, 0, 0, c->body.yaw) : (box){0};
+    char why[256];
+    const char *key = bt_case_window_fault(c, given(k, "domain.ahead"), b.x_min, b.x_max, why);
+    if (key) fault(k, key, "%s", why);
+}
+
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
@@ -400,6 +413,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     follow_hull(c, n, v);
     check_tow(&k);
     if (placed) check_path(&k, n, v);
+    check_window(&k, n, v);
     check_water(&k);
     for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
     return err->n == before ? BT_OK : BT_ERR_CASE;

@@ -24,4 +24,14 @@ double bt_case_expected_floes(const bt_case *c);
 /// Distance of the tow end from its start along the tow direction after time t, with the ramp, m.
 double bt_case_tow_distance(const bt_case *c, double t);
 
+/// Distance from the body to the end of the domain ahead of the tow, m.
+double bt_case_window_ahead(const bt_case *c);
+
+/// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case leaves it open.
+void bt_case_window_follow(bt_case *c);
+
+/// First fault of a moving window, or of domain.ahead (ahead_given) without one: its key, and why with remedy; NULL = none. The body
+/// reaches from x_min to x_max about its centroid.
+const char *bt_case_window_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256]);
+
 #endif

@@ -94,6 +94,14 @@ static void print_body(const bt_case *c)
         printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(mass * (1 + c->body.added_mass) * c->tow.line_length / c->tow.line_stiffness));
 }
 
+static void print_window(const bt_case *c)
+{
+    if (c->domain.ends != BT_BOUND_MOVING) return;
+    const double way = bt_case_tow_distance(c, c->run.duration);
+    printf("moving window        the body keeps %.4g m from its front and %.4g m from its rear; the tow is %.3g windows long\n", c->domain.ahead,
+           c->domain.length - c->domain.ahead, way / c->domain.length);
+}
+
 static void print_step(const bt_case *c, const ice_numbers *n)
 {
     double speed = bt_case_reference_speed(c), dt = c->run.dt;
@@ -133,6 +141,7 @@ int bt_cmd_check(int argc, char **argv)
         printf("domain               %g x %g m\n", c.domain.length, c.domain.width);
         print_ice(&c, &n);
         print_body(&c);
+        print_window(&c);
         print_step(&c, &n);
         print_cost(&c, &n);
     }

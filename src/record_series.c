@@ -41,6 +41,9 @@ const bt_series_field bt_series_fields[] = {
     ROW(outrun, SUM, "1", "steps whose last solution still outran the margin: a contact may have been met a step late"),
     ROW(restitution_cut, SUM, "1", "steps whose restitution was lowered so that the contacts add no energy"),
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
+    ROW(window_x, LAST, "m", "low end of the moving window, not wrapped; NaN where the domain stands still"),
+    ROW(window_renewed, SUM, "1", "floes taken out behind the moving window and put in ahead as they were at time zero"),
+    ROW(window_waiting, LAST, "1", "floes behind the moving window whose place ahead is not free, or not yet reached"),
 };
 
 const int bt_n_series_fields = sizeof bt_series_fields / sizeof *bt_series_fields;

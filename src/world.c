@@ -11,6 +11,7 @@
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "domain.h"
 
 bt_world *bt_world_create(const bt_params *p)
@@ -28,7 +29,7 @@ bt_world *bt_world_create(const bt_params *p)
 const bt_body_field bt_body_fields[] = {
     FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
     FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(drag), FIELD(motion), FIELD(large),
-    FIELD(stirred), FIELD(tile),
+    FIELD(stirred), FIELD(tile), FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
@@ -43,6 +44,7 @@ void bt_world_free(bt_world *w)
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
     free(w->tow);
+    free(w->window);
     free(w);
 }
 
@@ -104,6 +106,7 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->large[i] = d->large;
     b->stirred[i] = 1;
     b->tile[i][0] = b->tile[i][1] = 0;
+    b->home[i] = (bt_home){0};
     bt_world_turn_outline(w, i);
     w->tiles->labelled = false;
     return b->gid[i];
@@ -149,8 +152,10 @@ uint64_t bt_world_hash(const bt_world *w)
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
+        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
         sum += h;
     }
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

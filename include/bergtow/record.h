@@ -36,6 +36,9 @@ typedef struct bt_sample {
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
     double moving;          ///< floes faster than 1 % of the reference speed
+    double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
+    double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
+    double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -87,6 +90,7 @@ typedef struct bt_run_totals {
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     uint64_t state_hash;
+    const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;
