@@ -17,7 +17,7 @@
 #include "field_make.h"
 
 #define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
-#define ZONE_SHARE 0.25   // of `ahead`, assumed
+#define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
 
 /// A floe that could go, and the place it would take.
 typedef struct candidate {
@@ -89,6 +89,14 @@ static double floe_at(const bt_world *w, bt_idx i)
     return w->window->sign * (w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length);
 }
 
+/// Has the rear passed the home of floe i, and may the floe be taken from where it is?
+static bool due(const bt_world *w, bt_idx i)
+{
+    const bt_window *v = w->window;
+    const double late = v->rear - home_at(w, i);
+    return late > 0 && floe_at(w, i) < v->rear + bt_min(late, ZONE_SHARE * (v->length - v->ahead));
+}
+
 /// x brought into the period from `low`; *turns: periods it lay above.
 static double into(double x, double low, double period, int32_t *turns)
 {
@@ -118,11 +126,10 @@ static int by_gid(const void *p, const void *q)
     return (a->gid > b->gid) - (a->gid < b->gid);
 }
 
-/// Collective. All floes whose home and self lie behind the rear, by id; corners of their outlines at the places they would take.
+/// Collective. All floes that are due, by id; corners of their outlines at the places they would take.
 static candidate *collect(const bt_world *w, size_t *n, double **corner)
 {
     const bt_bodies *b = &w->bodies;
-    const double rear = w->window->rear;
     size_t m = 0, n_corners = 0, all;
     candidate *mine = NULL;
     double *own = NULL;
@@ -130,7 +137,7 @@ static candidate *collect(const bt_world *w, size_t *n, double **corner)
         if (pass) mine = bt_alloc(m, sizeof *mine), own = bt_alloc(2 * n_corners, sizeof *own);
         m = n_corners = 0;
         for (bt_idx i = 0; i < b->n; i++) {
-            if (!renewable(w, i) || !bt_domain_owns(w, i) || home_at(w, i) >= rear || floe_at(w, i) >= rear) continue;
+            if (!renewable(w, i) || !bt_domain_owns(w, i) || !due(w, i)) continue;
             int32_t turns;
             const bt_pose p = place_of(w, i, &turns);
             const int64_t count = b->offset[i + 1] - b->offset[i];

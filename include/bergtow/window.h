@@ -6,13 +6,14 @@
 // from the front. Every floe has a home: its pose in the field as made (the mother field), which goes on beyond the window, repeated with
 // L and drifting as undisturbed ice does:
 //     X_i(t) = home_i + drift(t) + copy_i L
-// A floe is renewed when the rear has passed its home, σ X_i < rear, and itself, and its next place X_i + σL, at the front, is free of
-// all floes that stay: then it is put there, with the velocity of undisturbed ice. Floes whose places hold each other go at once. So the number of
-// bodies, their ids and the memory stay, and what enters is the mother field as it was made.
+// A floe is due when the rear has passed its home, σ X_i < rear, and itself, σ x_i < rear; one that the body has pushed ahead is taken from
+// inside by as much as it is late, rear − σ X_i, but not from the half next to the body of what lies behind it. It is renewed when its next place,
+// X_i + σL at the front, is free of all floes that stay: it is put there with the velocity of undisturbed ice. Floes whose places hold each other
+// go at once. So the number of bodies, their ids and the memory stay, and what enters is the mother field as it was made.
 //
 // Around the period the rear and the front are neighbours. A floe that waits for its place lies, by the period, among the ice at the
-// front, acts there as any other, and keeps that ice complete. Within the front zone, a quarter of `ahead` deep (assumed: far enough from the body to be
-// undisturbed), a place can still be taken late, by floes that the body has pushed ahead a little. Beyond:
+// front, acts there as any other, and keeps that ice complete. Within the front zone, half of `ahead` deep (assumed: far enough from the body to
+// be undisturbed), a place can still be taken late. Beyond:
 //     kept    a floe that went round as it was: disturbed ice comes again
 //     missed  a place that stayed empty, because its floe is carried along by the body
 // Both are counted. Rejected: a pool of spare floes for the missed places (their outlines would have to change, or twice the
