@@ -27,7 +27,7 @@ ifeq ($(filter $(CONFIG),release debug validate asan),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate or asan)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -lmetis -lm
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -40,7 +40,7 @@ TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long validate bench clean install tests lint asan partition-study FORCE
+.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint asan partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -90,7 +90,7 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev \
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-pytest ffmpeg
 
@@ -139,6 +139,10 @@ BENCH ?= default
 bench: deps ## time a floe and step over sizes, threads and ranks (BENCH=quick a minute, BENCH=full to 300,000 floes)
 	@$(AGAIN) CONFIG=release all build/release/triad
 	$(PYTHON) cases/scaling/bench.py $(BENCH)
+
+fullscale: deps ## resistance of an 80 m berg at 20 to 95 % ice beside the estimates, at full scale: table and picture in out/fullscale
+	@$(AGAIN) CONFIG=release all
+	$(PYTHON) cases/fullscale/study.py concentration
 
 lint: all ## names of external symbols, licence lines, syntax
 	@tests/lint.sh

@@ -14,7 +14,7 @@
 
 #define IMBALANCE 0.05 // of the work, above which tiles are dealt anew
 #define TOLERANCE 0.01 // asked of the cut
-enum { CHECK_STEPS = 25 };
+enum { CHECK_STEPS = 10 };
 // Seconds, measured on one core (see partition/README.md): only their ratios matter.
 #define UNIT_SWEEP 30e-9
 #define UNIT_STEP 300e-9
@@ -42,6 +42,7 @@ bt_domain_stats bt_domain_get_stats(const bt_world *w)
 {
     bt_domain_stats s = w->domain ? w->domain->stats : (bt_domain_stats){0};
     if (s.checks > 0) s.imbalance /= (double)s.checks;
+    if (s.divisions > 1) s.dealt_imbalance /= (double)(s.divisions - 1);
     return s;
 }
 
@@ -178,6 +179,7 @@ static void cut_map(bt_world *w)
     bt_domain *d = w->domain;
     const int n = d->n_x * d->n_y;
     int64_t *work = gather_work(w);
+    double dealt = 0;
     if (d->comm->rank == 0) {
         int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to), *group = bt_alloc((size_t)n, sizeof *group);
         int64_t *edge = bt_alloc(8 * (size_t)n, sizeof *edge);
@@ -200,7 +202,9 @@ static void cut_map(bt_world *w)
             at[p][0] = x * t->side_x, at[p][1] = y * t->side_y;
         }
         const bt_graph g = {.n = n, .start = start, .to = to, .edge = edge, .weight = work, .at = (const double (*)[2])at, .group = group};
-        bt_cut(&g, d->comm->size, TOLERANCE, d->owner, NULL);
+        bt_cut_quality q;
+        bt_cut(&g, d->comm->size, TOLERANCE, d->owner, &q);
+        dealt = q.imbalance;
         for (int p = 0; p < n; p++)
             for (int i = start[p]; i < start[p + 1]; i++) {
                 all += edge[i];
@@ -213,6 +217,11 @@ static void cut_map(bt_world *w)
     free(work);
     MPI_Bcast(d->owner, n, MPI_INT, 0, d->comm->mpi);
     MPI_Bcast(&d->stats.cut, 1, MPI_DOUBLE, 0, d->comm->mpi);
+    MPI_Bcast(&dealt, 1, MPI_DOUBLE, 0, d->comm->mpi);
+    if (d->dealt) { // the first division knew no work yet
+        d->stats.dealt_imbalance += dealt;
+        d->stats.worst_dealt_imbalance = bt_max(d->stats.worst_dealt_imbalance, dealt);
+    }
     d->stats.divisions++;
 }
 
@@ -305,7 +314,7 @@ void bt_domain_note(bt_world *w)
         bt_sum_add(&total, mine * 0x1p40);
         bt_comm_reduce(d->comm, &total, 1, &mine, 1, NULL, 0);
         const double mean = bt_sum_value(&total) * 0x1p-40 / d->comm->size, imbalance = mean > 0 ? mine / mean - 1 : 0;
-        if (d->stats.divisions > 1 || imbalance <= IMBALANCE) { // the first division knew no work yet
+        if (d->stats.divisions > 1 || imbalance <= IMBALANCE) {
             d->stats.checks++;
             d->stats.imbalance += imbalance;
             d->stats.worst_imbalance = bt_max(d->stats.worst_imbalance, imbalance);

@@ -16,6 +16,8 @@ typedef struct bt_domain_stats {
     double imbalance;        ///< work of the busiest rank / mean − 1 over the checks, mean of those after the first division
     double worst_imbalance;  ///< largest of them
     int64_t checks;
+    double dealt_imbalance;  ///< the same of the work that a division was made from, just after it: mean of those after the first division
+    double worst_dealt_imbalance;
     double cut;              ///< share of neighbouring tile pairs that lie on different ranks, last division
     double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
     int64_t moved;           ///< bodies that went to another rank

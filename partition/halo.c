@@ -9,6 +9,7 @@
 
 #include "division.h"
 #include "domain.h"
+#include "order.h"
 
 enum { TAG_FLAGS = 10, TAG_SPEEDS = 11, TAG_VELOCITIES = 20 };
 
@@ -184,6 +185,7 @@ void bt_domain_connect(bt_world *w)
 {
     if (!w->domain) return;
     mark_owned(w);
+    bt_order_measure(w->tiles);
     bt_halo_connect(w);
     bt_domain_check(w);
 }
@@ -221,8 +223,8 @@ void bt_domain_select(bt_world *w)
     if (!d) return;
     const bt_tiles *t = w->tiles;
     memset(d->touched, 0, (size_t)w->bodies.n);
-    for (bt_idx i = 0; i < t->phase_start[BT_PHASES]; i++) {
-        const bt_tile *tile = &t->tile[t->phase_tile[i]];
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_tile *tile = &t->tile[t->order[i]];
         if (!tile->border) continue;
         for (bt_idx j = 0; j < tile->n_units; j++) {
             d->touched[tile->units[j].a] |= (uint8_t)(1 << tile->phase);

@@ -6,15 +6,24 @@ import command
 from bergtow_read import Run
 
 
+def entries(group, prefix=""):
+    """(dotted name, text) of everything in nested groups; the curves of the estimates are left out."""
+    for key, value in group.items():
+        if isinstance(value, dict):
+            if key != "curves":
+                yield from entries(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
 def main(argv=None):
     p = argparse.ArgumentParser(description="List what the output folder of a run holds.")
     p.add_argument("run", metavar="RUN", help="output folder of a run")
     with Run(p.parse_args(argv).run) as run:
         print(f"{run.path}: {run.n_floes} floes, {len(run.bodies)} bodies, {len(run['time'])} samples, "
               f"{run.n_frames} frames")
-        for key, value in run.summary.items():
-            for name, item in value.items() if isinstance(value, dict) else [("", value)]:
-                print(f"  {key + '.' * bool(name) + name:40} {item}")
+        for name, item in entries(run.summary):
+            print(f"  {name:40} {item}")
         print("series:")
         for name in run.series_names:
             print(f"  {name:24} {run.units(name):8} {run.description(name)}")

@@ -363,6 +363,15 @@ static void check_water(const check *k)
     if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && sound(k, "water.slope_y")) fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
 }
 
+static void check_estimate(const check *k)
+{
+    const bt_case *c = k->c;
+    if (sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
+        fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa, c->estimate.kappa_low);
+    if (sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
+        fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa, c->estimate.kappa_high);
+}
+
 static void check_floe(const check *k, int index)
 {
     const bt_case *c = k->c;
@@ -415,6 +424,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     if (placed) check_path(&k, n, v);
     check_window(&k, n, v);
     check_water(&k);
+    check_estimate(&k);
     for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
     return err->n == before ? BT_OK : BT_ERR_CASE;
 }

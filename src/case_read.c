@@ -3,18 +3,15 @@
 #include "case_check.h"
 
 #include "bergtow/shape.h"
+#include "fileio.h"
 #include "schema.h"
 #include "tree.h"
 #include "value.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-
-enum { LARGEST_FILE = 16 << 20 };
 
 typedef struct {
     bt_case *c;
@@ -28,45 +25,6 @@ void bt_case_defaults(bt_case *c)
 {
     *c = (bt_case){0};
     bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
-}
-
-static bt_status read_file(bt_case *c, const char *path, size_t *size, bt_errors *err)
-{
-    struct stat st;
-    if (stat(path, &st)) {
-        bt_errors_add(err, "%s: cannot be read: %s; give the path of a case file", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    if (S_ISDIR(st.st_mode)) {
-        bt_errors_add(err, "%s: is a folder; give the path of a case file in it", path);
-        return BT_ERR_IO;
-    }
-    FILE *f = fopen(path, "rb");
-    if (!f) {
-        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    // Read to the end rather than st_size bytes: /dev/stdin and pipes have no size.
-    size_t cap = 1 << 14, n = 0;
-    char *text = bt_alloc(cap, 1);
-    for (size_t got; n <= LARGEST_FILE && (got = fread(text + n, 1, cap - n - 1, f)) > 0;) {
-        n += got;
-        if (n == cap - 1) text = bt_realloc(text, cap *= 2, 1);
-    }
-    bool broken = ferror(f);
-    fclose(f);
-    text[n] = 0;
-    c->text = text;
-    *size = n;
-    if (broken) {
-        bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(errno));
-        return BT_ERR_IO;
-    }
-    if (n > LARGEST_FILE) {
-        bt_errors_add(err, "%s: larger than 16 MiB, which no case file is; put large fields into an HDF5 file and name it in ice.field", path);
-        return BT_ERR_CASE;
-    }
-    return BT_OK;
 }
 
 static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
@@ -265,7 +223,7 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     size_t n_path = strlen(path);
     c->path = bt_alloc(n_path + 1, 1);
     memcpy(c->path, path, n_path);
-    bt_status status = read_file(c, path, &size, err);
+    bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
     if (status != BT_OK) return status;
 
     bt_node *root = bt_tree_parse(c->text, size, path, err);

@@ -35,11 +35,16 @@ static void write_floes(const bt_case *c, FILE *out)
 
 char *bt_case_resolved(const bt_case *c)
 {
+    return bt_case_text(c, "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n");
+}
+
+char *bt_case_text(const bt_case *c, const char *head)
+{
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (!out) return NULL;
-    fputs("# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n", out);
+    fputs(head, out);
     const char *previous = "";
     for (int k = 0; k < bt_n_case_keys; k++) {
         const bt_key *key = &bt_case_keys[k];

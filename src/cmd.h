@@ -12,6 +12,8 @@
 int bt_cmd_run(int argc, char **argv);
 int bt_cmd_check(int argc, char **argv);
 int bt_cmd_field(int argc, char **argv);
+int bt_cmd_estimate(int argc, char **argv);
+int bt_cmd_ensemble(int argc, char **argv);
 
 /// The case file and the overrides that every command takes.
 typedef struct bt_cmd_case {
@@ -28,6 +30,12 @@ extern const struct argp bt_cmd_case_argp;
 
 /// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
 int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
+
+/// out/NAME for path/NAME.yml; the caller frees it.
+char *bt_cmd_default_folder(const char *path);
+
+/// The command as it could be typed again, for the provenance of the result. argv[0] is the command. The caller frees it.
+char *bt_cmd_join(int argc, char **argv);
 
 /// Collective over c. Print all ranks' messages once, release them, and return the worst status as exit code.
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err);

@@ -7,6 +7,7 @@
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
+#include "cost.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -14,25 +15,44 @@
 #include <stdlib.h>
 
 static const double bytes_per_floe = 2048;     // body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice
-// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 us at 20, 50 and 80 %, where
-// force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is linear.
-// A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.
-static double seconds_per_floe_step(double concentration)
-{
-    const double x = bt_min(0.95, bt_max(0, concentration));
-    return x < 0.5 ? 0.5e-6 * pow(4, (x - 0.2) / 0.3) : 2e-6 * pow(7.5, (x - 0.5) / 0.3);
-}
 static const double gravity = 9.81;
+
+typedef struct {
+    bt_cmd_case file;
+    double scale; ///< length ratio of the twin to print, 0 = none
+} options;
+
+// A number, or a fraction as in 1/30.
+static double parse_scale(const struct argp_state *state, const char *text)
+{
+    char *end;
+    double up = strtod(text, &end), down = 1;
+    if (end != text && *end == '/') {
+        const char *rest = end + 1;
+        down = strtod(rest, &end);
+        if (end == rest) end = (char *)"?";
+    }
+    const double ratio = up / down;
+    if (end == text || *end || !isfinite(up) || !isfinite(down) || !(ratio >= 1e-4 && ratio <= 1e4))
+        argp_error(state, "--scale %s: give a length ratio from 1e-4 to 1e4, as in 30 or 1/30", text);
+    return ratio;
+}
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
-    (void)arg;
-    if (key != ARGP_KEY_INIT) return ARGP_ERR_UNKNOWN;
-    state->child_inputs[0] = state->input;
-    return 0;
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'l': o->scale = parse_scale(state, arg); return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
 }
+static const struct argp_option check_options[] = {
+    {"scale", 'l', "L", 0, "print the Froude-scaled twin with all lengths times L as a case file instead", 0},
+    {0},
+};
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp check_argp = {.parser = parse, .args_doc = "CASE.yml", .children = children,
+static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
                                        .doc = "Validate a case and print the numbers that follow from it. Nothing is computed or written."};
 
 static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
@@ -116,7 +136,7 @@ static void print_step(const bt_case *c, const ice_numbers *n)
 
 static void print_cost(const bt_case *c, const ice_numbers *n)
 {
-    const double per_step = seconds_per_floe_step(n->concentration);
+    const double per_step = bt_cost_floe_step(n->concentration);
     double seconds = n->count * (double)bt_case_steps(c) * per_step;
     double frames = c->run.duration / c->output.frame_interval;
     printf("memory               about %.3g MB\n", n->count * bytes_per_floe / 1e6 + 20);
@@ -124,29 +144,43 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
     printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
 }
 
+static void print_numbers(const char *path, const bt_case *c, const bt_field *f)
+{
+    const ice_numbers n = c->ice.field ? ice_of_field(c, f) : ice_of_case(c);
+    printf("%s: valid\n", path);
+    if (c->run.title) printf("title                %s\n", c->run.title);
+    printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
+    print_ice(c, &n);
+    print_body(c);
+    print_window(c);
+    print_step(c, &n);
+    print_cost(c, &n);
+}
+
+static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
+{
+    const bt_status status = bt_case_scale(c, ratio, err);
+    if (status != BT_OK) return status;
+    char *text = bt_case_scaled_text(c, ratio);
+    if (text) fputs(text, stdout);
+    free(text);
+    return BT_OK;
+}
+
 int bt_cmd_check(int argc, char **argv)
 {
-    bt_cmd_case file = {0};
-    bt_cmd_parse(&check_argp, argc, argv, &file);
+    options o = {0};
+    bt_cmd_parse(&check_argp, argc, argv, &o);
     bt_case c;
     bt_field f;
     bt_errors err = {0};
     bt_field_init(&f);
-    bt_status status = bt_case_read(&c, file.path, file.set, file.n_set, &err);
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
-    if (status == BT_OK) {
-        ice_numbers n = c.ice.field ? ice_of_field(&c, &f) : ice_of_case(&c);
-        printf("%s: valid\n", file.path);
-        if (c.run.title) printf("title                %s\n", c.run.title);
-        printf("domain               %g x %g m\n", c.domain.length, c.domain.width);
-        print_ice(&c, &n);
-        print_body(&c);
-        print_window(&c);
-        print_step(&c, &n);
-        print_cost(&c, &n);
-    }
+    if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
+    else if (status == BT_OK) print_numbers(o.file.path, &c, &f);
     bt_field_free(&f);
     bt_case_free(&c);
-    free(file.set);
+    free(o.file.set);
     return bt_cmd_end(&bt_comm_alone, status, &err);
 }

@@ -105,6 +105,35 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
     return v;
 }
 
+char *bt_cmd_default_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
+    char *folder = NULL;
+    if (asprintf(&folder, "out/%.*s", yaml ? (int)(dot - name) : (int)strlen(name), name) < 0) abort();
+    return folder;
+}
+
+char *bt_cmd_join(int argc, char **argv)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) abort();
+    fputs("bergtow", out);
+    for (int i = 0; i < argc; i++) {
+        bool safe = *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") == strlen(argv[i]);
+        fputs(safe ? " " : " '", out);
+        for (const char *s = argv[i]; *s; s++) {
+            if (*s == '\'') fputs("'\\''", out);
+            else fputc(*s, out);
+        }
+        if (!safe) fputc('\'', out);
+    }
+    fclose(out);
+    return text;
+}
+
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
 {
     const bool lost = fflush(stdout) != 0 || ferror(stdout);

@@ -58,37 +58,6 @@ static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp run_argp = {.options = run_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
-// out/NAME for path/NAME.yml
-static char *default_folder(const char *path)
-{
-    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
-    bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
-    char *folder = NULL;
-    if (asprintf(&folder, "out/%.*s", yaml ? (int)(dot - name) : (int)strlen(name), name) < 0) abort();
-    return folder;
-}
-
-// The command as it could be typed again, for the provenance of the result. argv[0] is the command.
-static char *join(int argc, char **argv)
-{
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) abort();
-    fputs("bergtow", out);
-    for (int i = 0; i < argc; i++) {
-        bool safe = *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") == strlen(argv[i]);
-        fputs(safe ? " " : " '", out);
-        for (const char *s = argv[i]; *s; s++) {
-            if (*s == '\'') fputs("'\\''", out);
-            else fputc(*s, out);
-        }
-        if (!safe) fputc('\'', out);
-    }
-    fclose(out);
-    return text;
-}
-
 // A long run must not take the place of another by a slip of the hand.
 static bt_status check_folder(const char *dir, bool force, bt_errors *err)
 {
@@ -103,12 +72,12 @@ static bt_status check_folder(const char *dir, bool force, bt_errors *err)
 int bt_cmd_run(int argc, char **argv)
 {
     options o = {.run = {.dump_step = -1}};
-    char *command_line = join(argc, argv);
+    char *command_line = bt_cmd_join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&run_argp, argc, argv, &o);
     const bt_comm *comm = bt_comm_world();
     if (comm->rank != 0) o.run.quiet = true;
-    char *folder = o.run.dir ? NULL : default_folder(o.file.path);
+    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
     if (folder) o.run.dir = folder;
 
     bt_case c;

@@ -84,6 +84,30 @@ static void on_leaving(int code, void *unused)
     else bt_comm_abort(code);
 }
 
+static void count_here(bt_comm *c)
+{
+    MPI_Comm node;
+    MPI_Comm_split_type(c->mpi, MPI_COMM_TYPE_SHARED, c->rank, MPI_INFO_NULL, &node);
+    MPI_Comm_size(node, &c->ranks_here);
+    MPI_Comm_free(&node);
+}
+
+void bt_comm_split(const bt_comm *c, int group, bt_comm *part)
+{
+    *part = bt_comm_alone;
+    if (c->size == 1) return;
+    MPI_Comm_split(c->mpi, group, c->rank, &part->mpi); // inherits the error handler
+    MPI_Comm_rank(part->mpi, &part->rank);
+    MPI_Comm_size(part->mpi, &part->size);
+    count_here(part);
+}
+
+void bt_comm_split_end(bt_comm *part)
+{
+    if (part->mpi != MPI_COMM_NULL) MPI_Comm_free(&part->mpi);
+    *part = bt_comm_alone;
+}
+
 void bt_comm_start(int *argc, char ***argv)
 {
     if (running || (!getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK"))) return;
@@ -106,10 +130,7 @@ void bt_comm_start(int *argc, char ***argv)
     MPI_Comm_create_errhandler(on_mpi_error, &handler);
     MPI_Comm_set_errhandler(world.mpi, handler);
     MPI_Errhandler_free(&handler);
-    MPI_Comm node;
-    MPI_Comm_split_type(world.mpi, MPI_COMM_TYPE_SHARED, world.rank, MPI_INFO_NULL, &node);
-    MPI_Comm_size(node, &world.ranks_here);
-    MPI_Comm_free(&node);
+    count_here(&world);
     MPI_Type_contiguous(4, MPI_UINT64_T, &item_type);
     MPI_Type_commit(&item_type);
     MPI_Op_create(combine, 1, &item_op);

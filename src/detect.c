@@ -9,6 +9,7 @@
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "domain.h"
+#include "order.h"
 #include "pack.h"
 #include "pairs.h"
 
@@ -160,35 +161,6 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     bt_pack_units(w, k, &s->pack);
 }
 
-/// Tiles in the order of the sweep: by phase, and in a phase those whose results other ranks wait for first.
-static void order_tiles(bt_world *w)
-{
-    bt_tiles *t = w->tiles;
-    const bool line = w->tow && w->tow->mode == BT_TOW_LINE;
-    bt_idx next[2 * BT_PHASES + 1] = {0};
-    t->n_units = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        for (bt_idx k = 0; k < t->n; k++) {
-            const bt_tile *tile = &t->tile[k];
-            if (!tile->own || (tile->n_units == 0 && !(line && k == t->n - 1))) continue;
-            const int place = 2 * tile->phase + !tile->border;
-            if (pass == 0) {
-                next[place + 1]++;
-                t->n_units += tile->n_units;
-            } else {
-                t->phase_tile[next[place]++] = k;
-            }
-        }
-        if (pass == 1) break;
-        for (int i = 0; i < 2 * BT_PHASES; i++) next[i + 1] += next[i];
-        for (int p = 0; p < BT_PHASES; p++) {
-            t->phase_start[p] = next[2 * p];
-            t->phase_inner[p] = next[2 * p + 1];
-        }
-        t->phase_start[BT_PHASES] = next[2 * BT_PHASES];
-    }
-}
-
 static void detect(bt_world *w, bool again)
 {
     bt_tiles *t = w->tiles;
@@ -217,7 +189,7 @@ static void detect(bt_world *w, bool again)
         bt_pack_scratch_free(&s.pack);
     }
     free(due);
-    order_tiles(w);
+    bt_order_tiles(w);
     bt_domain_select(w);
 }
 

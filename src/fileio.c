@@ -44,6 +44,47 @@ char *bt_file_join(const char *dir, const char *name)
     return path;
 }
 
+bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
+{
+    enum { LARGEST = 16 << 20 };
+    *text = NULL;
+    *size = 0;
+    struct stat st;
+    if (stat(path, &st)) {
+        bt_errors_add(err, "%s: cannot be read: %s; give the path of %s", path, strerror(errno), what);
+        return BT_ERR_IO;
+    }
+    if (S_ISDIR(st.st_mode)) {
+        bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
+        return BT_ERR_IO;
+    }
+    FILE *f = fopen(path, "rb");
+    if (!f) {
+        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(errno));
+        return BT_ERR_IO;
+    }
+    // Read to the end rather than st_size bytes: /dev/stdin and pipes have no size.
+    size_t cap = 1 << 14, n = 0;
+    *text = bt_alloc(cap, 1);
+    for (size_t got; n <= LARGEST && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
+        n += got;
+        if (n == cap - 1) *text = bt_realloc(*text, cap *= 2, 1);
+    }
+    const int broken = ferror(f) ? errno : 0;
+    fclose(f);
+    (*text)[n] = 0;
+    *size = n;
+    if (broken) {
+        bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(broken));
+        return BT_ERR_IO;
+    }
+    if (n > LARGEST) {
+        bt_errors_add(err, "%s: larger than 16 MiB, which %s never is; put large fields into an HDF5 file and name it in ice.field", path, what);
+        return BT_ERR_CASE;
+    }
+    return BT_OK;
+}
+
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
 {
     const size_t size = strlen(path) + sizeof ".tmp", n = strlen(text);

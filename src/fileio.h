@@ -11,6 +11,10 @@ bt_status bt_file_fail(const char *path, const char *action, int errnum, bt_erro
 /// What a user can do about an errno value of a failed file operation.
 const char *bt_file_remedy(int errnum);
 
+/// Whole text of a file of at most 16 MiB, terminated; the caller frees it (also after an error). what: "a case file", for the
+/// messages. Errors: BT_ERR_IO, BT_ERR_CASE (too large).
+bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err);
+
 /// Write text to path by way of a temporary name and a rename: path holds the old or the new text, never a part.
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err);
 

@@ -111,6 +111,25 @@ void bt_json_int(bt_json *j, const char *key, int64_t value)
     puts_(j, text);
 }
 
+void bt_json_bool(bt_json *j, const char *key, bool value)
+{
+    member(j, key);
+    puts_(j, value ? "true" : "false");
+}
+
+void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *values)
+{
+    member(j, key);
+    puts_(j, "[");
+    for (int64_t i = 0; i < n; i++) {
+        char text[40] = "null";
+        if (isfinite(values[i])) snprintf(text, sizeof text, "%.7g", values[i]);
+        if (i) puts_(j, ", ");
+        puts_(j, text);
+    }
+    puts_(j, "]");
+}
+
 void bt_json_string(bt_json *j, const char *key, const char *value)
 {
     member(j, key);

@@ -17,6 +17,9 @@ void bt_json_open(bt_json *j, const char *key, char bracket);
 void bt_json_close(bt_json *j, char bracket); ///< '}' or ']'
 void bt_json_number(bt_json *j, const char *key, double value); ///< shortest text of the same bits; null unless finite
 void bt_json_int(bt_json *j, const char *key, int64_t value);
+void bt_json_bool(bt_json *j, const char *key, bool value);
+/// An array of numbers in one line, with 7 digits each: for curves.
+void bt_json_numbers(bt_json *j, const char *key, int64_t n, const double *values);
 /// value: NULL gives null; bytes that are not UTF-8 become U+FFFD.
 void bt_json_string(bt_json *j, const char *key, const char *value);
 void bt_json_free(bt_json *j);

@@ -18,19 +18,18 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 #pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
-        for (int phase = 0; phase < BT_PHASES; phase++) {
-            const bt_idx begin = ts->phase_start[phase], inner = ts->phase_inner[phase], end = ts->phase_start[phase + 1];
-            if (exchange) {
-#pragma omp for schedule(dynamic, 1)
-                for (bt_idx i = begin; i < inner; i++) visit(w, ts->phase_tile[i], context, &own);
-#pragma omp master
-                bt_domain_send(w, phase, exchanged);
-            }
+        for (bt_idx r = 0; r < ts->n_runs; r++) {
+            const bt_run_of_tiles *run = &ts->run[r];
 #pragma omp for schedule(dynamic, 2)
-            for (bt_idx i = exchange ? inner : begin; i < end; i++) visit(w, ts->phase_tile[i], context, &own);
-            if (exchange) {
+            for (bt_idx i = run->begin; i < run->end; i++) visit(w, ts->order[i], context, &own);
+            if (!exchange) continue;
+            if (run->send >= 0) {
 #pragma omp master
-                bt_domain_receive(w, phase, exchanged);
+                bt_domain_send(w, run->send, exchanged);
+            }
+            if (run->receive >= 0) {
+#pragma omp master
+                bt_domain_receive(w, run->receive, exchanged);
 #pragma omp barrier
             }
         }
@@ -46,7 +45,7 @@ void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_t
     {
         bt_totals own = {.n_sums = t->n_sums};
 #pragma omp for schedule(dynamic, 4)
-        for (bt_idx i = 0; i < ts->phase_start[BT_PHASES]; i++) visit(w, ts->phase_tile[i], context, &own);
+        for (bt_idx i = 0; i < ts->n_order; i++) visit(w, ts->order[i], context, &own);
 #pragma omp critical
         bt_totals_merge(t, &own);
     }

@@ -18,6 +18,8 @@ typedef enum {
     BT_RNG_ORIENT,     ///< orientation of regular polygons
     BT_RNG_SHAKE,      ///< velocities of the shake
     BT_RNG_THICKNESS,
+    BT_RNG_MEMBER,     ///< seeds of the members of a study
+    BT_RNG_HYPERCUBE,  ///< strata of a Latin hypercube, and places in them
 } bt_rng_purpose;
 
 typedef struct bt_rng {

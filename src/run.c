@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "bergtow/estimate.h"
 #include "bergtow/field.h"
 #include "bergtow/observe.h"
 #include "bergtow/record.h"
@@ -121,6 +122,8 @@ static void note_division(run *r)
     r->totals.divisions = s.divisions;
     r->totals.imbalance = s.imbalance;
     r->totals.worst_imbalance = s.worst_imbalance;
+    r->totals.dealt_imbalance = s.dealt_imbalance;
+    r->totals.worst_dealt_imbalance = s.worst_dealt_imbalance;
     r->totals.edge_cut = s.cut;
     r->totals.halo_share = s.halo;
     bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);
@@ -286,6 +289,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     bt_status status = make_field(comm, c, &f, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
     const double concentration = f.concentration;
+    double thickness, radius;
+    bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
     if (status == BT_OK) {
         bt_domain_create(r.w, comm);
@@ -295,6 +300,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .threads = threads,
             .dt = c->run.dt,
             .mean_size = r.roster.mean_size,
+            .mean_thickness = thickness,
+            .mean_radius = radius,
             .concentration = concentration,
             .tolerance = r.w->par.tolerance,
         };

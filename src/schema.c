@@ -6,6 +6,8 @@
 //   [Hunke & Comeau 2011]    J. Geophys. Res. 116, C05008: icebergs in sea ice, drag coefficients
 //   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
 //   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
+//   [Lichey & Hellmer 2001]  J. Glaciol. 47: giant iceberg drift, force of sea ice on a berg; numbers also as in FESOM2's iceberg code
+//   [Flato & Hibler 1995]    J. Geophys. Res. 100: ridging, work / potential energy
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
 // "assumed" is a choice of this program without a measurement behind it.
 #include "schema.h"
@@ -158,6 +160,16 @@ const bt_key bt_case_keys[] = {
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+
+    REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
+    REAL("estimate.p_s", estimate.p_s, LINE_LOAD, "13 kN/m", "[0, 1e9]", "strength P at which dense ice captures a berg, at full scale [Lichey & Hellmer 2001; FESOM2 takes 10 kN/m]"),
+    REAL("estimate.c_si", estimate.c_si, RATIO, "1", "[0, 100]", "drag coefficient of sea ice on the body's side [Lichey & Hellmer 2001]"),
+    REAL("estimate.kappa", estimate.kappa, RATIO, "11", "[1, 100]", "work of rafting / potential energy gained, the middle of the range, assumed"),
+    REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]", "low end of the range of estimate.kappa, assumed"),
+    REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]", "high end of the range of estimate.kappa, that of pressure ridges [Flato & Hibler 1995]; for rafting assumed"),
+    REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]", "concentration to which the body sweeps ice together, in the momentum closure, assumed"),
+    REAL("estimate.length_scale", estimate.length_scale, RATIO, "1", "(0, 1e4]",
+         "full scale / this case: p_star is divided by it and p_s by its square, 1 at full scale [Froude]"),
 
     REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]", "measured mean ice resistance, shown beside the computed one"),
     TEXT("reference.source", reference.source, "none", "where the measured force was published"),

@@ -172,6 +172,10 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         choose_window(s, h, c);
         reduce_window(s, h, t->dt);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
+        bt_estimate_conditions(c, &s->estimate);
+        s->estimate.concentration = t->concentration;
+        if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
+        if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;
     }
 
     s->contacts = h->n ? h->sum_contacts / (double)h->n : nan;

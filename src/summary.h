@@ -3,6 +3,7 @@
 #ifndef BT_SUMMARY_H
 #define BT_SUMMARY_H
 
+#include "bergtow/estimate.h"
 #include "bergtow/record.h"
 #include "bergtow/stats.h"
 
@@ -41,6 +42,7 @@ typedef struct bt_summary {
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps;          ///< means over all steps
     double ns_per_floe_step;
+    bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
     double reference_ratio;           ///< mean ice / measured mean, NaN without a reference
     bt_errors warnings;
 } bt_summary;
@@ -50,6 +52,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 /// summary.json as text; the caller frees it.
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
 void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+/// A force with a prefix that keeps three digits before the point; returns out.
+const char *bt_force_text(char out[32], double newton);
 void bt_summary_free(bt_summary *s);
 
 #endif

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "estimate_text.h"
 #include "json.h"
 #include "summary.h"
 #include "summary_window.h"
@@ -77,6 +78,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_int(&j, "moved_floes", t->moved_floes);
     bt_json_number(&j, "imbalance", t->imbalance);
     bt_json_number(&j, "worst_imbalance", t->worst_imbalance);
+    bt_json_number(&j, "dealt_imbalance", t->dealt_imbalance);
+    bt_json_number(&j, "worst_dealt_imbalance", t->worst_dealt_imbalance);
     bt_json_number(&j, "edge_cut", t->edge_cut);
     bt_json_number(&j, "halo_share", t->halo_share);
     bt_json_number(&j, "memory_per_floe_b", n_floes > 0 ? t->memory / (double)n_floes : NAN);
@@ -84,6 +87,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_forces(&j, s, h, c);
+    if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
+    else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
     bt_json_int(&j, "unconverged_steps", h->unconverged);
@@ -116,7 +121,6 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     return j.text;
 }
 
-/// A force with a prefix that keeps three digits before the point.
 static const char *force(char out[32], double newton)
 {
     const double size = fabs(newton);
@@ -125,6 +129,8 @@ static const char *force(char out[32], double newton)
     else snprintf(out, 32, "%#.4g N", newton);
     return out;
 }
+
+const char *bt_force_text(char out[32], double newton) { return force(out, newton); }
 
 static void print_forces(const bt_summary *s, const bt_history *h, const bt_case *c)
 {
@@ -155,6 +161,10 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
     if (s->body) print_forces(s, h, c);
+    if (s->body && !isnan(s->estimate.along)) {
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
+        bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
+    }
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
                (long long)h->unconverged);

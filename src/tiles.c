@@ -27,7 +27,7 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->phase_tile, t};
+    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -290,7 +290,7 @@ static void make_tiles(bt_world *w)
     t->moved = bt_realloc(t->moved, n, sizeof *t->moved);
     t->rest = bt_realloc(t->rest, n, sizeof *t->rest);
     t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
-    t->phase_tile = bt_realloc(t->phase_tile, n, sizeof *t->phase_tile);
+    t->order = bt_realloc(t->order, n, sizeof *t->order);
     for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->rest[k] = t->awake[k] = 0;
 }
 

@@ -40,26 +40,32 @@ static const unit units[] = {
     {"N s/m", BT_UNIT_DAMPING, 1, 1}, {"N*s/m", BT_UNIT_DAMPING, 1, 1}, {"kN s/m", BT_UNIT_DAMPING, 1e3, 1},
     {"kN*s/m", BT_UNIT_DAMPING, 1e3, 1},
     {"Pa", BT_UNIT_PRESSURE, 1, 1}, {"kPa", BT_UNIT_PRESSURE, 1e3, 1}, {"MPa", BT_UNIT_PRESSURE, 1e6, 1},
+    {"N/m", BT_UNIT_LINE_LOAD, 1, 1}, {"kN/m", BT_UNIT_LINE_LOAD, 1e3, 1}, {"MN/m", BT_UNIT_LINE_LOAD, 1e6, 1},
 };
 enum { N_UNITS = sizeof units / sizeof *units };
 
+// froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b time^c has
+// the exponent 3 a + b + c/2.
 static const struct {
     const char *noun, *symbol, *bare;
+    double froude;
 } kinds[BT_UNIT_KINDS] = {
-    [BT_UNIT_NONE] = {"a plain number", "", "-"},
-    [BT_UNIT_RATIO] = {"a ratio", "", "-"},
-    [BT_UNIT_LENGTH] = {"a length", "m", "m"},
-    [BT_UNIT_SPEED] = {"a speed", "m/s", "m/s"},
-    [BT_UNIT_TIME] = {"a time", "s", "s"},
-    [BT_UNIT_ANGLE] = {"an angle", "rad", "deg"},
-    [BT_UNIT_TURN] = {"a rate of turn", "rad/s", "deg/s"},
-    [BT_UNIT_FORCE] = {"a force", "N", "N"},
-    [BT_UNIT_MASS] = {"a mass", "kg", "kg"},
-    [BT_UNIT_DENSITY] = {"a density", "kg/m3", "kg/m3"},
-    [BT_UNIT_DAMPING] = {"a damping", "N s/m", "N s/m"},
-    [BT_UNIT_PRESSURE] = {"a pressure", "Pa", "Pa"},
+    [BT_UNIT_NONE] = {"a plain number", "", "-", 0},
+    [BT_UNIT_RATIO] = {"a ratio", "", "-", 0},
+    [BT_UNIT_LENGTH] = {"a length", "m", "m", 1},
+    [BT_UNIT_SPEED] = {"a speed", "m/s", "m/s", 0.5},
+    [BT_UNIT_TIME] = {"a time", "s", "s", 0.5},
+    [BT_UNIT_ANGLE] = {"an angle", "rad", "deg", 0},
+    [BT_UNIT_TURN] = {"a rate of turn", "rad/s", "deg/s", -0.5},
+    [BT_UNIT_FORCE] = {"a force", "N", "N", 3},
+    [BT_UNIT_MASS] = {"a mass", "kg", "kg", 3},
+    [BT_UNIT_DENSITY] = {"a density", "kg/m3", "kg/m3", 0},
+    [BT_UNIT_DAMPING] = {"a damping", "N s/m", "N s/m", 2.5},
+    [BT_UNIT_PRESSURE] = {"a pressure", "Pa", "Pa", 1},
+    [BT_UNIT_LINE_LOAD] = {"a force per length", "N/m", "N/m", 2},
 };
 
+double bt_units_froude(bt_unit kind) { return kinds[kind].froude; }
 const char *bt_units_symbol(bt_unit kind) { return kinds[kind].symbol; }
 const char *bt_units_bare(bt_unit kind) { return kinds[kind].bare; }
 const char *bt_units_noun(bt_unit kind) { return kinds[kind].noun; }

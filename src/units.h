@@ -18,7 +18,8 @@ typedef enum {
     BT_UNIT_MASS,     ///< kg
     BT_UNIT_DENSITY,  ///< kg/m3
     BT_UNIT_DAMPING,  ///< N s/m
-    BT_UNIT_PRESSURE, ///< Pa; no key has it, but messages can name it
+    BT_UNIT_PRESSURE, ///< Pa
+    BT_UNIT_LINE_LOAD, ///< N/m
     BT_UNIT_KINDS
 } bt_unit;
 
@@ -33,6 +34,9 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
 /// Shortest decimal form, at most 17 digits, that reads back to the same bits, with the unit: "0.1 s", "nan" as "none".
 /// Independent of the locale. Returns the length.
 int bt_units_format(double value, bt_unit kind, char *out, size_t size);
+
+/// Exponent a of the length ratio L under which a quantity of this kind scales as L^a at the same Froude number, with densities and gravity kept.
+double bt_units_froude(bt_unit kind);
 
 const char *bt_units_symbol(bt_unit kind); ///< SI symbol, "" for plain numbers; what the formatted value carries
 const char *bt_units_bare(bt_unit kind);   ///< unit of a number written without one, "-" for plain numbers

@@ -141,6 +141,13 @@ typedef struct bt_case {
         double progress;         ///< s of wall time between progress lines
     } output;
     struct {
+        double p_star, p_s;      ///< ice strength Pa and capture threshold N/m of Lichey and Hellmer, at full scale
+        double c_si;             ///< drag coefficient of ice on the body
+        double kappa, kappa_low, kappa_high; ///< work of rafting / potential energy gained
+        double phi_j;            ///< concentration to which ice is swept together
+        double length_scale;     ///< full scale / this case
+    } estimate;
+    struct {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
         char *source;            ///< where it was published
     } reference;
@@ -158,6 +165,16 @@ bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
 /// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
+
+/// The same below comment lines of one's own. Caller frees.
+char *bt_case_text(const bt_case *c, const char *head);
+
+/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/froude.c): the twin moves alike in
+/// times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for keys that name files of numbers with a dimension.
+bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
+
+/// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
+char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
 /// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0 without body.
 int bt_case_waterline(const bt_case *c, double *v);

@@ -86,6 +86,7 @@ typedef struct bt_run_totals {
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
+    double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
@@ -94,7 +95,7 @@ typedef struct bt_run_totals {
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;
-    double imbalance, worst_imbalance, edge_cut, halo_share;
+    double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
     const char *stopped;         ///< why the run ended early, or NULL

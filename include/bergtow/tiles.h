@@ -68,6 +68,8 @@ typedef struct bt_tile {
     bt_idx right, above, diagonal;  ///< tiles +x, +y, +xy: index, −1 = none
     bool own;                       ///< this rank solves its contacts and answers for its bodies
     bool border;                    ///< some body of its block is held by other ranks too
+    bt_idx ahead;                   ///< tile that comes soon after it in the order of the pass, −1 = none
+    int8_t depth;                   ///< tiles from the nearest border tile, at most BT_PHASES
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
     double margin;                  ///< m, of this step's detection
@@ -86,6 +88,12 @@ typedef struct bt_tile {
     double *unit_history, *body_history;
     bt_idx cap_unit_history, cap_body_history;
 } bt_tile;
+
+/// Tiles of one phase that are done at once, and what is exchanged with other ranks after them.
+typedef struct bt_run_of_tiles {
+    bt_idx begin, end;              ///< in the order of the pass
+    int8_t send, receive;           ///< phase whose results go out, or come in, after these; −1 = none
+} bt_run_of_tiles;
 
 enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
 
@@ -112,8 +120,10 @@ typedef struct bt_tiles {
     double moved_any;               ///< the same for any body in a tile
     uint8_t *rest;                  ///< [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
     uint8_t *awake;                 ///< [n] contacts may move the tile's bodies in this step
-    bt_idx *phase_tile;             ///< [n] active tiles of this rank by phase, in each those at a border first
-    bt_idx phase_start[BT_PHASES + 1], phase_inner[BT_PHASES]; ///< where each phase, and its inner tiles, begin
+    bt_idx *order;                  ///< [n_order] tiles of this rank with work, in the order of a pass (src/order.h)
+    bt_idx n_order;
+    bt_run_of_tiles *run;           ///< [n_runs] pieces of it whose tiles are done at once
+    bt_idx n_runs, cap_runs;
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
     bool calm;                      ///< nothing but contacts moves a floe that drifts with the water

@@ -114,6 +114,7 @@ def test_the_same_bits(alone, name, ranks, threads):
     assert r.summary["divisions"] >= 2 and r.summary["moved_floes"] > 50, r.summary
     assert 0 < r.summary["edge_cut"] <= 1 and 0 < r.summary["halo_share"] < 3
     assert 0 <= r.summary["imbalance"] <= r.summary["worst_imbalance"]
+    assert 0 <= r.summary["dealt_imbalance"] <= r.summary["worst_dealt_imbalance"]
 
 
 @pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2)])

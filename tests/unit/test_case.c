@@ -103,7 +103,7 @@ static void resolved_text_opens_each_section_once(void **state)
     bt_errors err = {0};
     if (read_text(&c, base, &err)) fail_with(&err, "the smallest case is refused");
     char *text = bt_case_resolved(&c);
-    static const char *const sections[] = {"run", "domain", "ice", "body", "tow", "water", "air", "solver", "output", "reference"};
+    static const char *const sections[] = {"run", "domain", "ice", "body", "tow", "water", "air", "solver", "output", "estimate", "reference"};
     for (size_t i = 0; i < sizeof sections / sizeof *sections; i++) {
         char line[32];
         snprintf(line, sizeof line, "\n%s:\n", sections[i]);

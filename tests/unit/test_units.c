@@ -27,7 +27,7 @@ static void reads_units_of_each_kind(void **state)
         {"180 deg", BT_UNIT_ANGLE, BT_PI}, {"180", BT_UNIT_ANGLE, BT_PI}, {"3 rad", BT_UNIT_ANGLE, 3}, {"90°", BT_UNIT_ANGLE, BT_PI / 2},
         {"180", BT_UNIT_TURN, BT_PI}, {"1 rad/s", BT_UNIT_TURN, 1}, {"50 kN", BT_UNIT_FORCE, 5e4}, {"1 MN", BT_UNIT_FORCE, 1e6},
         {"15.5 kt", BT_UNIT_MASS, 15.5e6}, {"2 t", BT_UNIT_MASS, 2000}, {"0.91 t/m3", BT_UNIT_DENSITY, 910}, {"910 kg/m^3", BT_UNIT_DENSITY, 910},
-        {"2 kN s/m", BT_UNIT_DAMPING, 2000}, {"20 kPa", BT_UNIT_PRESSURE, 2e4}, {"0.8 %", BT_UNIT_RATIO, 0.008}, {"80%", BT_UNIT_RATIO, 0.8},
+        {"2 kN s/m", BT_UNIT_DAMPING, 2000}, {"20 kPa", BT_UNIT_PRESSURE, 2e4}, {"13 kN/m", BT_UNIT_LINE_LOAD, 13e3}, {"0.8 %", BT_UNIT_RATIO, 0.008}, {"80%", BT_UNIT_RATIO, 0.8},
         {" 1e-3 ", BT_UNIT_RATIO, 1e-3}, {"+.5", BT_UNIT_NONE, 0.5}, {"5.", BT_UNIT_NONE, 5}, {"-1E2 m", BT_UNIT_LENGTH, -100},
         {"1e2m", BT_UNIT_LENGTH, 100},
     };

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
+//
+// Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it
+// holds summary.json, failed when it holds failed.txt (first line: exit code; then the reasons), and else waits. DIR/journal.jsonl has a line
+// for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
+// order, ranks, or how often the ensemble was stopped.
+//
+// Dealing. Who works on a member holds a lock on members/NAME/lock, which the system takes back when the process ends, however it
+// ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word between them:
+// each takes the next member that is neither finished, failed nor locked, the longest first by an estimate. (Tried in thought and left: a
+// counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it on every network.)
+// A member whose process died is tried again after all others, and given up after some attempts, so that it cannot stop the rest.
+#ifndef BERGTOW_ENSEMBLE_H
+#define BERGTOW_ENSEMBLE_H
+
+#include "bergtow/comm.h"
+#include "bergtow/study.h"
+
+enum { BT_MAX_ATTEMPTS = 20 }; ///< of a member whose process dies each time
+
+typedef struct bt_ensemble_options {
+    const char *dir;
+    int threads;              ///< of each rank, 0 = the cores of the node shared by its ranks
+    bool quiet;
+    bool retry;               ///< failed members are tried again
+    const char *command_line;
+} bt_ensemble_options;
+
+typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_member_state;
+
+/// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another study, the study
+/// asks for more ranks than there are), BT_ERR_IO, BT_ERR_SIGNAL (the call resumes); the worst status of a failed member when all others are done.
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
+
+/// State of a member by its files. why: text of failed.txt without its first line, to be freed by the caller, may be NULL; *code: its first line.
+bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
+
+/// Make DIR/ensemble.h5 from the members' files. Errors: BT_ERR_IO.
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_errors *err);
+
+#endif

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// Published and derived estimates of the resistance that broken ice adds to a tow, and the drag of open water.
+//
+// A concentration, h thickness m, W width of the body across the tow m, V speed of the body through the ice m/s, d the tow
+// direction, ρ_i and ρ_w densities of ice and water kg/m³, P = P* h exp(−20 (1 − A)) strength of the ice N/m [Hibler 1979's form].
+//
+//   Lichey–Hellmer   0 for A <= 0.15;  ½ ρ_i C_si h W |ΔV| ΔV·d for 0.15 < A < 0.9, and for A >= 0.9 while P < P_s;
+//                    for A >= 0.9 and P >= P_s the ice captures the body: what it then resists is limited by P W
+//                    [Lichey & Hellmer 2001, J. Glaciol. 47, with P* = 20 kN/m², P_s = 13 kN/m; FESOM2's iceberg code]
+//   Three closures of "F × 1 m = work spent on opening 1 m of channel" [Marchenko et al. 2010 as quoted by Yulmetov & Løset
+//   2017; their formula is not at hand, so each of these is ours and has a name]:
+//     compaction     F = P W                                    the strip is pressed against ice of strength P
+//     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W          the ice of the strip is pushed onto or under other ice; κ: work
+//                                                               over potential energy, of which a range is given
+//     momentum       F = ρ_i h W V² A φ/(φ − A)                 the ice of the strip is swept together to φ, with the front at V φ/(φ − A)
+//   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²         resting disc-like floes of radius r, each met once by a heavy disc of
+//                                                               radius R = W/2, without friction and drag (derived; tests/physics/test_resistance.c)
+//   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/forces.c computes; no ice resistance
+//
+// Ice and water are taken to move together, with the current: ΔV = V_tow − U_w.
+#ifndef BERGTOW_ESTIMATE_H
+#define BERGTOW_ESTIMATE_H
+
+#include "bergtow/case.h"
+#include "bergtow/field.h"
+
+typedef enum {
+    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_OPEN_WATER, BT_N_ESTIMATES
+} bt_estimate_kind;
+
+#define BT_EST_LOOSE 0.15      ///< A up to which Lichey & Hellmer have no force
+#define BT_EST_DENSE 0.9       ///< A from which ice may capture a berg
+#define BT_EST_STRENGTH 20.0   ///< exponent of the strength [Hibler 1979]
+#define BT_EST_COMPACT 0.65    ///< A below which ice has room to give way and is neither pressed together nor rafted, assumed
+#define BT_EST_DILUTE_MOST 0.25 ///< A above which floes hit each other before the body has passed, assumed
+
+/// What the estimates depend on, at the scale of the case.
+typedef struct bt_estimate_input {
+    double concentration;    ///< A
+    double thickness;        ///< h, weighted with area, m
+    double floe_radius;      ///< r, weighted with area, m
+    double width;            ///< W, m
+    double speed, along;     ///< |ΔV| and ΔV·d, m/s; NaN: nothing is towed
+    double restitution;      ///< e, ice on body
+    double ice_density, water_density; ///< kg/m³
+    double drag;             ///< ½ ρ_w C_w draft b + ρ_w C_ws A_wl, kg/m
+    double p_star, p_s;      ///< Pa, N/m: divided by the length scale and its square
+    double c_si, kappa, kappa_low, kappa_high, phi_j;
+    double length_scale;     ///< by which P* and P_s were divided
+} bt_estimate_input;
+
+/// One estimate.
+typedef struct bt_estimate {
+    double force;     ///< N against the tow; NaN: the formula has no value here
+    double low, high; ///< N, its range; equal to force where there is none
+    bool valid;       ///< the formula is meant for these conditions
+    const char *note; ///< regime, or why it is not valid; static
+} bt_estimate;
+
+/// The constant part of an estimate.
+typedef struct bt_estimate_kind_info {
+    const char *name;    ///< key in summary.json
+    const char *label;   ///< as printed
+    const char *formula, *source;
+} bt_estimate_kind_info;
+extern const bt_estimate_kind_info bt_estimate_kinds[BT_N_ESTIMATES];
+
+/// Strength of the ice P, N/m.
+double bt_estimate_strength(const bt_estimate_input *in);
+
+/// One estimate at the given conditions.
+bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in);
+
+/// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body, or tow, speed and
+/// along are NaN. The case has been checked (bt_case_finish).
+void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in);
+
+/// Area-weighted means of a field: thickness and radius of the circle of a floe's area, m. 0 without floes.
+void bt_estimate_field(const bt_field *f, double *thickness, double *radius);
+
+#endif

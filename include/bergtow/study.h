@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+// A study: one base case, what is varied, and how many fields of each condition. Read from a YAML file.
+//
+//     title: resistance against concentration
+//     base: ../basin/basin-80.yml          # relative to the study file
+//     set: {run.duration: 600 s}           # keys of the base that are replaced in every member
+//     parameters:
+//       ice.concentration: [0.2, 0.5, 0.8]                                    # a list
+//       tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}             # a range
+//     variants:                            # sets of keys that go together, as one more parameter
+//       squares: {ice.shape: rectangles}
+//       hexagons: {ice.shape: polygons, ice.sides: 6}
+//     sampling: grid                       # every combination; or latin-hypercube
+//     samples: 100                         # conditions of the Latin hypercube
+//     repeats: 20                          # fields of each condition
+//     seed: 1
+//     ranks: 1                             # MPI ranks that work on one member
+//
+// A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows from
+// (seed, condition, repeat) alone, so more repeats may be asked for later without changing a member.
+#ifndef BERGTOW_STUDY_H
+#define BERGTOW_STUDY_H
+
+#include "bergtow/case.h"
+
+typedef enum { BT_SAMPLING_GRID, BT_SAMPLING_LATIN_HYPERCUBE } bt_sampling;
+
+enum { BT_MAX_PARAMETERS = 32, BT_MAX_MEMBERS = 100000 };
+
+/// What is varied. A value is the text that --set takes.
+typedef struct bt_study_parameter {
+    char *name;          ///< case key, or "variant"
+    int key;             ///< index into the keys of a case, −1 = the variants
+    bool continuous;     ///< a range: a Latin hypercube draws from all of it
+    bool logarithmic;
+    double from, to;     ///< of a range, SI
+    int n;               ///< values of a list, or of a range in a grid
+    char **value;        ///< [n] texts; of the variants: their names
+    int64_t *stratum;    ///< [n_conditions] place of each condition in a Latin hypercube; NULL in a grid
+} bt_study_parameter;
+
+typedef struct bt_study_variant {
+    char *name;
+    char **set;          ///< [n_set] "key=value"
+    int n_set;
+} bt_study_variant;
+
+typedef struct bt_study {
+    char *path, *text;   ///< as read
+    char *title;         ///< or NULL
+    char *base_name;     ///< as written
+    char *base;          ///< path of the base case
+    char **set;          ///< [n_set] "key=value"
+    int n_set;
+    bt_study_parameter parameter[BT_MAX_PARAMETERS];
+    int n_parameters;
+    bt_study_variant *variant;
+    int n_variants;
+    bt_sampling sampling;
+    int64_t samples, repeats, seed, ranks;
+    int64_t n_conditions;
+} bt_study;
+
+/// One run of the study.
+typedef struct bt_member {
+    int64_t condition, repeat; ///< from 0
+    char name[56];             ///< of its folder
+    int64_t seed;              ///< ice.seed
+    int n_set;
+    char **set;                ///< [n_set] overrides of the base
+    char *value[BT_MAX_PARAMETERS]; ///< text of each parameter
+} bt_member;
+
+/// Read and check a study file; every error of the file is appended with file, line, key and remedy. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
+void bt_study_free(bt_study *s);
+
+static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_conditions * s->repeats; }
+
+/// Member m of 0 ... n − 1: repeats of condition 0 first, then those of condition 1. Release with bt_member_free.
+void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
+void bt_member_free(bt_member *m);
+
+/// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base case resolved. Two
+/// studies with the same text have the same members. Caller frees. NULL with a message when the base cannot be read.
+char *bt_study_resolved(const bt_study *s, bt_errors *err);
+
+#endif

@@ -1,0 +1,416 @@
+// SPDX-License-Identifier: MIT
+// The members of a study, dealt to groups of ranks; reasons in bergtow/ensemble.h.
+#include "bergtow/ensemble.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "bergtow/run.h"
+#include "cost.h"
+#include "fileio.h"
+#include "json.h"
+
+#define GATHER_SECONDS 10.0 // wall time between two looks at ensemble.h5
+
+typedef struct {
+    bt_member m;
+    char *folder;
+    double cost;   ///< estimated, s of one core
+    bool settled;  ///< finished or failed, as far as this process knows
+    int attempts;  ///< starts without an end
+} entry;
+
+typedef struct {
+    const bt_comm *world, *group;
+    const bt_study *s;
+    const bt_ensemble_options *o;
+    entry *list;        ///< [n] in the order in which they are taken
+    int64_t n, before;  ///< members; settled when this call began
+    double cost_before; ///< of those
+    int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
+    double began, gathered;
+    bt_errors *err;
+} ensemble;
+
+// --- files of a member -----------------------------------------------------------------------------------------------
+
+static bool there(const char *folder, const char *name)
+{
+    char *path = bt_file_join(folder, name);
+    const bool yes = access(path, F_OK) == 0;
+    free(path);
+    return yes;
+}
+
+bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
+{
+    if (why) *why = NULL;
+    if (code) *code = 0;
+    if (there(folder, "summary.json")) return BT_MEMBER_FINISHED;
+    if (!there(folder, "failed.txt")) return BT_MEMBER_WAITING;
+    char *path = bt_file_join(folder, "failed.txt"), *text;
+    size_t size;
+    bt_errors none = {0};
+    if (bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
+        char *rest = strchr(text, '\n');
+        if (code) *code = atoi(text);
+        if (why && rest) *why = strdup(rest + 1);
+    }
+    free(text);
+    free(path);
+    bt_errors_free(&none);
+    return BT_MEMBER_FAILED;
+}
+
+static int open_in(const char *folder, const char *name, int flags)
+{
+    char *path = bt_file_join(folder, name);
+    const int fd = open(path, flags | O_CLOEXEC, 0666);
+    free(path);
+    return fd;
+}
+
+/// Lock of an open file: the system lifts it when the process ends.
+static bool try_lock(int fd)
+{
+    struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    return fcntl(fd, F_OFD_SETLK, &l) == 0;
+}
+
+/// Starts of a member that had no end: one byte each.
+static int count_attempts(const char *folder)
+{
+    char *path = bt_file_join(folder, "attempts");
+    struct stat st;
+    const int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
+    free(path);
+    return n;
+}
+
+static void note_attempt(const char *folder)
+{
+    const int fd = open_in(folder, "attempts", O_WRONLY | O_CREAT | O_APPEND);
+    if (fd < 0) return;
+    if (write(fd, ".", 1) == 1) fsync(fd);
+    close(fd);
+}
+
+static void forget_attempts(const char *folder)
+{
+    char *path = bt_file_join(folder, "attempts");
+    unlink(path);
+    free(path);
+}
+
+/// One line of the journal, in one write: lines of several processes do not mix.
+static void journal(const ensemble *e, const char *event, const bt_member *m, double wall, int code)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    char line[256];
+    const int n = snprintf(line, sizeof line, "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": %.3f, \"exit_code\": %d}\n",
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), wall, code);
+    const int fd = open_in(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
+    if (fd < 0) return;
+    if (write(fd, line, (size_t)n) == n) fsync(fd);
+    close(fd);
+}
+
+static bt_status record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
+{
+    char *text = NULL, *path = bt_file_join(folder, "failed.txt");
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) abort();
+    fprintf(out, "%d\n", (int)code);
+    for (size_t i = 0; i < why->n; i++) fprintf(out, "%s\n", why->text[i]);
+    fclose(out);
+    const bt_status status = bt_file_write(path, text, err);
+    free(text);
+    free(path);
+    return status;
+}
+
+// --- the list --------------------------------------------------------------------------------------------------------
+
+static int by_cost(const void *a, const void *b)
+{
+    const entry *p = a, *q = b;
+    if ((p->attempts > 0) != (q->attempts > 0)) return p->attempts > 0 ? 1 : -1; // those whose process died come last
+    if (p->cost != q->cost) return p->cost > q->cost ? -1 : 1;
+    return strcmp(p->m.name, q->m.name);
+}
+
+static void look(entry *x)
+{
+    if (!x->settled) x->settled = bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_WAITING;
+}
+
+static void make_list(ensemble *e)
+{
+    e->n = bt_study_n_members(e->s);
+    e->list = bt_alloc((size_t)e->n, sizeof *e->list);
+    double cost = 0;
+    int64_t priced = -1;
+    for (int64_t i = 0; i < e->n; i++) {
+        entry *x = &e->list[i];
+        bt_study_member(e->s, i, &x->m);
+        if (asprintf(&x->folder, "%s/members/%s", e->o->dir, x->m.name) < 0) abort();
+        if (x->m.condition != priced) { // fields of one condition cost the same; a case that cannot be read fails when its turn comes
+            bt_case c;
+            bt_errors unheard = {0};
+            priced = x->m.condition;
+            cost = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
+            bt_case_free(&c);
+            bt_errors_free(&unheard);
+        }
+        x->cost = cost;
+        x->attempts = count_attempts(x->folder);
+        look(x);
+        if (x->settled) {
+            e->before++;
+            e->cost_before += cost;
+        }
+    }
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_cost);
+}
+
+/// Folder, resolved study; refuses a folder of another study. On rank 0.
+static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+{
+    char *text = bt_study_resolved(s, err);
+    if (!text) return BT_ERR_CASE;
+    char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"), *copy = bt_file_join(o->dir, "study.yml");
+    bt_status status = bt_file_make_dir(members, err);
+    if (status == BT_OK && access(path, F_OK) == 0) {
+        char *before;
+        size_t size;
+        status = bt_file_read(path, "a study", &before, &size, err);
+        if (status == BT_OK && strcmp(before, text)) {
+            bt_errors_add(err, "%s: holds the members of another study (see %s): only `repeats` may change; give another folder with -o, or restore the study and its base case", o->dir, path);
+            status = BT_ERR_CASE;
+        }
+        free(before);
+    } else if (status == BT_OK) {
+        status = bt_file_write(path, text, err);
+    }
+    if (status == BT_OK) status = bt_file_write(copy, s->text, err);
+    free(members);
+    free(path);
+    free(copy);
+    free(text);
+    return status;
+}
+
+// --- dealing ---------------------------------------------------------------------------------------------------------
+
+/// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
+static int64_t claim(ensemble *e)
+{
+    for (int64_t i = 0; i < e->n; i++) {
+        entry *x = &e->list[i];
+        look(x);
+        if (x->settled) continue;
+        bt_errors why = {0};
+        if (bt_file_make_dir(x->folder, &why) != BT_OK) {
+            if (e->err->n < 8) for (size_t k = 0; k < why.n; k++) bt_errors_add(e->err, "%s", why.text[k]);
+            bt_errors_free(&why);
+            return -2;
+        }
+        const int fd = open_in(x->folder, "lock", O_RDWR | O_CREAT);
+        if (fd < 0) {
+            bt_file_fail(x->folder, "make a lock in the folder", errno, e->err);
+            return -2;
+        }
+        if (!try_lock(fd)) { // somebody is at it
+            close(fd);
+            continue;
+        }
+        look(x); // it may have been finished between the look and the lock
+        if (x->settled) {
+            close(fd);
+            continue;
+        }
+        e->lock = fd;
+        return i;
+    }
+    return -1;
+}
+
+static void say(const ensemble *e, const entry *x, bt_status status, double wall)
+{
+    if (e->o->quiet) return;
+    int64_t done = 0;
+    double cost = 0, all = 0;
+    for (int64_t i = 0; i < e->n; i++) {
+        look(&e->list[i]);
+        all += e->list[i].cost;
+        if (!e->list[i].settled) continue;
+        done++;
+        cost += e->list[i].cost;
+    }
+    const double passed = bt_clock() - e->began, spent = cost - e->cost_before, left = spent > 0 ? passed * (all - cost) / spent : NAN;
+    char line[512];
+    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name, status == BT_OK ? "finished" : "FAILED", wall);
+    for (int p = 0; p < e->s->n_parameters && n < 400; p++) n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
+    if (isfinite(left) && done < e->n) snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left", left < 120 ? left : left / 60);
+    printf("%s\n", line);
+    fflush(stdout);
+}
+
+static bt_status run_member(ensemble *e, entry *x)
+{
+    const bool first = e->group->rank == 0;
+    const double t0 = bt_clock();
+    bt_errors why = {0};
+    bt_status status = BT_OK;
+    if (first && x->attempts >= BT_MAX_ATTEMPTS) {
+        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name, x->attempts);
+        status = BT_ERR_NUMERIC;
+    }
+    if (first) {
+        if (x->attempts < BT_MAX_ATTEMPTS) note_attempt(x->folder);
+        journal(e, "start", &x->m, 0, 0);
+    }
+    status = bt_comm_agree(e->group, status);
+    if (status == BT_OK) {
+        bt_case c;
+        status = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &why);
+        status = bt_comm_agree(e->group, status);
+        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .command_line = e->o->command_line};
+        if (status == BT_OK) status = bt_run(e->group, &c, &o, &why);
+        bt_case_free(&c);
+    }
+    bt_comm_errors(e->group, &why);
+    if (first) {
+        const double wall = bt_clock() - t0;
+        forget_attempts(x->folder);
+        if (status != BT_OK && status != BT_ERR_SIGNAL) {
+            bt_errors unheard = {0};
+            // Where not even that can be written (a full disk) the member stays open, and the next call tries it again.
+            if (record_failure(x->folder, status, &why, &unheard) != BT_OK) x->settled = true;
+            bt_errors_free(&unheard);
+        }
+        journal(e, status == BT_OK ? "finished" : status == BT_ERR_SIGNAL ? "stopped" : "failed", &x->m, wall, (int)status);
+        if (status != BT_ERR_SIGNAL) say(e, x, status, wall);
+    }
+    bt_errors_free(&why);
+    return status;
+}
+
+static void gather_now_and_then(ensemble *e)
+{
+    if (bt_clock() - e->gathered < GATHER_SECONDS) return;
+    const int fd = open_in(e->o->dir, "lock", O_RDWR | O_CREAT);
+    bt_errors unheard = {0}; // at the end it is done aloud
+    if (fd >= 0 && try_lock(fd)) bt_ensemble_gather(e->s, e->o->dir, &unheard);
+    if (fd >= 0) close(fd);
+    bt_errors_free(&unheard);
+    e->gathered = bt_clock();
+}
+
+static bt_status work(ensemble *e)
+{
+    for (;;) {
+        int64_t i = e->group->rank == 0 ? claim(e) : 0;
+        bt_comm_bcast(e->group, &i, sizeof i);
+        if (i == -1) return BT_OK;
+        if (i < -1) return BT_ERR_IO;
+        const bt_status status = run_member(e, &e->list[i]);
+        if (e->group->rank == 0) {
+            close(e->lock);
+            if (status != BT_ERR_SIGNAL) gather_now_and_then(e);
+        }
+        if (status == BT_ERR_SIGNAL) return status;
+    }
+}
+
+/// What became of the members: the worst status of the failed, each with its first reason.
+static bt_status tell_end(const ensemble *e, bt_status status, bt_errors *err)
+{
+    int64_t count[3] = {0};
+    bt_status worst = status;
+    for (int64_t m = 0; m < e->n; m++) {
+        bt_member member;
+        bt_study_member(e->s, m, &member);
+        char *folder = NULL, *why;
+        if (asprintf(&folder, "%s/members/%s", e->o->dir, member.name) < 0) abort();
+        int code;
+        const bt_member_state state = bt_ensemble_state(folder, &code, &why);
+        count[state]++;
+        if (state == BT_MEMBER_FAILED) {
+            if (why) why[strcspn(why, "\n")] = 0;
+            if (count[BT_MEMBER_FAILED] <= 10) bt_errors_add(err, "member %s failed (%d): %s", member.name, code, why ? why : "no reason recorded");
+            if (worst == BT_OK) worst = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
+        }
+        free(why);
+        free(folder);
+        bt_member_free(&member);
+    }
+    if (count[BT_MEMBER_FAILED] > 10) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", count[BT_MEMBER_FAILED] - 10, e->o->dir);
+    if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", count[BT_MEMBER_WAITING]);
+    else if (count[BT_MEMBER_WAITING] && !e->o->quiet) printf("%" PRId64 " members are being worked on by other processes\n", count[BT_MEMBER_WAITING]);
+    if (!e->o->quiet) printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left; %s/ensemble.h5\n", count[BT_MEMBER_FINISHED], count[BT_MEMBER_FAILED], count[BT_MEMBER_WAITING], e->o->dir);
+    return worst;
+}
+
+/// Failed members that are to be tried again.
+static void forget_failures(const ensemble *e)
+{
+    for (int64_t i = 0; i < e->n; i++) {
+        char *path = bt_file_join(e->list[i].folder, "failed.txt");
+        unlink(path);
+        free(path);
+        e->list[i].settled = false;
+    }
+}
+
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+{
+    bt_status status = BT_OK;
+    if (s->ranks > comm->size) {
+        bt_errors_add(err, "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it", s->path, s->ranks, comm->size);
+        status = BT_ERR_CASE;
+    }
+    if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
+    status = bt_comm_agree(comm, status);
+    if (status != BT_OK) return status;
+
+    bt_comm group;
+    bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
+    const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
+    ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks};
+    e.threads = o->threads > 0 ? o->threads : (int)bt_max(1, (double)(sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here));
+    make_list(&e);
+    if (o->retry && comm->rank == 0) forget_failures(&e);
+    if (o->retry) bt_comm_rest(comm);
+    if (o->retry) for (int64_t i = 0; i < e.n; i++) e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
+    if (comm->rank == 0 && !o->quiet) {
+        printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64 " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
+               e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
+        fflush(stdout);
+    }
+    if (!idle) status = work(&e);
+    bt_comm_rest(comm);
+    status = bt_comm_agree(comm, status);
+    if (comm->rank == 0) {
+        const bt_status gathered = bt_ensemble_gather(s, o->dir, err);
+        status = tell_end(&e, status, err);
+        if (status == BT_OK) status = gathered;
+    }
+    bt_comm_split_end(&group);
+    for (int64_t i = 0; i < e.n; i++) {
+        bt_member_free(&e.list[i].m);
+        free(e.list[i].folder);
+    }
+    free(e.list);
+    return bt_comm_agree(comm, status);
+}

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: MIT
+"""bergtow estimate, the estimates in the summary of a run, and the Froude-scaled twin that bergtow check --scale prints."""
+import json
+import math
+
+import numpy as np
+import pytest
+
+from harness import CASE, DONE, TOW, USAGE, call, changed, run, write_case
+
+G = 9.81
+KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
+BERG = {
+    "run": {"dt": 5, "duration": 1000},
+    "domain": {"frame": "geographic", "length": 5000, "width": 2000},
+    "ice": {"concentration": 0.8, "size": 30, "size_spread": 0, "thickness": 1.0, "restitution": 0.3},
+    "body": {"shape": "rectangle", "length": 80, "width": 60, "draft": 50},
+    "tow": {"speed": 0.5},
+}
+
+
+def estimate(folder, case, *arguments):
+    result = call("estimate", write_case(folder, case), "--json", *arguments)
+    assert result.returncode == DONE, result.stderr
+    return json.loads(result.stdout)["estimates"]
+
+
+def by_formula(a, h, w, v, r, e, rho=910.0, rho_w=1027.0, p_star=20e3, p_s=13e3, kappa=11.0, phi=0.9):
+    """The formulas of include/bergtow/estimate.h, written down a second time."""
+    p = p_star * h * math.exp(-20 * (1 - a))
+    captured = a >= 0.9 and p >= p_s
+    return {
+        "lichey_hellmer": 0.0 if a <= 0.15 else p * w if captured else 0.5 * rho * h * w * v * v,
+        "marchenko_compaction": p * w if a else 0.0,
+        "marchenko_rafting": kappa * 0.5 * rho * (1 - rho / rho_w) * G * h * h * a * w,
+        "marchenko_momentum": rho * h * w * v * v * a * phi / (phi - a) if a < phi else None,
+        "dilute_limit": 4 / 3 * (1 + e) * a * rho * h * (w / 2 + r) * v * v,
+    }
+
+
+@pytest.mark.parametrize("a, h", [(0.1, 1.0), (0.5, 0.4), (0.8, 1.0), (0.92, 1.0), (0.94, 4.0)])
+def test_the_command_has_the_numbers_of_the_formulas(tmp_path, a, h):
+    found = estimate(tmp_path, changed(BERG, ice__concentration=a, ice__thickness=h))
+    for name, force in by_formula(a, h, 60, 0.5, 15, 0.3).items():
+        assert found[name]["force_n"] == (None if force is None else pytest.approx(force, rel=1e-12)), name
+        assert found[name]["formula"] and found[name]["source"] and found[name]["note"]
+    assert found["marchenko_rafting"]["high_n"] == pytest.approx(17 / 11 * found["marchenko_rafting"]["force_n"])
+    assert found["open_water_drag"]["force_n"] == pytest.approx((0.5 * 1027 * 0.85 * 50 * 60 + 1027 * 5e-4 * 4800) * 0.25)
+
+
+def test_curves_are_the_estimates_over_the_concentration(tmp_path):
+    curves = estimate(tmp_path, changed(BERG, ice__thickness=6.0))["curves"]
+    grid = np.array(curves["concentration"])
+    assert grid[0] == 0 and grid[-1] == 0.98 and np.all(np.diff(grid) > 0)
+    for name in KINDS[:-1]:
+        want = [by_formula(a, 6.0, 60, 0.5, 15, 0.3)[name] for a in grid]
+        for a, x, y in zip(grid, curves[name], want):
+            if y is None:
+                assert x is None, (name, a)
+            elif min(abs(a - 0.15), abs(a - 0.9)) > 1e-9:  # the grid is printed with 7 digits
+                assert x == pytest.approx(y, rel=2e-6, abs=1e-12), (name, a)
+    assert curves["valid_range"] == {"lichey_hellmer": [0.01, 0.98], "marchenko_compaction": [0.65, 0.98], "marchenko_rafting": [0.65, 0.98],
+                                     "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "open_water_drag": [0.01, 0.98]}
+    jump = grid.tolist().index(0.9)
+    assert curves["lichey_hellmer"][jump] > 10 * curves["lichey_hellmer"][jump - 1] > 0
+
+
+def test_a_table_for_readers(tmp_path):
+    result = call("estimate", write_case(tmp_path, BERG))
+    assert result.returncode == DONE
+    for word in ("Lichey-Hellmer", "6.825 kN", "Marchenko, compaction", "rafting", "momentum", "dilute limit", "not valid", "open-water drag", "P_s"):
+        assert word in result.stdout, word
+
+
+def test_what_has_no_estimate_is_refused(tmp_path):
+    for change in ({"tow__mode": "none", "tow__speed": None}, {"body": {"shape": "none"}, "tow": {}}):
+        result = call("estimate", write_case(tmp_path, changed(BERG, **change)))
+        assert result.returncode == CASE and "case.yml: " in result.stderr and ";" in result.stderr
+    assert call("estimate", write_case(tmp_path, changed(BERG, estimate__kappa=4))).returncode == CASE
+    assert call("estimate").returncode == USAGE
+
+
+def test_a_field_that_is_read_counts_as_it_is(tmp_path):
+    path = write_case(tmp_path, changed(TOW, ice__thickness_law="lognormal", ice__thickness_spread=0.5))
+    assert call("field", path, "-o", tmp_path / "f.h5").returncode == DONE
+    asked = estimate(tmp_path, TOW)
+    read = estimate(tmp_path, changed(TOW, ice={"field": "f.h5", "concentration": 0.1}))
+    assert read["concentration"] == pytest.approx(0.5, abs=0.005) and read["concentration"] != 0.1
+    assert asked["thickness_m"] == 0.04 and read["thickness_m"] != 0.04 and read["thickness_m"] == pytest.approx(0.04, rel=0.2)
+
+
+def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
+    r = run(tmp_path, changed(TOW, ice__restitution=0.2, output__window_start=5))
+    found, mean = r.summary["estimates"], r.summary["mean_ice_resistance_n"]
+    assert found["concentration"] == r.summary["concentration"]
+    area, h = r.dataset("floes/area"), r.dataset("floes/thickness")
+    assert found["thickness_m"] == pytest.approx(np.average(h, weights=area))
+    assert found["floe_radius_m"] == pytest.approx(np.average(np.sqrt(area / np.pi), weights=area))
+    want = by_formula(found["concentration"], found["thickness_m"], found["width_m"], 0.13, found["floe_radius_m"], 0.2)
+    for name, force in want.items():
+        assert found[name]["force_n"] == pytest.approx(force, rel=1e-12)
+        assert found[name]["simulated_over_estimate"] == pytest.approx(mean / force)
+    assert found["open_water_drag"]["simulated_over_estimate"] is None
+    for word in ("Lichey-Hellmer", "Marchenko, momentum", "open-water drag"):
+        assert word in r.result.stdout
+    drift = run(tmp_path, changed(TOW, tow={"mode": "none"}, water__current_x=0.1), name="drift")
+    assert drift.summary["estimates"]["lichey_hellmer"]["force_n"] is None and "Lichey" not in drift.result.stdout
+    nobody = run(tmp_path, changed(TOW, body={"shape": "none"}, tow={}), name="nobody")
+    assert nobody.summary["estimates"] is None
+
+
+def test_open_water_drag_is_what_a_tow_in_open_water_meets(tmp_path):
+    """The same law in src/forces.c and in the estimate, with a current at an angle, a body that is no disc, and the air taken away."""
+    case = changed(TOW, ice__concentration=0, body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20}, air__density=0,
+                   water={"current_x": -0.05, "current_y": 0.04}, output__window_start=10)
+    r = run(tmp_path, case)
+    assert r.summary["estimates"]["open_water_drag"]["force_n"] == pytest.approx(r.summary["mean_drag_force_n"], rel=1e-12)
+
+
+# ---- the twin ----
+
+def twin(folder, path, scale, name):
+    result = call("check", path, "--scale", scale)
+    assert result.returncode == DONE, result.stderr
+    (folder / name).write_text(result.stdout)
+    return folder / name
+
+
+LOOSE = changed(TOW, run__duration=60, tow={"mode": "line", "speed": 0.13, "line_stiffness": 2e4}, water__current_y=0.01, air__wind_x=1.0,
+                output__window_start=10)
+
+
+def dimensionless(a, b, L, tolerance):
+    """Every series and pose of b is that of a, scaled by the dimension of its units."""
+    exponents = {"m": 1, "rad": 0, "m/s": 0.5, "rad/s": -0.5, "s": 0.5, "N": 3, "N m": 4, "J": 4, "1": 0}
+    import h5py
+    with h5py.File(a.dir / "result.h5") as f, h5py.File(b.dir / "result.h5") as g:
+        for name in f["series"]:
+            if name == "momentum_residual":  # rounding of rounding
+                continue
+            x, y = f["series"][name][:], g["series"][name][:]
+            units = f["series"][name].attrs["units"]
+            units = units.decode() if isinstance(units, bytes) else units
+            scale = L ** exponents[units]
+            bound = tolerance * max(np.nanmax(np.abs(x), initial=0), 1e-30)
+            assert np.allclose(x * scale, y, rtol=0, atol=bound * scale, equal_nan=True), (name, np.nanmax(np.abs(y / scale - x)))
+        x, y = f["frames/pose"][:], g["frames/pose"][:]
+        assert np.allclose(x[:, :, :2] * L, y[:, :, :2], rtol=0, atol=tolerance * 15 * L)
+        assert np.allclose(x[:, :, 2], y[:, :, 2], rtol=0, atol=tolerance * 10)
+
+
+def test_a_twin_of_scale_4_is_the_case_to_rounding_of_the_units(tmp_path):
+    """Factors of 4, 2, 8, ... only change exponents of numbers: whatever differs has a length, time or mass of its own in the program."""
+    path = write_case(tmp_path, changed(LOOSE, ice__concentration=0.7))
+    a = run(tmp_path, path, name="a")
+    b = run(tmp_path, twin(tmp_path, path, "4", "twin.yml"), name="b")
+    assert a.summary["contacts_mean"] > 20
+    dimensionless(a, b, 4, 1e-15)
+    for name in KINDS:
+        if a.summary["estimates"][name]["valid"] and name != "open_water_drag":
+            assert b.summary["estimates"][name]["simulated_over_estimate"] == a.summary["estimates"][name]["simulated_over_estimate"]
+
+
+def test_a_twin_of_any_scale_is_the_case_to_rounding(tmp_path):
+    """Loose ice, and no shake: nothing that makes rounding grow by much."""
+    path = write_case(tmp_path, changed(LOOSE, ice__concentration=0.15, ice__shake=0, solver__tolerance=1e-8))
+    a = run(tmp_path, path, name="a")
+    b = run(tmp_path, twin(tmp_path, path, "30", "twin.yml"), name="b")
+    assert a.summary["mean_ice_resistance_n"] > 0
+    x, y = a.series("ice_resistance"), b.series("ice_resistance")
+    assert np.allclose(y / 27000, x, rtol=0, atol=1e-6 * x.max())
+    assert np.allclose(b.dataset("frames/pose")[-1][:, :2] / 30, a.dataset("frames/pose")[-1][:, :2], rtol=0, atol=1e-6)
+    assert b.summary["mean_ice_resistance_n"] / 27000 == pytest.approx(a.summary["mean_ice_resistance_n"], rel=1e-6)
+
+
+def test_there_and_back_is_the_resolved_case(tmp_path):
+    path = write_case(tmp_path, changed(LOOSE, floes=[{"x": 13, "y": 3, "length": 0.3}], water__latitude=70))
+    once = twin(tmp_path, path, "16", "once.yml")
+    back = twin(tmp_path, once, "1/16", "back.yml").read_text()
+    same = twin(tmp_path, path, "1", "same.yml").read_text()
+    lines = [[line for line in text.splitlines() if not line.startswith("#")] for text in (same, back)]
+    assert lines[0] == lines[1] and len(lines[0]) > 100
+    assert "Coriolis" in once.read_text() and "Reynolds" in once.read_text()
+
+
+@pytest.mark.parametrize("scale", ["0", "-3", "x", "3x", "1/0", "1/", "nan", "inf", "1e9"])
+def test_scales_that_are_none_are_refused(tmp_path, scale):
+    result = call("check", write_case(tmp_path, LOOSE), f"--scale={scale}")
+    assert result.returncode == USAGE and "length ratio" in result.stderr and not result.stdout
+
+
+def test_a_twin_out_of_range_is_refused(tmp_path):
+    result = call("check", write_case(tmp_path, BERG), "--scale", "10000")
+    assert result.returncode == CASE and "domain.length: becomes" in result.stderr and not result.stdout

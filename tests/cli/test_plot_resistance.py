@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""postproc/plot_resistance.py: points, curves and table of made-up runs, and what it refuses."""
+import json
+
+import matplotlib
+import numpy as np
+import pytest
+
+from harness import DONE, call, changed, write_case
+from test_postproc import done, make_run, pixels, script, where
+
+import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
+import style  # noqa: E402
+
+BERG = {"run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
+        "ice": {"size": 30, "size_spread": 0, "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}}
+
+
+def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
+    """A run with the estimates of the program and a mean of the test's own."""
+    run = make_run(folder)
+    result = call("estimate", "--json", write_case(folder, changed(case, ice__concentration=concentration)))
+    assert result.returncode == DONE, result.stderr
+    numbers = json.loads((run / "summary.json").read_text())
+    numbers |= {"estimates": json.loads(result.stdout)["estimates"], "mean_ice_resistance_n": mean, "mean_ice_resistance_se_n": se,
+                "concentration": concentration, "warnings": [], "reference": None} | summary
+    (run / "summary.json").write_text(json.dumps(numbers))
+    return run
+
+
+@pytest.fixture
+def runs(tmp_path):
+    return [made_up(tmp_path / "a", 0.1, 2e3), made_up(tmp_path / "b", 0.5, 4e4), made_up(tmp_path / "c", 0.5, 6e4, warnings=["a doubt"]),
+            made_up(tmp_path / "d", 0.95, 8e5, unconverged_steps=3)]
+
+
+def test_the_picture_has_points_bars_and_curves(runs):
+    points = [plot_resistance.read(run) for run in runs]
+    axes = plot_resistance.draw(points).axes[0]
+    lines = {line.get_label(): line for line in axes.lines}
+    scale = 1e3  # kN
+    for name, (label, _) in plot_resistance.ESTIMATES.items():
+        a, force = plot_resistance.curve(points[0], name)
+        low, high = points[0].estimates["curves"]["valid_range"][name]
+        y = np.asarray(lines[label].get_ydata(), dtype=float)
+        drawn = np.isfinite(y)
+        assert np.array_equal(drawn, (a >= low) & (a <= high) & (force > 0)), name
+        assert np.allclose(y[drawn] * scale, force[drawn], rtol=1e-12), name
+    [bars] = axes.containers
+    assert list(bars[0].get_xdata()) == [0.1, 0.5, 0.5, 0.95]
+    assert np.allclose(bars[0].get_ydata(), [2, 40, 60, 800])
+    top = [segment[1][1] for segment in bars[2][0].get_segments()]
+    assert np.allclose(top, [2 + 1.96, 40 + 1.96, 60 + 1.96, 800 + 1.96])
+    mean = lines["mean of the seeds"]
+    assert list(mean.get_xdata()) == [0.5] and np.allclose(mean.get_ydata(), [50])
+    low, high = axes.get_ylim()
+    assert axes.get_yscale() == "log" and 0.04 - 1e-9 < low < 2 and 800 < high < 8000
+    least = points[1].estimate("lichey_hellmer")  # the smallest of what is meant for 50 %
+    assert np.isclose(plot_resistance.limits(points[1:3], True)[0], least / 2.5)
+    assert plot_resistance.draw(points, log=False).axes[0].get_yscale() == "linear"
+
+
+def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
+    done(script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--table", tmp_path / "new/r.md"), tmp_path / "r.png", tmp_path / "new/r.md")
+    head, _, *lines = (tmp_path / "new/r.md").read_text().splitlines()
+    cells = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
+    assert [c.strip() for c in head.strip("|").split("|")][:5] == ["ice, %", "runs", "simulated, N", "standard error, N", "Lichey–Hellmer 2001"]
+    assert [c[0] for c in cells] == ["10", "50", "95"] and [c[1] for c in cells] == ["1", "2", "1"]
+    assert cells[0][2:5] == ["2000", "1e+03", "0"]
+    assert cells[1][2:4] == ["5e+04", "1e+04"]  # scatter of 40 and 60 kN: 14.1 / sqrt 2
+    width = plot_resistance.read(runs[0]).estimates["width_m"]
+    drag = 0.5 * 910 * width * 0.25
+    assert cells[1][4] == f"{drag:.3g} ({5e4 / drag:.3g})"
+    assert cells[1][5].split()[0].endswith("*") and not cells[2][5].split()[0].endswith("*")  # compaction of loose and of dense ice
+    assert cells[2][7] == "–"  # momentum beyond phi
+    assert cells[2][9] == "3 %" and cells[1][10] == "1"
+    picture = pixels(tmp_path / "r.png")
+    for colour in (style.ICE, style.TOW, style.INERTIA, style.DRAG):
+        assert len(where(picture, colour)[0]) > 100
+
+
+def test_the_default_place_is_beside_the_first_run(runs, tmp_path):
+    done(script("plot_resistance.py", *runs), tmp_path / "resistance.png")
+
+
+def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
+    points = [plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)), plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))]
+    figure = plot_resistance.draw(points)
+    assert any("1 run(s) without resistance" in text.get_text() for text in figure.texts)
+    assert "–" in plot_resistance.table(points).splitlines()[2]
+    matplotlib.pyplot.close(figure)
+
+
+def test_runs_of_other_conditions_are_refused(runs, tmp_path):
+    thick = made_up(tmp_path / "thick", 0.7, 1e5, case=changed(BERG, ice__thickness=1.2))
+    result = script("plot_resistance.py", *runs, thick, "-o", tmp_path / "r.png")
+    assert result.returncode == 4 and "thick: has other conditions" in result.stderr and ";" in result.stderr
+    assert not (tmp_path / "r.png").exists()
+
+
+@pytest.mark.parametrize("spoil, words", [
+    (lambda s: s.pop("estimates"), "holds no estimates"),
+    (lambda s: s["estimates"]["lichey_hellmer"].update(force_n=None), "not towed"),
+    (lambda s: s.update(mean_ice_resistance_n=None), "no mean ice resistance"),
+])
+def test_runs_without_the_numbers_are_refused(tmp_path, spoil, words):
+    run = made_up(tmp_path / "a", 0.5, 4e4)
+    summary = json.loads((run / "summary.json").read_text())
+    spoil(summary)
+    (run / "summary.json").write_text(json.dumps(summary))
+    result = script("plot_resistance.py", run)
+    assert result.returncode == 4 and words in result.stderr and "Traceback" not in result.stderr
+
+
+def test_usage(tmp_path):
+    assert script("plot_resistance.py").returncode == 2
+    result = script("plot_resistance.py", tmp_path, "-o", "r.txt")
+    assert result.returncode == 2 and "unknown kind of file" in result.stderr
+
+
+def test_contents_lists_the_estimates_without_their_curves(runs):
+    result = script("contents.py", runs[0])
+    assert result.returncode == 0
+    assert "estimates.lichey_hellmer.force_n" in result.stdout and "curves" not in result.stdout
