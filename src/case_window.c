@@ -31,25 +31,30 @@ const char *bt_case_window_fault(const bt_case *c, bool ahead_given, double x_mi
         return "domain.ahead";
     }
     if (c->body.shape == BT_BODY_ABSENT || c->tow.mode == BT_TOW_NONE) {
-        snprintf(why, 256, "moving follows a body that is towed, and here is none (body.shape, tow.mode); set domain.ends: periodic or open, or tow a body");
+        snprintf(why, 256, "moving follows a body that is towed, and here is none (body.shape, tow.mode); "
+                           "set domain.ends: periodic or open, or tow a body");
         return "domain.ends";
     }
     if (fabs(cos(c->tow.direction)) < 0.5) {
-        snprintf(why, 256, "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open", c->tow.direction * 180 / BT_PI);
+        snprintf(why, 256, "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
+                 c->tow.direction * 180 / BT_PI);
         return "tow.direction";
     }
     if (sign * c->water.current_x > 0 && sign * c->water.current_x >= c->tow.speed * fabs(cos(c->tow.direction))) {
-        snprintf(why, 256, "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; set domain.ends: periodic or open", c->water.current_x);
+        snprintf(why, 256, "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
+                           "set domain.ends: periodic or open", c->water.current_x);
         return "water.current_x";
     }
     const double front = sign > 0 ? x_max : -x_min, stern = sign > 0 ? -x_min : x_max;
     if (ahead < front + room * floe || length - ahead < stern + room * floe) {
-        snprintf(why, 256, "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; move the body or take a longer domain",
+        snprintf(why, 256, "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; "
+                           "move the body or take a longer domain",
                  ahead, length, room, room * floe);
         return "domain.ahead";
     }
     if (c->domain.sides_closing != 0) {
-        snprintf(why, 256, "%g m/s: closing walls leave no room for the ice that enters a moving window; remove the key, or set domain.ends: periodic", c->domain.sides_closing);
+        snprintf(why, 256, "%g m/s: closing walls leave no room for the ice that enters a moving window; remove the key, or set "
+                           "domain.ends: periodic", c->domain.sides_closing);
         return "domain.sides_closing";
     }
     for (bt_idx i = 0; i < c->n_floes; i++) {

@@ -142,7 +142,8 @@ static candidate *collect(const bt_world *w, size_t *n, double **corner)
             const bt_pose p = place_of(w, i, &turns);
             const int64_t count = b->offset[i + 1] - b->offset[i];
             if (pass)
-                mine[m] = (candidate){.gid = b->gid[i], .place = p, .radius = b->radius[i], .mass = b->mass[i], .inertia = b->inertia[i], .was = b->vel[i], .n = count};
+                mine[m] = (candidate){.gid = b->gid[i], .place = p, .radius = b->radius[i], .mass = b->mass[i],
+                                      .inertia = b->inertia[i], .was = b->vel[i], .n = count};
             m++;
             for (int64_t k = 0; pass && k < count; k++) {
                 const double *q = b->vertices + 2 * (b->offset[i] + k);
@@ -165,7 +166,10 @@ static candidate *collect(const bt_world *w, size_t *n, double **corner)
     return list;
 }
 
-static candidate *find(candidate *list, size_t n, bt_gid gid) { return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL; }
+static candidate *find(candidate *list, size_t n, bt_gid gid)
+{
+    return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
+}
 
 /// Mark the places that body i, where it is, does not leave free.
 static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t n, const double *corner, double *blocked)

@@ -35,7 +35,8 @@ static void add_body(bt_world *w, int n, double *v, double x, double speed)
 static void wedge_in_dilute_ice(void **state)
 {
     (void)state;
-    const double beam = 10, r = 0.4, speed = 0.5, a = 0.003, alpha = 30 * BT_PI / 180, c = cos(alpha), y0 = 1, half = 0.5 * beam + r + 1.5; // ice at y0 <= |y| <= half
+    const double beam = 10, r = 0.4, speed = 0.5, a = 0.003, alpha = 30 * BT_PI / 180, c = cos(alpha);
+    const double y0 = 1, half = 0.5 * beam + r + 1.5; // ice at y0 <= |y| <= half
     const int n = 200;
     const double length = n * BT_PI * r * r / (a * 2 * (half - y0)), nose = 0.5 * beam / tan(alpha);
     bt_params p = scene_params(0.5, 1);
@@ -46,7 +47,8 @@ static void wedge_in_dilute_ice(void **state)
     double v[6] = {nose, 0, 0, 0.5 * beam, 0, -0.5 * beam};
     const double ahead = 0.6 * length, body = length - ahead;
     for (int k = 0; k < n; k++) { // strata along x, a low-discrepancy sequence across
-        const double x = length * (k + 0.5) / n, u = 2 * fmod(0.618033988749895 * k, 1) - 1, y = u * (half - y0) + (u < 0 ? -y0 : y0);
+        const double x = length * (k + 0.5) / n, u = 2 * fmod(0.618033988749895 * k, 1) - 1;
+        const double y = u * (half - y0) + (u < 0 ? -y0 : y0);
         if (fabs(x - body) > nose) add_floe(w, r, x, y, 7 * scene_uniform(&rng), 1e6, 0);
     }
     const bt_gid floes = w->bodies.n_global;
@@ -65,9 +67,10 @@ static void wedge_in_dilute_ice(void **state)
     way = w->tow->travel_x - way;
     // The floes that stand: without those taken out for the body.
     const double density = floes * BT_PI * r * r / (length * 2 * (half - y0));
-    const double want = density * sheet * speed * 2 * ((0.5 * beam + r * c - y0) * sin(alpha) * sin(alpha) + r * (2.0 / 3 - c + c * c * c / 3));
-    print_message("force %.4f want %.4f; renewed %d kept %d missed %d\n", (impulse[0] - before) / way * speed, want * speed, (int)w->window->renewed,
-                  (int)w->window->kept, (int)w->window->missed);
+    const double want =
+        density * sheet * speed * 2 * ((0.5 * beam + r * c - y0) * sin(alpha) * sin(alpha) + r * (2.0 / 3 - c + c * c * c / 3));
+    print_message("force %.4f want %.4f; renewed %d kept %d missed %d\n", (impulse[0] - before) / way * speed, want * speed,
+                  (int)w->window->renewed, (int)w->window->kept, (int)w->window->missed);
     CHECK_CLOSE((impulse[0] - before) / way, want, 0.02 * want);
     assert_true(w->window->renewed > 4 * (int64_t)floes && w->window->missed + w->window->kept == 0);
     // Momentum: what the body gave is in the floes, or was dropped with them; they came in at rest.
@@ -127,9 +130,8 @@ static void as_in_one_long_domain(void **state)
         worst = bt_max(worst, fabs(impulse[0] - impulse[1]));
         largest = bt_max(largest, s[1].ice_resistance);
     }
-    print_message("mean force %.6f, in the long domain %.6f N (largest %.3g), worst difference of the impulse %.3g of %.3g N s; renewed %d kept %d missed %d\n",
-                  impulse[0] / w[0]->tow->time, impulse[1] / w[1]->tow->time, largest, worst, impulse[1], (int)w[0]->window->renewed, (int)w[0]->window->kept,
-                  (int)w[0]->window->missed);
+    print_message("mean force %.6f, in the long domain %.6f N (largest %.3g), worst difference of the impulse %.3g of %.3g N s\n",
+                  impulse[0] / w[0]->tow->time, impulse[1] / w[1]->tow->time, largest, worst, impulse[1]);
     assert_true(w[0]->window->renewed > 2 * n && w[0]->window->kept + w[0]->window->missed == 0);
     assert_true(impulse[1] > 0);
     assert_true(worst <= 1e-7 * impulse[1]);
