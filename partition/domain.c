@@ -278,6 +278,14 @@ void bt_domain_reduce(const bt_world *w, bt_totals *t)
     w->domain->exchange_s += bt_clock() - t0;
 }
 
+double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total)
+{
+    const double t0 = bt_clock();
+    double *all = bt_comm_gather(w->domain->comm, n, width, rows, total);
+    w->domain->exchange_s += bt_clock() - t0;
+    return all;
+}
+
 uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x)
 {
     if (!w->domain) return x;

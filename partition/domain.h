@@ -51,6 +51,9 @@ void bt_domain_reduce(const bt_world *w, bt_totals *t);
 /// Sum modulo 2⁶⁴ over the ranks. Collective.
 uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x);
 
+/// Rows of doubles [n][width] of all ranks to rank 0, see bt_comm_gather; only with a division. Collective.
+double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total);
+
 /// Is a new division due?
 bool bt_domain_due(const bt_world *w);
 /// After labelling: choose owners, move bodies (owned and ghosts) and traces to where they belong now. Takes and returns the traces. Collective.
@@ -69,7 +72,7 @@ void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
 void bt_domain_settle(bt_world *w);
 
 /// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the caller frees. Collective.
-void *bt_domain_gather(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);
+void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);
 
 /// Largest value of every body over the ranks that hold it: x [n bodies]. Collective.
 void bt_domain_largest(const bt_world *w, double *x);

@@ -58,7 +58,7 @@ static void *gather(const bt_comm *c, const void *mine, size_t n, size_t size, s
     return all;
 }
 
-void *bt_domain_gather(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all)
+void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all)
 {
     if (w->domain) return gather(w->domain->comm, mine, n, size, n_all);
     char *copy = bt_realloc(NULL, n * size + 1, 1);

@@ -27,9 +27,9 @@ _UNITS = {
     "m/s": (1, 1), "cm/s": (1, 100), "mm/s": (1, 1000), "km/h": (1000, 3600), "kn": (1852, 3600),
     "s": (1, 1), "ms": (1, 1000), "min": (60, 1), "h": (3600, 1), "d": (86400, 1),
     "rad": (1, 1), "deg": (np.pi, 180), "°": (np.pi, 180),
-    "N": (1, 1), "kN": (1e3, 1), "MN": (1e6, 1), "GN": (1e9, 1),
+    "N": (1, 1), "kN": (1e3, 1), "MN": (1e6, 1), "GN": (1e9, 1), "Pa": (1, 1), "kPa": (1e3, 1), "MPa": (1e6, 1),
 }
-_ANGLES = ("tow.direction", "body.yaw", "water.latitude")
+_ANGLES = ("tow.direction", "body.yaw", "water.latitude", "impact.corner_angle")
 
 
 class RunError(Exception):
@@ -322,6 +322,25 @@ class Run:
     def towed(self):
         """Index of the towed body in bodies, or None."""
         return next((i for i, body in enumerate(self.bodies) if body.towed), None)
+
+    # ---- loads on the towed body
+
+    def _group(self, name, meaning):
+        """Attributes and data sets of a group as one dict."""
+        node = self._file.get(name)
+        if not isinstance(node, h5py.Group):
+            raise RunError(self.result, f"has no /{name}", f"{meaning}: run a case with a towed body and impact.conversion other than none")
+        return {**{k: _plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
+
+    @property
+    def impacts(self):
+        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", what a peak means."""
+        return self._once("impacts", lambda: self._group("impacts", "collisions were not told apart"))
+
+    @property
+    def panels(self):
+        """Panels of the hull: dict of "ends" [P+1, 2], "middle" and "normal" [P, 2], body frame, m; loads "mean_load", "max_load", ... [P] N."""
+        return self._once("panels", lambda: self._group("panels", "loads by panel were not kept"))
 
     # ---- frames
 

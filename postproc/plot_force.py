@@ -91,23 +91,30 @@ def mark_window(axes, run):
 
 
 def draw_balance(axes, run, factor, unit):
-    """Running means of the forces on the towed body along the tow: tow = ice + drag + inertia."""
+    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + inertia.
+
+    Coriolis force and tilt are drawn where they reach a hundredth of the tow.
+    """
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
     for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 2.8, None),
                                                ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
                                                ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
+                                               ("coriolis_force", "Coriolis", style.CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
+                                               ("tilt_force", "tilt", style.TILT, 1.6, (1, 1)),
                                                ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))):
         if name in run:
-            line, = axes.plot(run["time"], running_mean(run[name], samples) / factor, color=colour, linewidth=width,
-                              label=label)
+            mean = running_mean(run[name], samples)
+            if name in ("coriolis_force", "tilt_force") and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
+                continue
+            line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=label)
             if dashes:
                 line.set_dashes(dashes)
     axes.set_ylabel(f"running mean ({unit})")
     axes.grid(axis="y")
     axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=4, borderaxespad=0.2, handlelength=2.2,
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=6, borderaxespad=0.2, handlelength=2.2,
                 columnspacing=1.6)
 
 

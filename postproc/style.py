@@ -29,6 +29,8 @@ ICE = "#0072b2"       # ice resistance
 TOW = "#d55e00"       # tow force
 DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
+CORIOLIS = "#b8860b"  # Coriolis force
+TILT = "#4d4d4d"      # force of the sea-surface tilt
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 

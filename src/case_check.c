@@ -6,6 +6,7 @@
 #include "case_check.h"
 
 #include "bergtow/shape.h"
+#include "bergtow/environment.h"
 #include "schema.h"
 
 #include <math.h>
@@ -130,17 +131,17 @@ static char outside(const bt_case *c, box b, double x, double y)
 
 // ---- defaults that follow from other keys ----
 
-// The field file relative to the folder of the case file, as an absolute path: the resolved file lies elsewhere.
-static void follow_field(bt_case *c)
+// A file that the case names, relative to the folder of the case file, as an absolute path: the resolved file lies elsewhere.
+static void follow_file(const bt_case *c, char **file)
 {
-    if (!c->ice.field || c->ice.field[0] == '/') return;
+    if (!*file || **file == '/') return;
     const char *slash = c->path ? strrchr(c->path, '/') : NULL;
     char *folder = slash == c->path && slash ? strdup("/") : slash ? strndup(c->path, (size_t)(slash - c->path)) : strdup(".");
     char *absolute = folder ? realpath(folder, NULL) : NULL;
     char *joined = NULL;
-    if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", c->ice.field) >= 0) {
-        free(c->ice.field);
-        c->ice.field = joined;
+    if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", *file) >= 0) {
+        free(*file);
+        *file = joined;
     }
     free(absolute);
     free(folder);
@@ -184,7 +185,9 @@ static void follow(bt_case *c)
         fill(&f->thickness, c->ice.thickness);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
-    follow_field(c);
+    follow_file(c, &c->ice.field);
+    follow_file(c, &c->water.current_table);
+    follow_file(c, &c->air.wind_table);
 }
 
 // ---- checks ----
@@ -342,15 +345,11 @@ static void check_path(const check *k, int n, const double *v)
     fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
-static void check_window(const check *k, int n, const double *v)
+// After check_tow: the reference speed goes by it.
+static void follow_impact(bt_case *c)
 {
-    const bt_case *c = k->c;
-    if (!sound(k, "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction tow.speed water.current_x body.x body.shape ice.size")) return;
-    if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // reported by check_body
-    box b = n ? bounds_of(n, v, 0, 0, c->body.yaw) : (box){0};
-    char why[256];
-    const char *key = bt_case_window_fault(c, given(k, "domain.ahead"), b.x_min, b.x_max, why);
-    if (key) fault(k, key, "%s", why);
+    fill(&c->impact.duration, c->run.dt);
+    fill(&c->impact.least_speed, 0.05 * bt_case_reference_speed(c));
 }
 
 static void check_water(const check *k)
@@ -412,6 +411,8 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
     follow(c);
+    bt_status loaded = bt_case_load_tables(c, err);
+    size_t at_files = err->n;
     check_run(&k);
     check_domain(&k);
     check_region(&k);
@@ -421,12 +422,15 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bool placed = check_body(&k, &n, v);
     follow_hull(c, n, v);
     check_tow(&k);
+    follow_impact(c);
     if (placed) check_path(&k, n, v);
-    check_window(&k, n, v);
+    bt_case_check_window(c, n, v, from, err);
     check_water(&k);
+    bt_case_check_environment(c, from, err);
+    bt_case_check_lead(c, n, v, from, err);
     check_estimate(&k);
     for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
-    return err->n == before ? BT_OK : BT_ERR_CASE;
+    return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 
 bt_status bt_case_finish(bt_case *c, bt_errors *err) { return bt_case_check(c, NULL, err); }
@@ -480,10 +484,10 @@ double bt_case_reference_speed(const bt_case *c)
     if (c->solver.reference_speed > 0) return c->solver.reference_speed;
     if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
-    u = bt_max(u, hypot(c->water.current_x, c->water.current_y));
+    u = bt_max(u, bt_environment_fastest(c, true));
     u = bt_max(u, hypot(c->body.vx, c->body.vy));
     for (bt_idx i = 0; i < c->n_floes; i++) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
-    u = bt_max(u, 0.02 * hypot(c->air.wind_x, c->air.wind_y));
+    u = bt_max(u, 0.02 * bt_environment_fastest(c, false));
     return u > 0 ? u : 0.1;
 }

@@ -5,6 +5,7 @@
 #include "bergtow/shape.h"
 #include "fileio.h"
 #include "schema.h"
+#include "table.h"
 #include "tree.h"
 #include "value.h"
 
@@ -240,17 +241,21 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     for (int i = 0; i < n; i++) read_override(&r, overrides[i]);
     read_given(&r);
     read_floes(&r);
-    bt_case_check(c, r.from, err);
+    size_t in_file = err->n;
+    status = bt_case_check(c, r.from, err);
+    if (in_file > before) status = BT_ERR_CASE;
     free(r.from);
     free(r.given);
     bt_tree_free(root);
-    return err->n == before ? BT_OK : BT_ERR_CASE;
+    return status;
 }
 
 void bt_case_free(bt_case *c)
 {
     bt_schema_release(bt_case_keys, bt_n_case_keys, c);
     for (bt_idx i = 0; i < c->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
+    bt_table_free(&c->water.table);
+    bt_table_free(&c->air.table);
     free(c->floes);
     free(c->path);
     free(c->text);

@@ -4,6 +4,7 @@
 #include <stdio.h>
 
 #include "case_check.h"
+#include "schema.h"
 
 static const double share_ahead = 0.6; // of the window, assumed
 static const double room = 4;          // floe sizes of ice ahead and behind, at least
@@ -22,7 +23,8 @@ void bt_case_window_follow(bt_case *c)
     if (isnan(c->body.x)) c->body.x = sign > 0 ? c->domain.x0 + length - ahead : c->domain.x0 + ahead;
 }
 
-const char *bt_case_window_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256])
+/// First fault: its key, and why with remedy; NULL = none. The body reaches from x_min to x_max about its centroid.
+static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256])
 {
     const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length, floe = c->ice.size;
     if (c->domain.ends != BT_BOUND_MOVING) {
@@ -63,4 +65,30 @@ const char *bt_case_window_fault(const bt_case *c, bool ahead_given, double x_mi
         return "domain.ends";
     }
     return NULL;
+}
+
+static const bt_origin *origin(const bt_origin *from, const char *key)
+{
+    return from ? &from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
+}
+
+void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err)
+{
+    static const char *const used[] = {"domain.ends", "domain.length", "domain.x0", "domain.ahead", "domain.sides_closing", "tow.mode",
+                                       "tow.direction", "tow.speed", "water.current_x", "body.x", "body.yaw", "body.shape", "ice.size"};
+    for (size_t k = 0; from && k < sizeof used / sizeof *used; k++)
+        if (origin(from, used[k])->faulty) return;
+    if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
+    double x_min = 0, x_max = 0;
+    for (int k = 0; k < n; k++) {
+        const double x = cos(c->body.yaw) * v[2 * k] - sin(c->body.yaw) * v[2 * k + 1];
+        x_min = bt_min(x_min, x);
+        x_max = bt_max(x_max, x);
+    }
+    const bt_origin *ahead = origin(from, "domain.ahead");
+    char why[256], where[256];
+    const char *key = find_fault(c, ahead && (ahead->line > 0 || ahead->set), x_min, x_max, why);
+    if (!key) return;
+    bt_case_locate(c, origin(from, key), key, where);
+    bt_errors_add(err, "%s: %s", where, why);
 }

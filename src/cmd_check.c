@@ -3,7 +3,9 @@
 //
 // Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full scale) and
 // much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
+#include "bergtow/environment.h"
 #include "bergtow/field.h"
+#include "bergtow/lead.h"
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
@@ -122,6 +124,37 @@ static void print_window(const bt_case *c)
            c->domain.length - c->domain.ahead, way / c->domain.length);
 }
 
+/// With a field file as it will be; of a field that is still to be made, the strip.
+static bt_status print_lead(const bt_case *c, bt_field *f, bt_errors *err)
+{
+    if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
+    printf("lead                 %s, %.4g m wide, %.4g m long, %.4g m2 of strip", c->lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed", c->lead.width, c->lead.length,
+           c->lead.width * c->lead.length);
+    if (c->lead.mode == BT_LEAD_MANAGED) printf(", pieces of at most %.4g m", c->lead.floe_size);
+    printf("\n");
+    if (!c->ice.field) return BT_OK;
+    bt_lead_stats s;
+    bt_status status = bt_lead_open(c, f, &s, err);
+    if (status == BT_OK) bt_lead_stats_print(&s);
+    return status;
+}
+
+static void print_environment(const bt_case *c)
+{
+    static const char *const names[] = {"wind", "current"};
+    for (int water = 1; water >= 0; water--) {
+        double v[2];
+        bt_environment_at(c, water, 0, v);
+        const double most = bt_environment_fastest(c, water);
+        const bt_table *t = water ? &c->water.table : &c->air.table;
+        if (most == 0) continue;
+        printf("%-20s (%.4g, %.4g) m/s at the start", names[water], v[0], v[1]);
+        if (t->n > 0) printf(", table of %" PRId64 " rows to %g s, at most %.4g m/s", t->n, t->row[3 * (t->n - 1)], most);
+        else if (water && c->water.tide.major > 0) printf(", tide of %.4g m/s in %.4g h", c->water.tide.major, c->water.tide.period / 3600);
+        printf("\n");
+    }
+}
+
 static void print_step(const bt_case *c, const ice_numbers *n)
 {
     double speed = bt_case_reference_speed(c), dt = c->run.dt;
@@ -130,8 +163,9 @@ static void print_step(const bt_case *c, const ice_numbers *n)
     double longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5;
     printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(dt <= longest));
     if (n->count < 1) return;
-    double passed = dt * speed / n->size;
-    printf("time step, floes     moves %.3g floe sizes a step, at most 0.1 (%.3g s to pass a floe): %s\n", passed, n->size / speed, verdict(passed <= 0.1));
+    const bool pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size;
+    const double size = pieces ? c->lead.floe_size : n->size, passed = dt * speed / size;
+    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", passed, pieces ? "pieces of the lead" : "floe sizes", size / speed, verdict(passed <= 0.1));
 }
 
 static void print_cost(const bt_case *c, const ice_numbers *n)
@@ -144,7 +178,7 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
     printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
 }
 
-static void print_numbers(const char *path, const bt_case *c, const bt_field *f)
+static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
     const ice_numbers n = c->ice.field ? ice_of_field(c, f) : ice_of_case(c);
     printf("%s: valid\n", path);
@@ -153,8 +187,11 @@ static void print_numbers(const char *path, const bt_case *c, const bt_field *f)
     print_ice(c, &n);
     print_body(c);
     print_window(c);
+    print_environment(c);
+    const bt_status status = print_lead(c, f, err);
     print_step(c, &n);
     print_cost(c, &n);
+    return status;
 }
 
 static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
@@ -178,7 +215,7 @@ int bt_cmd_check(int argc, char **argv)
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
     if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
-    else if (status == BT_OK) print_numbers(o.file.path, &c, &f);
+    else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
     bt_field_free(&f);
     bt_case_free(&c);
     free(o.file.set);

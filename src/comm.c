@@ -367,3 +367,31 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
     free(numbers);
     return bt_comm_agree(c, status);
 }
+
+double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total)
+{
+    const size_t bytes = (size_t)width * sizeof *rows;
+    double *all = NULL;
+    if (c->size == 1) {
+        *total = n;
+        all = bt_alloc((size_t)n, bytes);
+        if (n > 0) memcpy(all, rows, (size_t)n * bytes);
+        return all;
+    }
+    int mine = (int)n, *counts = NULL, *starts = NULL;
+    *total = 0;
+    if (c->rank == 0) counts = bt_alloc(2 * (size_t)c->size, sizeof *counts);
+    MPI_Gather(&mine, 1, MPI_INT, counts, 1, MPI_INT, 0, c->mpi);
+    if (c->rank == 0) {
+        starts = counts + c->size;
+        *total = running_sum(c->size, counts, starts);
+        all = bt_alloc((size_t)*total, bytes);
+    }
+    MPI_Datatype row;
+    MPI_Type_contiguous(width, MPI_DOUBLE, &row);
+    MPI_Type_commit(&row);
+    MPI_Gatherv(rows, mine, row, all, counts, starts, row, 0, c->mpi);
+    MPI_Type_free(&row);
+    free(counts);
+    return all;
+}

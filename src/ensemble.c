@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,6 +41,12 @@ typedef struct {
     bt_errors *err;
 } ensemble;
 
+// A run has handlers of its own, which end it after a step; these are for the time between runs.
+static volatile sig_atomic_t told;
+static void on_signal(int number) { told = number; }
+static const int caught[] = {SIGINT, SIGTERM, SIGUSR1};
+enum { N_CAUGHT = sizeof caught / sizeof *caught };
+
 // --- files of a member -----------------------------------------------------------------------------------------------
 
 static bool there(const char *folder, const char *name)
@@ -54,7 +61,7 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
 {
     if (why) *why = NULL;
     if (code) *code = 0;
-    if (there(folder, "summary.json")) return BT_MEMBER_FINISHED;
+    if (there(folder, "finished")) return BT_MEMBER_FINISHED;
     if (!there(folder, "failed.txt")) return BT_MEMBER_WAITING;
     char *path = bt_file_join(folder, "failed.txt"), *text;
     size_t size;
@@ -79,10 +86,10 @@ static int open_in(const char *folder, const char *name, int flags)
 }
 
 /// Lock of an open file: the system lifts it when the process ends.
-static bool try_lock(int fd)
+static bool take_lock(int fd, bool wait)
 {
     struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    return fcntl(fd, F_OFD_SETLK, &l) == 0;
+    return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
 }
 
 /// Starts of a member that had no end: one byte each.
@@ -190,6 +197,8 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
     if (!text) return BT_ERR_CASE;
     char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"), *copy = bt_file_join(o->dir, "study.yml");
     bt_status status = bt_file_make_dir(members, err);
+    const int fd = status == BT_OK ? open_in(o->dir, "lock", O_RDWR | O_CREAT) : -1;
+    if (fd >= 0) take_lock(fd, true); // calls that begin together
     if (status == BT_OK && access(path, F_OK) == 0) {
         char *before;
         size_t size;
@@ -203,6 +212,7 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
         status = bt_file_write(path, text, err);
     }
     if (status == BT_OK) status = bt_file_write(copy, s->text, err);
+    if (fd >= 0) close(fd);
     free(members);
     free(path);
     free(copy);
@@ -230,7 +240,7 @@ static int64_t claim(ensemble *e)
             bt_file_fail(x->folder, "make a lock in the folder", errno, e->err);
             return -2;
         }
-        if (!try_lock(fd)) { // somebody is at it
+        if (!take_lock(fd, false)) { // somebody is at it
             close(fd);
             continue;
         }
@@ -293,6 +303,11 @@ static bt_status run_member(ensemble *e, entry *x)
     if (first) {
         const double wall = bt_clock() - t0;
         forget_attempts(x->folder);
+        if (status == BT_OK) {
+            char *done = bt_file_join(x->folder, "finished");
+            status = bt_file_write(done, "", &why);
+            free(done);
+        }
         if (status != BT_OK && status != BT_ERR_SIGNAL) {
             bt_errors unheard = {0};
             // Where not even that can be written (a full disk) the member stays open, and the next call tries it again.
@@ -311,7 +326,7 @@ static void gather_now_and_then(ensemble *e)
     if (bt_clock() - e->gathered < GATHER_SECONDS) return;
     const int fd = open_in(e->o->dir, "lock", O_RDWR | O_CREAT);
     bt_errors unheard = {0}; // at the end it is done aloud
-    if (fd >= 0 && try_lock(fd)) bt_ensemble_gather(e->s, e->o->dir, &unheard);
+    if (fd >= 0 && take_lock(fd, false)) bt_ensemble_gather(e->s, e->o->dir, &unheard);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
     e->gathered = bt_clock();
@@ -320,6 +335,8 @@ static void gather_now_and_then(ensemble *e)
 static bt_status work(ensemble *e)
 {
     for (;;) {
+        const bool stop = bt_comm_any(e->group, told != 0);
+        if (stop) return BT_ERR_SIGNAL;
         int64_t i = e->group->rank == 0 ? claim(e) : 0;
         bt_comm_bcast(e->group, &i, sizeof i);
         if (i == -1) return BT_OK;
@@ -398,7 +415,12 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
                e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
         fflush(stdout);
     }
+    struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal};
+    sigemptyset(&act.sa_mask);
+    told = 0;
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
     if (!idle) status = work(&e);
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (comm->rank == 0) {

@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "bergtow/environment.h"
 #include "bergtow/shape.h"
 
 #define GRAVITY 9.81 // m/s²
@@ -137,7 +138,9 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
     const double ahead = c->tow.direction - c->body.yaw;
     in->width = bt_shape_width(n, v, cos(ahead), sin(ahead));
     if (c->tow.mode == BT_TOW_NONE) return;
-    const double rx = c->tow.speed * ux - c->water.current_x, ry = c->tow.speed * uy - c->water.current_y;
+    double current[2]; // of a current that changes the mean over the run
+    bt_environment_mean(c, true, current);
+    const double rx = c->tow.speed * ux - current[0], ry = c->tow.speed * uy - current[1];
     in->speed = hypot(rx, ry);
     in->along = rx * ux + ry * uy;
     const double flow = in->speed > 0 ? atan2(ry, rx) - c->body.yaw : ahead;

@@ -86,23 +86,34 @@ void bt_forces_predict(bt_world *w)
     }
 }
 
-void bt_forces_impulse(const bt_world *w, bt_idx i, double j[3])
+bt_external bt_forces_external(const bt_world *w, bt_idx i)
 {
     const bt_bodies *b = &w->bodies;
     const bt_params *p = &w->par;
+    const double m = b->mass[i], dt = p->dt, ub = p->balance_u, vb = p->balance_v;
     const bt_vel *u = &b->vel[i];
-    if (b->motion[i] == BT_DYNAMIC) {
-        const bt_vel *u1 = &b->vel_start[i], *free = &b->vel_free[i];
-        const double m = b->mass[i], inertia = b->inertia[i], me = 1 / b->inv[i].m, ie = 1 / b->inv[i].i;
-        j[0] = me * free->x - m * u1->x - (me - m) * u->x;
-        j[1] = me * free->y - m * u1->y - (me - m) * u->y;
-        j[2] = ie * free->w - inertia * u1->w - (ie - inertia) * u->w;
-        return;
+    if (b->motion[i] != BT_DYNAMIC) {
+        const drag_load l = drag_at(w, i, u);
+        const double turn = dt * m * p->coriolis;
+        return (bt_external){
+            .drag = {dt * (l.jx - l.k * u->x), dt * (l.jy - l.k * u->y)},
+            .turn = -dt * l.kw * u->w,
+            .coriolis = {-turn * u->y, turn * u->x},
+            .tilt = {dt * m * p->tilt_ax + turn * vb, dt * m * p->tilt_ay - turn * ub},
+        };
     }
-    const drag_load l = drag_at(w, i, u);
-    j[0] = p->dt * (l.jx - l.k * u->x + b->mass[i] * (p->tilt_ax - p->coriolis * (u->y - p->balance_v)));
-    j[1] = p->dt * (l.jy - l.k * u->y + b->mass[i] * (p->tilt_ay + p->coriolis * (u->x - p->balance_u)));
-    j[2] = -p->dt * l.kw * u->w;
+    const bt_vel *u1 = &b->vel_start[i], *f = &b->vel_free[i];
+    const double angle = p->coriolis * dt, s = sin(angle), c1 = cos(angle) - 1;
+    bt_external e = {
+        .coriolis = {m * (c1 * u1->x - s * u1->y), m * (s * u1->x + c1 * u1->y)},
+        .tilt = {m * (dt * p->tilt_ax - (c1 * ub - s * vb)), m * (dt * p->tilt_ay - (s * ub + c1 * vb))},
+    };
+    // Drag is Δt (Σ K U_ref − K U2) = (M + Δt K)(U* − U2) − M (U' − U2), U' = U1 + Coriolis and tilt.
+    const double me = 1 / b->inv[i].m, ie = 1 / b->inv[i].i;
+    e.drag[0] = me * (f->x - u->x) - m * (u1->x - u->x) - e.coriolis[0] - e.tilt[0];
+    e.drag[1] = me * (f->y - u->y) - m * (u1->y - u->y) - e.coriolis[1] - e.tilt[1];
+    e.turn = ie * (f->w - u->w) - b->inertia[i] * (u1->w - u->w);
+    return e;
 }
 
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,

@@ -2,7 +2,7 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + J_ice·(−d) + J_ext·(−d)      (tow = inertia + ice resistance + drag)
+//     J_tow = M ΔU·d + (J_ice + J_drag + J_Coriolis + J_tilt)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt)
 // On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
@@ -11,6 +11,7 @@
 #include <math.h>
 
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
@@ -95,14 +96,15 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
     const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
-    double external[3];
-    bt_forces_impulse(w, t, external);
+    const bt_external e = bt_forces_external(w, t);
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
     s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
     s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
-    s->drag_force = -(external[0] * dx + external[1] * dy) / dt;
+    s->drag_force = 0.0 - (e.drag[0] * dx + e.drag[1] * dy) / dt;
+    s->coriolis_force = 0.0 - (e.coriolis[0] * dx + e.coriolis[1] * dy) / dt;
+    s->tilt_force = 0.0 - (e.tilt[0] * dx + e.tilt[1] * dy) / dt;
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
@@ -117,11 +119,23 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
         s->carriage_y = tow->carriage_y;
         s->tow_force = s->line_tension * (tow->lx * dx + tow->ly * dy);
     } else if (tow->mode == BT_TOW_SPEED) {
-        s->tow_force = s->ice_resistance + s->drag_force + s->inertia_force;
+        s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
     } else {
         s->tow_force = 0;
     }
     s->contacts_body = bt_sum_value(&seen->sum[TOUCHING]);
+}
+
+/// Collisions of the towed body; on rank 0, which records.
+static void observe_impacts(const bt_world *w, bt_sample *s)
+{
+    const bt_impacts *m = w->impacts;
+    s->collision_resistance = s->collisions = s->impact_peak = NAN;
+    if (!m || !w->tow) return;
+    s->collision_resistance = 0.0 - (m->collision_x * w->tow->ux + m->collision_y * w->tow->uy) / w->par.dt;
+    s->collisions = (double)m->n_closed;
+    s->impact_peak = 0;
+    for (int64_t i = 0; i < m->n_closed; i++) s->impact_peak = bt_max(s->impact_peak, m->closed[i].peak);
 }
 
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
@@ -143,6 +157,10 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .repeats = (double)st->repeats,
         .outrun = st->outrun,
         .restitution_cut = st->restitution_cut,
+        .current_x = w->par.water_u,
+        .current_y = w->par.water_v,
+        .wind_x = w->par.air_u,
+        .wind_y = w->par.air_v,
         .line_tension = NAN,
         .line_length = NAN,
         .carriage_x = NAN,
@@ -154,11 +172,12 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
+    observe_impacts(w, s);
     if (w->towed >= 0) {
         observe_body(w, &seen, s);
     } else {
         s->tow_force = s->ice_resistance = s->ice_resistance_budget = s->ice_force_x = s->ice_force_y = s->ice_moment = NAN;
-        s->drag_force = s->inertia_force = s->body_x = s->body_y = s->body_yaw = NAN;
+        s->drag_force = s->coriolis_force = s->tilt_force = s->inertia_force = s->body_x = s->body_y = s->body_yaw = NAN;
         s->body_vx = s->body_vy = s->body_yaw_rate = NAN;
     }
 }

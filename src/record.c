@@ -14,6 +14,7 @@
 #include "fileio.h"
 #include "frames.h"
 #include "h5util.h"
+#include "impact_store.h"
 #include "provenance.h"
 #include "summary.h"
 #include "xdmf.h"
@@ -36,6 +37,7 @@ struct bt_record {
     int64_t n_merged;
     double last_flush;     ///< bt_clock
     bt_frames frames;
+    bt_impact_store impacts;
 };
 
 static void create_series(bt_record *r)
@@ -71,6 +73,7 @@ static bt_status close_file(bt_record *r)
     for (int k = 0; k < bt_n_series_fields; k++)
         if (r->series[k] >= 0) H5Dclose(r->series[k]);
     bt_frames_close(&r->frames);
+    bt_impact_store_close(&r->impacts);
     return bt_h5_close(&r->h5);
 }
 
@@ -141,6 +144,14 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     return BT_OK;
 }
 
+bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err)
+{
+    if (r->comm->rank != 0) return BT_OK;
+    r->h5.err = err;
+    bt_impact_store_create(&r->impacts, &r->h5, m, r->c->output.panels);
+    return r->h5.status;
+}
+
 static double *member(bt_sample *s, int k) { return (double *)(void *)((char *)s + bt_series_fields[k].offset); }
 
 static double member_of(const bt_sample *s, int k)
@@ -157,6 +168,7 @@ static void write_buffer(bt_record *r)
                      r->buffer + (size_t)k * BUFFER);
     r->written += r->buffered;
     r->buffered = 0;
+    bt_impact_store_write(&r->impacts);
     bt_h5_flush(&r->h5);
     r->last_flush = bt_clock();
 }
@@ -171,6 +183,7 @@ static void end_entry(bt_record *r)
     }
     r->buffered++;
     r->n_merged = 0;
+    bt_impact_store_end_sample(&r->impacts);
 }
 
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
@@ -178,6 +191,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
     r->h5.err = err;
     bt_history_add(&r->history, s);
+    bt_impact_store_take(&r->impacts);
     for (int k = 0; k < bt_n_series_fields; k++) {
         double *m = member(&r->merged, k);
         const double x = member_of(s, k);
@@ -238,7 +252,9 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
     r->h5.err = err;
     if (first) {
         if (r->n_merged > 0) end_entry(r);
+        if (t) bt_impact_store_take_closed(&r->impacts);
         write_buffer(r);
+        if (t) bt_impact_store_totals(&r->impacts);
         if (t) write_totals(r, t);
     }
     bt_status status = bt_comm_agree(r->comm, close_file(r));

@@ -15,6 +15,7 @@
 
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "bergtow/impact.h"
 #include "bergtow/observe.h"
 #include "bergtow/record.h"
 #include "bergtow/setup.h"
@@ -45,11 +46,12 @@ typedef struct {
     bt_run_totals totals;
 } run;
 
-/// Collective. Rank 0 makes or reads the field, with all its threads; then every rank has it.
-static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_errors *err)
+/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it. lead: on rank 0.
+static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
     if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) bt_field_share(comm, f);
@@ -63,6 +65,9 @@ static bt_status open_record(run *r, bt_errors *err)
     if (status != BT_OK) return status;
     status = bt_record_open(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
     bt_handover_free(&b);
+    if (status != BT_OK || !r->w->impacts) return status;
+    status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
+    if (status != BT_OK) bt_record_close(r->record, NULL, err);
     return status;
 }
 
@@ -225,6 +230,8 @@ static bt_status run_world(run *r, bt_errors *err)
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
+    if (r->w->impacts) bt_impacts_end(r->w->impacts);
+    r->totals.impacts = r->w->impacts;
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
@@ -286,9 +293,10 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     bt_field f;
     bt_field_init(&f);
-    bt_status status = make_field(comm, c, &f, err);
+    bt_lead_stats lead = {0};
+    bt_status status = make_field(comm, c, &f, &lead, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
-    const double concentration = f.concentration;
+    const double concentration = lead.mode == BT_LEAD_NONE ? f.concentration : lead.concentration_before;
     double thickness, radius;
     bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
@@ -303,6 +311,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .mean_thickness = thickness,
             .mean_radius = radius,
             .concentration = concentration,
+            .lead = lead,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);

@@ -28,7 +28,10 @@ static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
 static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
 static const char *const tow_modes[] = {"none", "speed", "line", NULL};
-static const char *const tilts[] = {"none", "slope", "geostrophic", NULL};
+static const char *const conversions[] = {"none", "duration", "crushing", NULL};
+static const char *const corners[] = {"given", "real", NULL};
+static const char *const tilts[] = {"none", "slope", "geostrophic", "dynamic", NULL};
+static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 
 #define AT(member) .offset = offsetof(bt_case, member)
 #define REAL(key, member, kind, preset_, range_, doc_) \
@@ -133,17 +136,33 @@ const bt_key bt_case_keys[] = {
     REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own x"),
     REAL("tow.hull_y", tow.hull_y, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
 
+    CHOICE("lead.mode", lead.mode, lead_modes, "none",
+           "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that reach into it; or those floes cut into pieces"),
+    REAL("lead.width", lead.width, LENGTH, "= width of the body across the tow", "[0, 1e5]", "width of the lead"),
+    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length", "[0, 1e7]", "length of the lead from the body's place at time zero"),
+    REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]", "diameter of the circle of the area of the largest piece, needed by mode managed"),
+
     REAL("water.density", water.density, DENSITY, "1027 kg/m3", "[500, 2000]", "density of the water [Hunke & Comeau 2011]"),
     REAL("water.current_x", water.current_x, SPEED, "0 m/s", ANY_SPEED, "current along x"),
     REAL("water.current_y", water.current_y, SPEED, "0 m/s", ANY_SPEED, "current along y"),
+    REAL("water.tide.major", water.tide.major, SPEED, "0 m/s", "[0, 100]", "tidal ellipse, added to the current: largest speed"),
+    REAL("water.tide.minor", water.tide.minor, SPEED, "0 m/s", ANY_SPEED,
+         "tidal ellipse: speed across the major axis a quarter period later, positive when the current turns from x towards y"),
+    REAL("water.tide.inclination", water.tide.inclination, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: angle of the major axis from the x axis towards y"),
+    REAL("water.tide.period", water.tide.period, TIME, "44714.164 s", "(0, 1e9]", "tidal ellipse: period; the default is that of the constituent M2, 28.9841042 deg an hour"),
+    REAL("water.tide.phase", water.tide.phase, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: lag; the current is largest along the major axis at phase / 360 deg x period"),
+    TEXT("water.current_table", water.current_table, "none",
+         "CSV file with the header t,u,v: current along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
     REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]", "latitude of the Coriolis force, 0 = no Coriolis force"),
-    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none, given by its slope, or in geostrophic balance with the current"),
+    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none; given by its slope; in geostrophic balance with the current of the moment; or dynamic: it also accelerates the water where that changes"),
     REAL("water.slope_x", water.slope_x, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along x, for tilt slope"),
     REAL("water.slope_y", water.slope_y, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along y, for tilt slope"),
 
     REAL("air.density", air.density, DENSITY, "1.29 kg/m3", "[0, 10]", "density of the air [Hunke & Comeau 2011]"),
     REAL("air.wind_x", air.wind_x, SPEED, "0 m/s", ANY_SPEED, "wind along x"),
     REAL("air.wind_y", air.wind_y, SPEED, "0 m/s", ANY_SPEED, "wind along y"),
+    TEXT("air.wind_table", air.wind_table, "none",
+         "CSV file with the header t,u,v: wind along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
 
     REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
@@ -156,10 +175,21 @@ const bt_key bt_case_keys[] = {
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
+    CHOICE("impact.conversion", impact.conversion, conversions, "duration",
+           "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a corner at a pressure; none: collisions are not told apart"),
+    REAL("impact.duration", impact.duration, TIME, "= run.dt", "(0, 1000]",
+         "duration of a collision for conversion duration; assumed, the time step being chosen about as long as a collision [Yulmetov & Løset 2017]"),
+    REAL("impact.pressure", impact.pressure, PRESSURE, "1 MPa", "(0, 1e9]", "pressure of crushed ice for conversion crushing, assumed; at model scale divided by the length ratio"),
+    CHOICE("impact.corner", impact.corner, corners, "given", "crushed corner for conversion crushing: the given angle, or the real one of the corner in contact"),
+    REAL("impact.corner_angle", impact.corner_angle, ANGLE, "90 deg", "(0, 179]", "angle of the crushed corner, assumed"),
+    REAL("impact.least_speed", impact.least_speed, SPEED, "= 0.05 x reference speed of the solver", "[0, 100]", "approach of a floe to the body below which its contact counts as a push, assumed"),
+    INT("impact.panels", impact.panels, "36", "[1, 1000]", "pieces of equal length that the hull's perimeter is cut into for loads, the first centred on the body's own x axis"),
+
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+    BOOL("output.panels", output.panels, "false", "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
 
     REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
     REAL("estimate.p_s", estimate.p_s, LINE_LOAD, "13 kN/m", "[0, 1e9]", "strength P at which dense ice captures a berg, at full scale [Lichey & Hellmer 2001; FESOM2 takes 10 kN/m]"),

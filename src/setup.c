@@ -7,7 +7,9 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/environment.h"
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/tow.h"
 #include "bergtow/window.h"
 #include "case_check.h"
@@ -22,6 +24,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
     // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
     // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
     const double turn = c->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;
+    double water[2], air[2]; // at time zero; where they change, each step sets its own
+    bt_environment_at(c, true, 0, water);
+    bt_environment_at(c, false, 0, air);
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -38,15 +43,15 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
-        .water_u = c->water.current_x,
-        .water_v = c->water.current_y,
-        .air_u = c->air.wind_x,
-        .air_v = c->air.wind_y,
+        .water_u = water[0],
+        .water_v = water[1],
+        .air_u = air[0],
+        .air_v = air[1],
         .coriolis = turn,
     };
-    if (c->water.tilt == BT_TILT_GEOSTROPHIC) {
-        p.balance_u = c->water.current_x;
-        p.balance_v = c->water.current_y;
+    if (c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC) {
+        p.balance_u = water[0];
+        p.balance_v = water[1];
     } else if (c->water.tilt == BT_TILT_SLOPE) {
         p.tilt_ax = -GRAVITY * c->water.slope_x;
         p.tilt_ay = -GRAVITY * c->water.slope_y;
@@ -274,9 +279,11 @@ static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall
 /// Floes of a field that was read may belong to another domain.
 static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
 {
+    // A managed lead may cut a floe that reaches over an open edge, and leave a piece beyond it.
+    const bool over_x = c->lead.mode == BT_LEAD_MANAGED && c->domain.ends == BT_BOUND_OPEN, over_y = c->lead.mode == BT_LEAD_MANAGED && c->domain.sides == BT_BOUND_OPEN;
     for (bt_idx i = 0; i < f->n; i++) {
         const double x = f->pose[3 * (size_t)i], y = f->pose[3 * (size_t)i + 1];
-        if (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length && y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width) continue;
+        if ((over_x || (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length)) && (over_y || (y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width))) continue;
         bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
                       c->ice.field ? c->ice.field : c->path ? c->path : "case", (int)i, x, y);
         return false;
@@ -297,6 +304,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     if (!check_inside(c, f, err)) return BT_ERR_CASE;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    w->environment = bt_environment_create(c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_world_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
@@ -310,6 +318,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
         add_towed_body(c, w, r);
         r->names[n++] = "towed body";
     }
+    w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)

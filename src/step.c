@@ -3,7 +3,9 @@
 #include <math.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/environment.h"
 #include "bergtow/forces.h"
+#include "bergtow/impact.h"
 #include "bergtow/solver.h"
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
@@ -75,9 +77,9 @@ static void advance(bt_world *w)
     bt_tiles *ts = w->tiles;
     const double dt = w->par.dt;
     // Tiles move with the water where that is not periodic.
-    const double drift = (double)(w->step + 1) * dt;
-    if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + drift * w->par.water_u;
-    if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + drift * w->par.water_v;
+    bt_environment_advance(w);
+    if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
+    if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
     double farthest = 0, out = 0;
 #pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(w->bodies.n, 2000))
     for (bt_idx k = 0; k < ts->n; k++) {
@@ -226,6 +228,7 @@ void bt_world_step(bt_world *w)
     bt_step_stats *st = &w->stats;
     st->forces_s = st->detect_s = st->colour_s = st->solve_s = st->advance_s = st->exchange_s = 0;
     double t0 = bt_clock();
+    bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);
     bt_tiles_begin(w);
     clock_phase(w, &st->detect_s, &t0);
@@ -237,6 +240,7 @@ void bt_world_step(bt_world *w)
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
+    bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
     bt_window_advance(w);
     bt_domain_note(w);

@@ -3,7 +3,7 @@
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
 //     mean ice resistance ± standard error (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
-//     closure = <ice> − (<tow> − <drag> − <inertia>)      the body's own momentum balance
+//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "summary.h"
 #include "summary_window.h"
@@ -25,21 +25,22 @@ void bt_history_init(bt_history *h) { *h = (bt_history){.peak_tension = NAN}; }
 
 void bt_history_free(bt_history *h)
 {
-    double *columns[] = {h->time, h->ice, h->tow, h->drag, h->inertia, h->budget};
+    double *columns[] = {h->time, h->ice, h->tow, h->drag, h->coriolis, h->tilt, h->inertia, h->budget};
     for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) free(columns[i]);
     bt_history_init(h);
 }
 
 void bt_history_add(bt_history *h, const bt_sample *s)
 {
-    double **columns[] = {&h->time, &h->ice, &h->tow, &h->drag, &h->inertia, &h->budget};
-    const double values[] = {s->time, s->ice_resistance, s->tow_force, s->drag_force, s->inertia_force,
-                             s->ice_resistance_budget};
+    enum { N_COLUMNS = 8 };
+    double **columns[N_COLUMNS] = {&h->time, &h->ice, &h->tow, &h->drag, &h->coriolis, &h->tilt, &h->inertia, &h->budget};
+    const double values[N_COLUMNS] = {s->time, s->ice_resistance, s->tow_force, s->drag_force, s->coriolis_force, s->tilt_force, s->inertia_force,
+                                      s->ice_resistance_budget};
     if (h->n == h->cap) {
         h->cap = h->cap ? 2 * h->cap : 1024;
-        for (size_t i = 0; i < 6; i++) *columns[i] = bt_realloc(*columns[i], (size_t)h->cap, sizeof(double));
+        for (size_t i = 0; i < N_COLUMNS; i++) *columns[i] = bt_realloc(*columns[i], (size_t)h->cap, sizeof(double));
     }
-    for (size_t i = 0; i < 6; i++) (*columns[i])[h->n] = values[i];
+    for (size_t i = 0; i < N_COLUMNS; i++) (*columns[i])[h->n] = values[i];
     h->n++;
     h->sum_contacts += s->contacts;
     h->sum_sweeps += s->sweeps;
@@ -119,6 +120,8 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
     s->ice = bt_stats_mean(h->ice + first, n);
     s->tow = bt_stats_mean(h->tow + first, n);
     s->drag = bt_stats_mean(h->drag + first, n);
+    s->coriolis = bt_stats_mean(h->coriolis + first, n);
+    s->tilt = bt_stats_mean(h->tilt + first, n);
     s->inertia = bt_stats_mean(h->inertia + first, n);
     s->budget = bt_stats_mean(h->budget + first, n);
     s->window.correlation_time = n > 1 ? s->ice.tau * dt : NAN;
@@ -131,8 +134,9 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
     s->peak = percentile(sorted, n, 100);
     free(sorted);
 
-    const double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
-    s->balance = s->tow.mean - s->drag.mean - s->inertia.mean;
+    double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
+    largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
+    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean - s->inertia.mean;
     s->closure = s->ice.mean - s->balance;
     s->closure_relative = largest > 0 ? s->closure / largest : s->closure == 0 ? 0 : NAN;
     const double other = s->ice.mean - s->budget.mean;
@@ -150,7 +154,7 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
         s->window.warning = warn_window(s);
     }
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
-        bt_errors_add(&s->warnings, "the mean ice resistance differs from tow - drag - inertia by %.2g of the largest of them; "
+        bt_errors_add(&s->warnings, "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the largest of them; "
                       "the momentum balance of the towed body does not close", fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings, "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
@@ -165,7 +169,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
 
     const bt_mean none = bt_stats_mean(NULL, 0);
-    s->ice = s->tow = s->drag = s->inertia = s->budget = none;
+    s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
     s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
     s->window.start = s->window.end = s->window.correlation_time = nan;
     if (body) {

@@ -7,11 +7,11 @@
 #include "bergtow/record.h"
 #include "bergtow/stats.h"
 
-/// What the summary keeps of every step, whatever output.sample_every says: 48 bytes a step.
+/// What the summary keeps of every step, whatever output.sample_every says: 64 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
     double *time;    ///< [n] s
-    double *ice, *tow, *drag, *inertia, *budget; ///< [n] N, as in bt_sample
+    double *ice, *tow, *drag, *coriolis, *tilt, *inertia, *budget; ///< [n] N, as in bt_sample
     double sum_contacts, sum_sweeps, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double peak_tension;             ///< NaN until there is a line
@@ -35,9 +35,9 @@ typedef struct bt_summary {
         int64_t first, n;             ///< steps
         const char *warning;          ///< into warnings, or NULL
     } window;
-    bt_mean ice, tow, drag, inertia, budget; ///< N, over the window
+    bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double balance;                   ///< mean tow − drag − inertia, N
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps;          ///< means over all steps

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "estimate_text.h"
+#include "impact_report.h"
 #include "json.h"
 #include "summary.h"
 #include "summary_window.h"
@@ -20,6 +21,27 @@ static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
     for (int i = 0; i < N_PHASES; i++) rows[i] = all[i];
 }
 
+static const char *const lead_names[] = {"none", "channel", "managed"};
+
+static void json_lead(bt_json *j, const bt_lead_stats *l)
+{
+    if (l->mode == BT_LEAD_NONE) {
+        bt_json_string(j, "lead", NULL);
+        return;
+    }
+    bt_json_open(j, "lead", '{');
+    bt_json_string(j, "mode", lead_names[l->mode]);
+    bt_json_number(j, "width_m", l->width);
+    bt_json_number(j, "length_m", l->length);
+    bt_json_int(j, l->mode == BT_LEAD_CHANNEL ? "floes_removed" : "floes_cut", l->taken);
+    bt_json_number(j, l->mode == BT_LEAD_CHANNEL ? "area_removed_m2" : "area_cut_m2", l->area_taken);
+    bt_json_int(j, "pieces", l->pieces);
+    bt_json_number(j, "mean_piece_m", l->pieces > 0 ? l->mean_piece : NAN);
+    bt_json_number(j, "concentration_before", l->concentration_before);
+    bt_json_number(j, "concentration_after", l->concentration_after);
+    bt_json_close(j, '}');
+}
+
 static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
 {
     bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
@@ -32,11 +54,13 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, co
     bt_json_number(j, "mean_tow_force_n", s->tow.mean);
     bt_json_number(j, "mean_tow_force_se_n", s->tow.se);
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
+    bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
+    bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
     bt_json_number(j, "peak_line_tension_n", s->body ? h->peak_tension : NAN);
     bt_json_open(j, "budget", '{');
-    bt_json_number(j, "tow_minus_drag_minus_inertia_n", s->balance);
+    bt_json_number(j, "tow_minus_other_forces_n", s->balance);
     bt_json_number(j, "closure_n", s->closure);
     bt_json_number(j, "closure_relative", s->closure_relative);
     bt_json_number(j, "ice_momentum_closure_relative", s->budget_closure_relative);
@@ -86,7 +110,9 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "sweep_bytes_per_contact", t->sweep_bytes_per_contact);
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
+    json_lead(&j, &t->lead);
     json_forces(&j, s, h, c);
+    bt_impacts_json(&j, t->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
     else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
@@ -145,7 +171,7 @@ static void print_forces(const bt_summary *s, const bt_history *h, const bt_case
            force(d, s->ice.sd));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95),
            force(b, s->p99), force(d, s->peak));
-    printf("    from balances     %s by tow - drag - inertia, %s by the momentum of the ice\n", force(a, s->balance),
+    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
            force(b, s->budget.mean));
     printf("  tow force           %s +- %s, drag %s", force(a, s->tow.mean), force(b, s->tow.se), force(d, s->drag.mean));
     if (!isnan(h->peak_tension)) printf(", peak line tension %s", force(a, h->peak_tension));
@@ -160,7 +186,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
+    bt_lead_stats_print(&t->lead);
     if (s->body) print_forces(s, h, c);
+    bt_impacts_print(t->impacts);
     if (s->body && !isnan(s->estimate.along)) {
         printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);

@@ -123,10 +123,9 @@ static void choose(bt_world *w, double margin)
     t->heaviest = most[5];
     t->rebounds = most[6] > 0;
     t->margin_max = bt_max(2 * bt_max(margin, bt_contacts_margin(w, most[7])), 0.25 * w->par.size);
-    const double drift = (double)w->step * w->par.dt;
     const bool any = most[0] + most[2] >= 0;
-    t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : drift * w->par.water_u);
-    t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : drift * w->par.water_v);
+    t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
+    t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
     double side = bt_max((w->par.tile > 0 ? w->par.tile : TILE_DIAMETERS) * w->par.size, 2 * t->reach + t->margin_max + 0.5 * w->par.size);
     if (!(side > 0)) side = 1;
     for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 tiles a floe, by larger tiles

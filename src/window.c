@@ -153,8 +153,8 @@ static candidate *collect(const bt_world *w, size_t *n, double **corner)
             n_corners += (size_t)count;
         }
     }
-    candidate *list = bt_domain_gather(w, mine, m, sizeof *mine, n);
-    *corner = bt_domain_gather(w, own, n_corners, 2 * sizeof *own, &all);
+    candidate *list = bt_domain_gather_all(w, mine, m, sizeof *mine, n);
+    *corner = bt_domain_gather_all(w, own, n_corners, 2 * sizeof *own, &all);
     free(mine);
     free(own);
     int64_t first = 0;

@@ -8,6 +8,8 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/impact.h"
+#include "bergtow/environment.h"
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
@@ -43,6 +45,8 @@ void bt_world_free(bt_world *w)
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
+    bt_impacts_free(w->impacts);
+    bt_environment_free(w->environment);
     free(w->tow);
     free(w->window);
     free(w);
@@ -157,5 +161,6 @@ uint64_t bt_world_hash(const bt_world *w)
     }
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
+    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

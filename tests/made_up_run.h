@@ -69,8 +69,10 @@ static inline bt_sample sample(int step)
     s.ice_resistance = 1000 + 10 * sin(1.7 * step * step);
     s.ice_resistance_budget = s.ice_resistance;
     s.drag_force = 20;
+    s.coriolis_force = -7;
+    s.tilt_force = 5;
     s.inertia_force = 3;
-    s.tow_force = s.ice_resistance + 23;
+    s.tow_force = s.ice_resistance + 21;
     s.contacts = 8 + step % 2;
     s.sweeps = 5;
     s.residual = 1e-6;

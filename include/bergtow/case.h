@@ -18,7 +18,11 @@ typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;  
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
 typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE } bt_tow_mode;         // none, speed, line
-typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC } bt_tilt;   // none, slope, geostrophic
+typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC, BT_TILT_DYNAMIC } bt_tilt; // none, slope, geostrophic, dynamic
+typedef enum { BT_LEAD_NONE, BT_LEAD_CHANNEL, BT_LEAD_MANAGED } bt_lead_mode;    // none, channel, managed
+
+typedef enum { BT_IMPACT_NONE, BT_IMPACT_DURATION, BT_IMPACT_CRUSHING } bt_impact_conversion; // none, duration, crushing
+typedef enum { BT_CORNER_GIVEN, BT_CORNER_REAL } bt_corner;                  // given, real
 
 /// Drag coefficients of a class of bodies (ice: floes; body: the towed body).
 typedef struct bt_drag_coefs {
@@ -27,6 +31,12 @@ typedef struct bt_drag_coefs {
     double air_form;   ///< C_a, on ½ρ sail×width
     double air_skin;   ///< C_as, on ρ A
 } bt_drag_coefs;
+
+/// A velocity in time, read from a file: rows of time, x and y component; linear between them.
+typedef struct bt_table {
+    int64_t n;
+    double *row;   ///< [n][3] s, m/s, m/s; ascending in time
+} bt_table;
 
 /// One floe or body given by hand (list `floes:`).
 typedef struct bt_floe_def {
@@ -112,8 +122,21 @@ typedef struct bt_case {
         double hull_x, hull_y;   ///< fastening point, body frame, m; default the foremost point of the waterline
     } tow;
     struct {
+        bt_lead_mode mode;       ///< what the vessel has done to the ice ahead
+        double width;            ///< m
+        double length;           ///< of the path from the body's place, m
+        double floe_size;        ///< diameter of the circle of the area of the largest piece, managed, m
+    } lead;
+    struct {
         double density;          ///< ρ_w, kg/m³
-        double current_x, current_y; ///< U_w, m/s
+        double current_x, current_y; ///< U_w, its constant part, m/s
+        struct {
+            double major, minor;     ///< semi-axes of the tidal ellipse, m/s; minor > 0 turns from x towards y
+            double inclination;      ///< of the major axis from x towards y, rad
+            double period, phase;    ///< s; rad: the current is largest along the major axis at time phase/2π × period
+        } tide;
+        char *current_table;     ///< CSV file of the current in time, or NULL; relative to the case file
+        bt_table table;          ///< what it holds
         double latitude;         ///< rad; Coriolis parameter f = 2Ω sin(latitude); 0 = off
         bt_tilt tilt;
         double slope_x, slope_y; ///< ∇η for tilt: slope
@@ -121,6 +144,8 @@ typedef struct bt_case {
     struct {
         double density;          ///< ρ_a, kg/m³
         double wind_x, wind_y;   ///< U_a, m/s
+        char *wind_table;        ///< CSV file of the wind in time, or NULL; relative to the case file
+        bt_table table;          ///< what it holds
     } air;
     struct {
         double tolerance;        ///< natural-map residual / reference speed at which a step has converged
@@ -135,10 +160,20 @@ typedef struct bt_case {
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
     struct {
+        bt_impact_conversion conversion; ///< of the impulse of a collision into a force
+        double duration;         ///< T_c of a collision, s
+        double pressure;         ///< p of crushed ice, Pa
+        bt_corner corner;        ///< which angle the crushed corner has
+        double corner_angle;     ///< φ when given, or without a corner, rad
+        double least_speed;      ///< approach below this is a push, m/s
+        int64_t panels;          ///< pieces of the hull's perimeter
+    } impact;
+    struct {
         int64_t sample_every;    ///< steps per entry of the series
         double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
+        bool panels;             ///< series of the loads on the hull's panels
     } output;
     struct {
         double p_star, p_s;      ///< ice strength Pa and capture threshold N/m of Lichey and Hellmer, at full scale

@@ -71,4 +71,8 @@ static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n) { ret
 bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width, const double *rows,
                               double *block, bt_errors *err);
 
+/// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there, to be freed; NULL and
+/// *total = 0 elsewhere.
+double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total);
+
 #endif

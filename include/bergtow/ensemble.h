@@ -2,7 +2,8 @@
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
 // Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it
-// holds summary.json, failed when it holds failed.txt (first line: exit code; then the reasons), and else waits. DIR/journal.jsonl has a line
+// holds a file `finished` (the last thing written: a run that was stopped has a summary too), failed when it holds failed.txt (first line: exit
+// code; then the reasons), and else waits. DIR/journal.jsonl has a line
 // for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
 // order, ranks, or how often the ensemble was stopped.
 //

@@ -17,7 +17,7 @@
 //                                                               radius R = W/2, without friction and drag (derived; tests/physics/test_resistance.c)
 //   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/forces.c computes; no ice resistance
 //
-// Ice and water are taken to move together, with the current: ΔV = V_tow − U_w.
+// Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
 #ifndef BERGTOW_ESTIMATE_H
 #define BERGTOW_ESTIMATE_H
 

@@ -23,9 +23,16 @@
 /// keep vel.
 void bt_forces_predict(bt_world *w);
 
-/// External impulse on body i in the step just solved, N s, N s, N m s; of a dynamic body from U1, U* and U2 by the scheme
-/// above (contact impulses do not enter), of a kinematic body the same forces at its prescribed velocity.
-void bt_forces_impulse(const bt_world *w, bt_idx i, double j[3]);
+/// External impulses of a step on one body by what they come from.
+typedef struct bt_external {
+    double drag[2], turn;   ///< water and air, N s; their moment, N m s
+    double coriolis[2];     ///< N s: M (R − I) U1, R the rotation by f Δt
+    double tilt[2];         ///< N s: −M g ∇η Δt, or in balance with U_b: −M (R − I) U_b
+} bt_external;
+
+/// External impulses on body i in the step just solved; of a dynamic body from U1, U* and U2 by the scheme above (contact
+/// impulses do not enter), so that their sum is what the step has used, to rounding; of a kinematic body the same forces at its prescribed velocity.
+bt_external bt_forces_external(const bt_world *w, bt_idx i);
 
 /// Drag of one body from its outline, draft and coefficients: multiplied out.
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,

@@ -6,21 +6,25 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/lead.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
-/// tow direction; resisting components are positive against it, so that tow = ice + drag + inertia.
+/// tow direction; resisting components are positive against it, so that
+/// tow = ice + drag + Coriolis + tilt + inertia.
 typedef struct bt_sample {
     double time;            ///< s, end of the step
     double tow_force;       ///< N along
     double ice_resistance;  ///< N, contact force against the tow direction
     double ice_force_x, ice_force_y; ///< N, contact force on the body
     double ice_moment;      ///< N m, contact moment on the body about its centroid
-    double drag_force;      ///< N, all external forces (water, air, Coriolis, tilt) against the tow direction
+    double drag_force;      ///< N, drag of water and air against the tow direction
+    double coriolis_force, tilt_force; ///< N, Coriolis force and that of the sea-surface tilt against the tow direction
     double inertia_force;   ///< N, (M + added mass) × acceleration along the tow direction
     double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
     double line_tension, line_length, carriage_x, carriage_y; ///< N, m, m, m (NaN without a line)
+    double current_x, current_y, wind_x, wind_y; ///< m/s, of the step (its middle, where they change)
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
@@ -35,6 +39,9 @@ typedef struct bt_sample {
     double repeats;         ///< times the step was solved again because floes outran the contact margin
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
+    double collision_resistance; ///< N, the part of ice_resistance that collisions have (impact.h); the rest is push
+    double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
+    double impact_peak;     ///< largest peak force of these, N; 0 without
     double moving;          ///< floes faster than 1 % of the reference speed
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
@@ -56,6 +63,8 @@ extern const int bt_n_series_fields;
 typedef struct bt_phases {
     double detect, colour, forces, solve, advance, exchange, output;
 } bt_phases;
+
+struct bt_impacts;
 
 /// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order of their
 /// ids; the other bodies are the last rank's. first: [size + 1].
@@ -88,6 +97,7 @@ typedef struct bt_run_totals {
     double mean_size;            ///< mean equivalent diameter of the floes, m
     double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
+    bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     uint64_t state_hash;
@@ -98,6 +108,7 @@ typedef struct bt_run_totals {
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    const struct bt_impacts *impacts; ///< collisions of the towed body, NULL = none told apart
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
 
@@ -108,6 +119,10 @@ typedef struct bt_record bt_record;
 /// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
 bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
                          const char *command_line, bt_errors *err);
+
+/// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left in m, which must stay
+/// valid until the record is closed. Before the first sample. The status is that of rank 0: agree on it.
+bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err);
 
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
 /// the end of the run is an entry too. Buffered, and flushed every 256 entries or 5 s of wall time, so that a

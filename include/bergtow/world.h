@@ -105,7 +105,7 @@ typedef struct bt_params {
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets tiles and skin, m
     // fluid and frame (see forces.h)
-    double water_u, water_v, air_u, air_v; ///< m/s
+    double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
     double balance_u, balance_v; ///< velocity in geostrophic balance with the tilt (Coriolis acts on U minus this), m/s
     double tilt_ax, tilt_ay;     ///< −g ∇η, m/s²
@@ -116,6 +116,8 @@ struct bt_solver;
 struct bt_tow;
 struct bt_domain;
 struct bt_window;
+struct bt_impacts;
+struct bt_environment;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
@@ -141,9 +143,12 @@ typedef struct bt_world {
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still
+    struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
+    struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
+    double drift_x, drift_y; ///< displacement of the water since time zero, m
     bt_step_stats stats;
 } bt_world;
 

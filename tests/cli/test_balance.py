@@ -15,6 +15,16 @@ BALANCES = {
                                              "line_length": 1.5, "line_stiffness": 300, "line_damping": 0}, ice__restitution=0.5),
     "line, current, wind, Coriolis": changed(TOW, tow__mode="line", water={"latitude": 75, "current_y": 0.05}, air={"wind_x": -3}),
     "speed, current, slope, Coriolis": changed(TOW, water={"latitude": 75, "current_y": 0.05, "tilt": "slope", "slope_x": 1e-5}),
+    # Everything that changes: the tide turns within the run.
+    "line, tide, dynamic tilt, wind, Coriolis, geographic": changed(
+        TOW, domain__frame="geographic", domain__x0=0, tow__mode="line", tow__direction=10, air={"wind_x": 2, "wind_y": 4},
+        water={"latitude": 75, "current_x": 0.02, "tilt": "dynamic", "tide": {"major": 0.1, "minor": 0.05, "period": 40, "inclination": 70}}),
+    "speed, tide, geostrophic, wind, Coriolis, geographic": changed(
+        TOW, domain__frame="geographic", domain__x0=0, air={"wind_x": -2, "wind_y": 4},
+        water={"latitude": -75, "tilt": "geostrophic", "tide": {"major": 0.1, "minor": -0.05, "period": 40, "phase": 100}}),
+    "none, tide, dynamic tilt, wind, Coriolis": changed(
+        TOW, tow={"mode": "none"}, body__vx=0.2, air={"wind_x": 5}, solver={"reference_speed": 0.13},
+        water={"latitude": 75, "tilt": "dynamic", "tide": {"major": 0.1, "minor": 0.05, "period": 40}}),
 }
 
 
@@ -24,20 +34,76 @@ def balanced(request, tmp_path_factory):
 
 
 def test_forces_on_the_body(balanced):
-    """tow = ice + drag + inertia in every sample, and in the means of the summary to 1e-6.
+    """tow = ice + drag + Coriolis + tilt + inertia in every sample, and in the means of the summary to 1e-6.
 
     On a line this holds the spring's tension, the contact rows, the drag formulas and the velocities against each other.
     """
     case, r = balanced
-    tow, ice, drag, inertia = r.series("tow_force", "ice_resistance", "drag_force", "inertia_force")
-    scale = np.abs([tow, ice, drag, inertia]).max()
-    assert np.abs(ice).max() > 1 and np.abs(drag).max() > 0.1
-    assert np.abs(tow - ice - drag - inertia).max() <= 1e-9 * scale
+    tow, *others = r.series("tow_force", "ice_resistance", "drag_force", "coriolis_force", "tilt_force", "inertia_force")
+    scale = np.abs([tow, *others]).max(axis=0) # the largest term of that sample
+    assert np.abs(others[0]).max() > 1 and np.abs(others[1]).max() > 0.1
+    assert np.all(np.abs(tow - sum(others)) <= 1e-9 * scale)
     s = r.summary
-    mean = s["mean_tow_force_n"] - s["mean_drag_force_n"] - s["mean_inertia_force_n"]
+    mean = s["mean_tow_force_n"] - sum(s[f"mean_{name}_force_n"] for name in ("drag", "coriolis", "tilt", "inertia"))
     assert s["mean_ice_resistance_n"] == pytest.approx(mean, rel=1e-6)
-    assert s["budget"]["tow_minus_drag_minus_inertia_n"] == pytest.approx(mean, rel=1e-9)
+    assert s["budget"]["tow_minus_other_forces_n"] == pytest.approx(mean, rel=1e-9)
     assert not warned(r, "balance")
+
+
+def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
+    """Each from the recorded velocities and the case's own numbers: the budget closes term by term, not in the sum alone."""
+    case, r = balanced
+    names = "time body_vx body_vy body_yaw drag_force coriolis_force tilt_force current_x current_y wind_x wind_y".split()
+    t, vx, vy, yaw, drag, coriolis, tilt, *fluids = r.series(*names)
+    water, air = case.get("water", {}), case.get("air", {})
+    flow = np.array(fluids).reshape(2, 2, -1)
+    tide = water.get("tide", {})
+    mean = np.array([[water.get("current_x", 0), water.get("current_y", 0)], [air.get("wind_x", 0), air.get("wind_y", 0)]])
+    i, turn = np.radians(tide.get("inclination", 0)), 2 * np.pi / tide.get("period", 1)
+    axes = np.array([[np.cos(i), -np.sin(i)], [np.sin(i), np.cos(i)]]) * [tide.get("major", 0), tide.get("minor", 0)]
+
+    def current(time):
+        a = turn * np.asarray(time) - np.radians(tide.get("phase", 0))
+        return mean[0][:, None] + axes @ np.array([np.cos(a), np.sin(a)])
+
+    np.testing.assert_allclose(flow[0], current(t - 0.05), atol=1e-12)
+    np.testing.assert_allclose(flow[1], np.repeat(mean[1][:, None], len(t), axis=1), atol=1e-12)
+    angle = np.radians(case["tow"].get("direction", 0))
+    along = np.array([np.cos(angle), np.sin(angle)])
+    with h5py.File(r.dir / "result.h5") as f:
+        area, height, outline = f["bodies/area"][0], f["bodies/height"][0], f["bodies/vertices"][:f["bodies/offsets"][1]]
+    mass, draft = 1.5 * 900 * area * height, 0.5
+    u = np.array([vx, vy])
+    prescribed = case["tow"].get("mode", "speed") == "speed"
+    start = np.array([[case["body"].get("vx", 0), 0]] + list(u.T[:-1])).T
+    before = np.concatenate([[0], yaw[:-1]])
+    want = np.zeros_like(u)
+    # The coefficient is that of the speed at the start of the step (of the prescribed speed itself), the velocity that at its end.
+    for k in range(len(t)):
+        for ref, skin, form in ((flow[0, :, k], 1027 * 5e-4 * area, 0.5 * 1027 * 0.85 * draft),
+                                (flow[1, :, k], 1.29 * 2.5e-4 * area, 0.5 * 1.29 * 0.4 * (height - draft))):
+            rel = ref - (u if prescribed else start)[:, k]
+            speed = np.hypot(*rel)
+            if speed > 0:
+                c, s = np.cos(before[k]), np.sin(before[k])
+                width = np.ptp(outline @ np.array([[c, s], [-s, c]]) @ [-rel[1], rel[0]]) / speed
+                want[:, k] += (skin + form * width) * speed * (ref - u[:, k])
+    scale = np.abs(want).max()
+    np.testing.assert_allclose(drag, -(along @ want), atol=1e-9 * scale)
+
+    right = 1 if case["domain"].get("frame") == "geographic" else -1
+    f = right * 2 * 7.292115e-5 * np.sin(np.radians(water.get("latitude", 0)))
+    spin = np.array([[0, -f], [f, 0]])
+    moving = u if prescribed else start
+    slope = water.get("tilt", "none")
+    here, last = current(t - 0.05), current(np.maximum(t - 0.15, 0))
+    push = {"none": np.zeros_like(u), "slope": np.full_like(u, 0) + np.array([[-9.81 * water.get("slope_x", 0)], [0]]),
+            "geostrophic": -spin @ here, "dynamic": -spin @ last + (here - last) / 0.1}[slope]
+    # The rotation by f dt is that force but for f dt / 2 = 7e-6 of it.
+    np.testing.assert_allclose(coriolis, -mass * (along @ spin @ moving), atol=1e-5 * mass * abs(f) * 0.5)
+    np.testing.assert_allclose(tilt, -mass * (along @ push), atol=1e-5 * mass * abs(f) * 0.5 + 1e-12 * mass)
+    # A body that is led along a straight line has its Coriolis force across.
+    assert (np.abs(coriolis).max() > 0) == (f != 0 and not prescribed) and (np.abs(tilt).max() > 0) == (slope != "none")
 
 
 def test_inertia_is_mass_times_acceleration(balanced):
@@ -45,7 +111,7 @@ def test_inertia_is_mass_times_acceleration(balanced):
     case, r = balanced
     vx, vy, inertia = r.series("body_vx", "body_vy", "inertia_force")
     angle = np.radians(case["tow"].get("direction", 0))
-    v = np.concatenate([[0], vx * np.cos(angle) + vy * np.sin(angle)])
+    v = np.concatenate([[case["body"].get("vx", 0) * np.cos(angle)], vx * np.cos(angle) + vy * np.sin(angle)])
     with h5py.File(r.dir / "result.h5") as f:
         area, height = f["bodies/area"][0], f["bodies/height"][0]
     mass = 1.5 * 900 * area * height

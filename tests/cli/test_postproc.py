@@ -23,7 +23,7 @@ from bergtow_read import Run, RunError  # noqa: E402
 SQUARE = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 TRIANGLE = np.array([[-1.0, -0.5], [1.0, -0.5], [0.0, 1.0]])
 HULL = np.array([[-2.0, -1.0], [2.0, -1.0], [2.0, 1.0], [-2.0, 1.0]])
-SCRIPTS = ("plot_force.py", "plot_field.py", "animate.py", "contents.py")
+SCRIPTS = ("plot_force.py", "plot_field.py", "plot_impacts.py", "animate.py", "contents.py")
 
 CASE = """# A case with every key, its value in SI units, and what it means.
 

@@ -179,7 +179,7 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     deadline = time.time() + 30
     while time.time() < deadline:
         try:
-            if (tmp_path / "out/result.h5").stat().st_size > 400_000:
+            if (tmp_path / "out/result.h5").stat().st_size > 600_000:
                 break
         except FileNotFoundError:
             pass

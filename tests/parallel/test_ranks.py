@@ -34,13 +34,13 @@ JAM = {
     "solver": {"tile": 2.5, "max_sweeps": 15},
     "output": {"frame_interval": 2.5},
 }
-# No walls, every force, and floes of very different size; the current carries them through tiles and seams.
+# No walls, every force, and floes of very different size; the current, which the tide turns, carries them through tiles and seams.
 SEAMS = {
     "run": {"dt": 0.2, "duration": 100},
     "domain": {"length": 30, "width": 24, "ends": "periodic", "sides": "periodic"},
     "ice": {"concentration": 0.6, "size": 1, "size_law": "power", "size_min": 0.6, "size_max": 3, "size_exponent": 2, "thickness_law": "lognormal"},
     "body": {"shape": "none"},
-    "water": {"latitude": 75, "current_x": 0.2, "current_y": -0.15},
+    "water": {"latitude": 75, "current_x": 0.2, "current_y": -0.15, "tilt": "dynamic", "tide": {"major": 0.2, "minor": 0.1, "period": 80, "inclination": 30}},
     "air": {"wind_x": -6, "wind_y": 8},
     "solver": {"tile": 2},
     "output": {"frame_interval": 10},
@@ -48,10 +48,13 @@ SEAMS = {
 # A berg that goes round a channel without ends.
 ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ice={"concentration": 0.5, "size": 1}, run__duration=50, run__dt=0.1,
                 body__x=3, tow__speed=0.8)
-CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND}
+# The same where the tide turns, in a managed lead: nothing rests, and between the walls the tiles go with the water.
+TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}}, tow__mode="line",
+               lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
+CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
 PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
-         "round": [(2, 1), (3, 2), (4, 1)]}
+         "round": [(2, 1), (3, 2), (4, 1)], "tide": [(2, 2), (3, 1)]}
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):

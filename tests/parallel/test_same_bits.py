@@ -18,9 +18,9 @@ ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 LINE = changed(PRESS, domain__ends_closing=0, domain__sides_closing=0, body={"shape": "disc", "length": 6, "x": 8},
                tow={"mode": "line", "speed": 0.5, "ramp": 0, "line_length": 2, "line_damping": 0, "hull_y": 1, "hull_x": 2},
                ice__restitution=0.3, run__duration=3)
-# Periodic both ways, restless and under every force: floes cross the seams.
+# Periodic both ways, restless and under every force, in a tide that turns: floes cross the seams.
 SEAMS = changed(PRESS, domain={"length": 66, "width": 40, "ends": "periodic", "sides": "periodic"}, body={"shape": "none"},
-                water={"latitude": 75, "current_x": 0.4, "current_y": -0.3}, air={"wind_x": -8, "wind_y": 11}, run__duration=3,
+                water={"latitude": 75, "current_x": 0.4, "current_y": -0.3, "tilt": "dynamic", "tide": {"major": 0.2, "minor": -0.1, "period": 5}}, air={"wind_x": -8, "wind_y": 11}, run__duration=3,
                 ice={"concentration": 0.7, "size": 0.8, "thickness_law": "lognormal", "size_law": "lognormal", "size_spread": 0.4})
 CASES = {"press": PRESS, "line": LINE, "seams": SEAMS}
 

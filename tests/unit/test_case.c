@@ -537,7 +537,9 @@ static void compare(const bt_key *keys, int n, const void *a, const void *b)
             const char *ta, *tb;
             memcpy(&ta, ma, sizeof ta), memcpy(&tb, mb, sizeof tb);
             same = ta && tb ? !strcmp(ta, tb) : ta == tb;
-            if (k->offset == offsetof(bt_case, ice.field) && keys == bt_case_keys) same = true; // becomes absolute; compared as text below
+            // becomes absolute; compared as text below
+            const size_t o = k->offset;
+            if (keys == bt_case_keys && (o == offsetof(bt_case, ice.field) || o == offsetof(bt_case, water.current_table) || o == offsetof(bt_case, air.wind_table))) same = true;
         }
         if (k->type == BT_KEY_POINTS) {
             const double *pa, *pb;

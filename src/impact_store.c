@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+// Datasets of collisions and panels; one table names the columns of a collision.
+#include "impact_store.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
+
+static const struct {
+    const char *name, *units, *description;
+    size_t offset;
+    bool whole;
+} columns[] = {
+#define ROW(name_, member, whole_, units_, text) {name_, units_, text, offsetof(bt_impact, member), whole_}
+    ROW("time", time, false, "s", "end of the step in which the collision began"),
+    ROW("floe", gid, true, "1", "id of the floe; from n_floes on one of /bodies, as a wall"),
+    ROW("x", x, false, "m", "where on the hull, in the frame of the towed body"),
+    ROW("y", y, false, "m", "where on the hull, in the frame of the towed body"),
+    ROW("panel", panel, true, "1", "panel of the hull"),
+    ROW("impulse", impulse, false, "N s", "normal impulse that the approach explains, over all its steps"),
+    ROW("approach", approach, false, "m/s", "normal speed of approach at the start of the first step"),
+    ROW("effective_mass", mass, false, "kg", "m_e = 1 / n.(1/M_a + 1/M_b).n with rotation and added mass"),
+    ROW("thickness", thickness, false, "m", "thickness of the floe"),
+    ROW("corner", corner, false, "rad", "angle of the crushed corner; used by conversion crushing alone"),
+    ROW("mean", mean, false, "N", "mean force by the conversion"),
+    ROW("peak", peak, false, "N", "peak force by the conversion"),
+    ROW("duration", duration, false, "s", "conversion duration: of the collision; crushing: time from touch to peak"),
+#undef ROW
+};
+_Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS && sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
+               "every number of a collision has its column");
+
+static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
+{
+    bt_h5_attr_text(h, path, "units", units);
+    bt_h5_attr_text(h, path, "description", text);
+}
+
+static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
+{
+    bt_h5 *h = s->h;
+    const hsize_t n = (hsize_t)p->n;
+    double *start = bt_alloc(2 * (size_t)p->n + 2, sizeof *start), *middle = bt_alloc(2 * (size_t)p->n, sizeof *middle), *normal = bt_alloc(2 * (size_t)p->n, sizeof *normal);
+    for (int k = 0; k <= p->n; k++) bt_panels_point(p, k, start + 2 * k, NULL);
+    for (int k = 0; k < p->n; k++) bt_panels_point(p, k + 0.5, middle + 2 * k, normal + 2 * k);
+    bt_h5_group(h, "/panels");
+    bt_h5_attr_double(h, "/panels", "length", p->arc[p->n_vertices] / p->n);
+    bt_h5_attr_text(h, "/panels", "description", "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the body's own x axis");
+    bt_h5_write(h, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
+    describe(h, "/panels/ends", "m", "panel k reaches from point k to k + 1, frame of the towed body");
+    bt_h5_write(h, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
+    describe(h, "/panels/middle", "m", "middle of each panel, frame of the towed body");
+    bt_h5_write(h, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
+    describe(h, "/panels/normal", "1", "outward normal there");
+    free(start);
+    free(middle);
+    free(normal);
+    if (!series) return;
+    s->force = bt_h5_growing(h, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n}, false);
+    s->normal = bt_h5_growing(h, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
+    describe(h, "/panels/force", "N", "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry of /series");
+    describe(h, "/panels/load", "N", "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
+}
+
+void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, bool series)
+{
+    *s = (bt_impact_store){.h = h, .from = m, .force = -1, .normal = -1, .n_panels = m->panels.n};
+    bt_h5_group(h, "/impacts");
+    char text[160], path[64];
+    bt_impact_describe(&m->rule, text);
+    bt_h5_attr_text(h, "/impacts", "conversion", text);
+    bt_h5_attr_text(h, "/impacts", "description", "collisions with the towed body in the order in which they ended");
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+        s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){CHUNK, 1}, false);
+        describe(h, path, columns[k].units, columns[k].description);
+    }
+    s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
+    create_panels(s, &m->panels, series);
+}
+
+static void write_rows(bt_impact_store *s)
+{
+    if (s->n_rows == 0) return;
+    double *x = bt_alloc((size_t)s->n_rows, sizeof *x);
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+        for (int64_t i = 0; i < s->n_rows; i++) memcpy(&x[i], (const char *)&s->rows[i] + columns[k].offset, sizeof *x);
+        bt_h5_append(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)s->written, (hsize_t)s->n_rows, x);
+    }
+    free(x);
+    s->written += s->n_rows;
+    s->n_rows = 0;
+}
+
+void bt_impact_store_take_closed(bt_impact_store *s)
+{
+    if (!s->h || s->from->n_closed == 0) return;
+    const int64_t n = s->from->n_closed;
+    if (s->n_rows + n > s->cap_rows) {
+        s->cap_rows = 2 * (s->n_rows + n);
+        s->rows = bt_realloc(s->rows, (size_t)s->cap_rows, sizeof *s->rows);
+    }
+    memcpy(s->rows + s->n_rows, s->from->closed, (size_t)n * sizeof *s->rows);
+    s->n_rows += n;
+    if (s->n_rows >= CHUNK) write_rows(s);
+}
+
+void bt_impact_store_take(bt_impact_store *s)
+{
+    if (!s->h) return;
+    bt_impact_store_take_closed(s);
+    for (int k = 0; k < s->n_panels; k++) {
+        const bt_panel *p = &s->from->panels.panel[k];
+        s->sum[3 * k] += p->fx;
+        s->sum[3 * k + 1] += p->fy;
+        s->sum[3 * k + 2] += p->normal;
+    }
+    s->n_merged++;
+}
+
+void bt_impact_store_end_sample(bt_impact_store *s)
+{
+    if (!s->h || s->n_merged == 0) return;
+    const size_t n = (size_t)s->n_panels;
+    if (s->force >= 0) {
+        if (s->n_samples == s->cap_samples) {
+            s->cap_samples = s->cap_samples ? 2 * s->cap_samples : 64;
+            s->forces = bt_realloc(s->forces, (size_t)s->cap_samples * n, 2 * sizeof *s->forces);
+            s->normals = bt_realloc(s->normals, (size_t)s->cap_samples * n, sizeof *s->normals);
+        }
+        double *f = s->forces + 2 * n * (size_t)s->n_samples, *l = s->normals + n * (size_t)s->n_samples;
+        for (size_t k = 0; k < n; k++) {
+            f[2 * k] = s->sum[3 * k] / (double)s->n_merged;
+            f[2 * k + 1] = s->sum[3 * k + 1] / (double)s->n_merged;
+            l[k] = s->sum[3 * k + 2] / (double)s->n_merged;
+        }
+        s->n_samples++;
+    }
+    memset(s->sum, 0, 3 * n * sizeof *s->sum);
+    s->n_merged = 0;
+}
+
+void bt_impact_store_write(bt_impact_store *s)
+{
+    if (!s->h) return;
+    write_rows(s);
+    if (s->n_samples > 0) {
+        bt_h5_append(s->h, s->force, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->forces);
+        bt_h5_append(s->h, s->normal, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->normals);
+    }
+    s->samples_written += s->n_samples;
+    s->n_samples = 0;
+}
+
+void bt_impact_store_totals(bt_impact_store *s)
+{
+    if (!s->h) return;
+    const bt_impacts *m = s->from;
+    const bt_panels *p = &m->panels;
+    const double steps = (double)p->steps;
+    const size_t n = (size_t)p->n;
+    double *x = bt_alloc(5 * n, sizeof *x);
+    int64_t *count = bt_alloc(n, sizeof *count);
+    for (size_t k = 0; k < n; k++) {
+        const bt_panel *l = &p->panel[k];
+        x[2 * k] = l->sum_fx / steps, x[2 * k + 1] = l->sum_fy / steps; // NaN when no step counts
+        x[2 * n + k] = l->sum_normal / steps;
+        x[3 * n + k] = l->max_normal;
+        x[4 * n + k] = l->max_peak;
+        count[k] = l->collisions;
+    }
+    bt_h5 *h = s->h;
+    bt_h5_attr_double(h, "/panels", "from", m->from);
+    bt_h5_attr_int(h, "/panels", "steps", p->steps);
+    bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
+    bt_h5_write(h, "/panels/mean_load", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 2 * n);
+    bt_h5_write(h, "/panels/max_load", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 3 * n);
+    bt_h5_write(h, "/panels/max_peak", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 4 * n);
+    bt_h5_write(h, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
+    describe(h, "/panels/mean_force", "N", "mean contact force from the time `from` on, x and y in the frame of the towed body");
+    describe(h, "/panels/mean_load", "N", "mean sum of the normal forces from the time `from` on");
+    describe(h, "/panels/max_load", "N", "largest sum of the normal forces in a step, impulse / dt, from the time `from` on");
+    describe(h, "/panels/max_peak", "N", "largest peak of a collision by the conversion of /impacts, from the time `from` on");
+    describe(h, "/panels/collisions", "1", "collisions from the time `from` on");
+    free(x);
+    free(count);
+}
+
+void bt_impact_store_close(bt_impact_store *s)
+{
+    if (!s->h) return;
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++)
+        if (s->column[k] >= 0) H5Dclose(s->column[k]);
+    if (s->force >= 0) H5Dclose(s->force);
+    if (s->normal >= 0) H5Dclose(s->normal);
+    free(s->rows);
+    free(s->forces);
+    free(s->normals);
+    free(s->sum);
+    *s = (bt_impact_store){0};
+}

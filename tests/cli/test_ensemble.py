@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""Ensembles: whatever happens to the processes, every member is there once, and the file is that of a quiet run."""
+import json
+import os
+import random
+import signal
+import subprocess
+import time
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, write_case
+
+BASE = changed(TOW, run__duration=20, output__window_start=5)
+STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
+         "parameters": {"ice.concentration": [0.2, 0.5], "tow.speed": {"from": "0.1 m/s", "to": "0.2 m/s", "n": 2}}}
+ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
+
+
+def prepare(folder, study=STUDY, base=BASE):
+    write_case(folder, base, "base.yml")
+    (folder / "study.yml").write_text(json.dumps(study))
+    return folder
+
+
+def ensemble(folder, out="all", *more, **how):
+    return call("ensemble", "study.yml", "-o", out, "--threads", 1, *more, cwd=folder, **how)
+
+
+def journal(folder, out="all"):
+    return [json.loads(line) for line in (folder / out / "journal.jsonl").read_text().splitlines()]
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    folder = prepare(tmp_path_factory.mktemp("quiet"))
+    result = ensemble(folder)
+    assert result.returncode == DONE, result.stderr
+    return folder, result
+
+
+def test_a_row_for_each_member(quiet):
+    folder, result = quiet
+    with h5py.File(folder / "all/ensemble.h5") as f:
+        assert f.attrs["complete"] == 1 and f.attrs["n_members"] == 12 and f.attrs["n_finished"] == 12 and f.attrs["n_failed"] == 0
+        assert np.all(f["members/status"][()] == 1) and len(set(f["members/seed"][()])) == 12
+        assert np.array_equal(f["members/condition"][()], np.repeat([0, 1, 2, 3], 3))
+        assert np.array_equal(f["parameters/ice.concentration"][()], np.repeat([0.2, 0.5], 6))
+        assert np.allclose(f["parameters/tow.speed"][()], np.tile(np.repeat([0.1, 0.2], 3), 2), rtol=1e-15) and f["parameters/tow.speed"].attrs["units"] == "m/s"
+        for i, name in enumerate(f["members/name"].asstr()[()]):
+            member = folder / "all/members" / name
+            summary = json.loads((member / "summary.json").read_text())
+            assert f["members/state_hash"].asstr()[i] == summary["state_hash"]
+            assert f["summary/mean_ice_resistance_n"][i] == summary["mean_ice_resistance_n"]
+            with h5py.File(member / "result.h5") as r:
+                assert np.array_equal(f["series/ice_resistance"][i], r["series/ice_resistance"][()])
+            # A member is an ordinary run: its case alone gives the same.
+            if i in (0, 11):
+                assert call("run", member / "case.resolved.yml", "-o", f"again{i}", "--quiet", cwd=folder).returncode == DONE
+                assert json.loads((folder / f"again{i}/summary.json").read_text())["state_hash"] == summary["state_hash"]
+        assert not {"wall_time_s", "threads", "phases_s_solve"} & set(f["summary"])
+    assert "12 members: 4 conditions x 3 fields" in result.stdout and "12 finished, 0 failed" in result.stdout.replace("members ", "")
+
+
+def test_finished_members_are_not_run_again(quiet):
+    folder, _ = quiet
+    before = len(journal(folder))
+    result = ensemble(folder)
+    assert result.returncode == DONE and len(journal(folder)) == before
+
+
+def test_killed_and_called_again(quiet, tmp_path):
+    folder, _ = quiet
+    prepare(tmp_path)
+    rng = random.Random(3)
+    for _ in range(4):
+        child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stdout=subprocess.DEVNULL)
+        time.sleep(0.15 + 0.4 * rng.random())
+        child.kill()
+        child.wait()
+    stopped = len([j for j in journal(tmp_path) if j["event"] == "start"]) - len([j for j in journal(tmp_path) if j["event"] == "finished"])
+    assert stopped >= 1 # some member was struck in its middle
+    assert ensemble(tmp_path).returncode == DONE
+    assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+    assert sorted(j["member"] for j in journal(tmp_path) if j["event"] == "finished") == sorted(p.name for p in (tmp_path / "all/members").iterdir())
+
+
+def test_interrupted(quiet, tmp_path):
+    folder, _ = quiet
+    prepare(tmp_path)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1),
+                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not list(tmp_path.glob("all/members/*/result*.h5")):
+        time.sleep(0.01)
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    assert child.returncode == SIGNAL and "goes on with the" in err
+    with h5py.File(tmp_path / "all/ensemble.h5") as f:
+        assert f.attrs["complete"] == 0
+    assert ensemble(tmp_path).returncode == DONE
+    assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+
+def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
+    folder, _ = quiet
+    prepare(tmp_path)
+    jobs = [subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--quiet"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1)) for _ in range(3)]
+    assert [j.wait(timeout=120) for j in jobs] == [DONE] * 3
+    starts = [j["member"] for j in journal(tmp_path) if j["event"] == "start"]
+    assert len(starts) == len(set(starts)) == 12 and len({j["pid"] for j in journal(tmp_path)}) > 1
+    assert ensemble(tmp_path).returncode == DONE  # the one that ended last may have gathered before another's last member
+    assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+    groups = changed(STUDY, ranks=2, repeats=2)
+    prepare(tmp_path / "mpi", groups)
+    result = subprocess.run(["mpirun", "--oversubscribe", "-n", "3", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path / "mpi",
+                            env=environment(OMP_NUM_THREADS=1, **ROOT), capture_output=True, text=True, timeout=180)
+    assert result.returncode == DONE, result.stderr
+    with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "mpi/all/ensemble.h5") as b:
+        kept = a["members/repeat"][()] < 2
+        assert np.array_equal(a["members/state_hash"][kept], b["members/state_hash"][()])
+
+
+def test_one_member_fails_and_the_rest_complete(tmp_path):
+    # The second condition ends before its window begins, which only the whole case shows.
+    prepare(tmp_path, {"base": "base.yml", "parameters": {"run.duration": [8, 3, 6]}})
+    result = ensemble(tmp_path)
+    assert result.returncode == CASE
+    assert "member c002-r001 failed (3)" in result.stderr and "output.window_start" in result.stderr
+    with h5py.File(tmp_path / "all/ensemble.h5") as f:
+        assert list(f["members/status"][()]) == [1, 2, 1] and f.attrs["complete"] == 1
+        assert "output.window_start" in f["members/reason"].asstr()[1]
+        assert np.isnan(f["summary/mean_ice_resistance_n"][1]) and np.isfinite(f["series/time"][0]).sum() == 80 and np.isfinite(f["series/time"][2]).sum() == 60
+    before = len(journal(tmp_path))
+    assert ensemble(tmp_path).returncode == CASE and len(journal(tmp_path)) == before
+    assert ensemble(tmp_path, "all", "--retry-failed").returncode == CASE and len(journal(tmp_path)) == before + 2
+
+
+def test_a_full_disk_is_named_and_made_good(quiet, tmp_path):
+    folder, _ = quiet
+    prepare(tmp_path, changed(STUDY, repeats=1))
+    # The members' files hit the limit on file sizes; the small texts do not.
+    limited = subprocess.run(["bash", "-c", f"ulimit -f 40; exec {BERGTOW} ensemble study.yml -o all --threads 1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1),
+                             capture_output=True, text=True, timeout=120)
+    assert limited.returncode == IO and "failed (4)" in limited.stderr and "ulimit -f" in limited.stderr
+    assert ensemble(tmp_path, "all", "--retry-failed").returncode == DONE
+    with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "all/ensemble.h5") as b:
+        assert np.array_equal(a["members/state_hash"][()][::3], b["members/state_hash"][()]) and b.attrs["n_failed"] == 0
+
+
+def test_a_process_that_dies_each_time_does_not_stop_the_rest(tmp_path):
+    prepare(tmp_path, changed(STUDY, repeats=1))
+    bad = tmp_path / "all/members/c004-r001"
+    bad.mkdir(parents=True)
+    (bad / "attempts").write_text("." * 20)
+    result = ensemble(tmp_path)
+    assert "its process died in each of 20 attempts" in result.stderr and "3 members finished, 1 failed" in result.stdout
+    assert [j["member"] for j in journal(tmp_path)][-1] == "c004-r001"  # it came last
+
+
+def test_another_study_is_refused(quiet, tmp_path):
+    folder, _ = quiet
+    for name, study, base in ("values", changed(STUDY, parameters={"ice.concentration": [0.2, 0.6]}), BASE), ("base", STUDY, changed(BASE, ice__friction=0.1)), ("seed", changed(STUDY, seed=5), BASE):
+        here = prepare(tmp_path / name, study, base)
+        os.symlink(folder / "all", here / "all")
+        result = ensemble(here)
+        assert result.returncode == CASE and "another study" in result.stderr, name
+    more = prepare(tmp_path / "more", changed(STUDY, repeats=4))
+    subprocess.run(["cp", "-r", folder / "all", more / "all"], check=True)
+    assert ensemble(more).returncode == DONE
+    with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(more / "all/ensemble.h5") as b:
+        old = b["members/repeat"][()] < 3
+        assert b.attrs["n_finished"] == 16 and np.array_equal(a["members/state_hash"][()], b["members/state_hash"][old])
+
+
+BAD = {"repeat": 3, "set": {"run.duration": "20 x", "ice.sed": 4}, "sampling": "lhs",
+       "parameters": {"ice.concentration": [0.2, 1.5, 0.2], "tow.speed": {"from": 0.3, "too": 0.2, "n": 1}, "ice.seed": [1, 2], "tow": 4, "run.duration": [1], "body.draft": []}}
+
+
+def test_every_fault_of_a_study_at_once(tmp_path):
+    prepare(tmp_path, BAD)
+    result = ensemble(tmp_path)
+    assert result.returncode == CASE and not (tmp_path / "all").exists()
+    for part in ("repeat: unknown key of a study; did you mean repeats", "base: missing", "\"x\" is not a unit of time", "ice.sed: unknown key; did you mean ice.seed", "1.5 is out of range",
+                 "did you mean to", "ice.seed: the fields of a study", "tow: is a section", "give grid or latin-hypercube", "body.draft: the list is empty"):
+        assert part in result.stderr, part
+    assert "Traceback" not in result.stderr and all(line.startswith("bergtow: study.yml") for line in result.stderr.splitlines())

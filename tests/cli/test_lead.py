@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""The lead ahead of the body in a run: counted, felt by the body, the same however the field came to be."""
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, area, call, changed, placed, run, worst_overlap, write_case
+
+# A body of 2 m in half-open ice of 0.8 m.
+BASE = {
+    "run": {"dt": 0.1, "duration": 25}, "domain": {"length": 16, "width": 9}, "ice": {"concentration": 0.5, "size": 0.8, "x_min": 4.5, "thickness_law": "lognormal"},
+    "body": {"x": 2.5, "length": 2, "shape": "square"}, "tow": {"speed": 0.2, "ramp": 2}, "solver": {"max_sweeps": 200}, "output": {"frame_interval": 10},
+}
+CHANNEL = {"mode": "channel", "width": 2.2}
+MANAGED = {"mode": "managed", "width": 2.2, "floe_size": 0.35, "length": 8}
+
+
+def floes(r):
+    with h5py.File(r.dir / "result.h5") as f:
+        v, o, pose, h = f["floes/vertices"][:], f["floes/offsets"][:], f["frames/pose"][0], f["floes/thickness"][:]
+    return [placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose)], h
+
+
+def test_a_channel_as_wide_as_the_body_is_open_water(tmp_path):
+    """Nothing is in the way of a square body in a channel wider than it, and only floes at its end could touch it."""
+    plain = run(tmp_path, BASE, name="plain")
+    r = run(tmp_path, changed(BASE, lead=CHANNEL), name="channel")
+    assert plain.series("ice_resistance").max() > 5 and plain.summary["lead"] is None
+    assert r.series("ice_resistance").max() == 0
+    lead, (was, h_was), (now, h_now) = r.summary["lead"], floes(plain), floes(r)
+    removed = [p for p in was if not any(np.array_equal(p, q) for q in now)]
+    assert lead["mode"] == "channel" and lead["width_m"] == 2.2 and lead["pieces"] == 0
+    assert lead["length_m"] == pytest.approx(0.2 * (25 - 1) + 2, rel=1e-12), "the length of the tow and the body"
+    assert lead["floes_removed"] == len(removed) == len(was) - len(now) > 10
+    assert lead["area_removed_m2"] == pytest.approx(sum(map(area, removed)), rel=1e-9)
+    assert all(np.any(np.abs(p[:, 1]) < 1.1) or np.ptp(np.sign(p[:, 1])) == 2 for p in removed)
+    ice = (16 - 4.5) * 9
+    assert lead["concentration_before"] == pytest.approx(0.5, abs=0.004) and r.summary["concentration"] == lead["concentration_before"]
+    assert lead["concentration_after"] == pytest.approx(sum(map(area, now)) / ice, rel=1e-9)
+    assert f"{len(removed)} floes" in r.result.stdout and "removed; concentration" in r.result.stdout
+
+
+def test_a_managed_lead_keeps_the_mass(tmp_path):
+    plain = run(tmp_path, BASE, name="plain")
+    r = run(tmp_path, changed(BASE, lead=MANAGED), name="managed")
+    lead, (was, h_was), (now, h_now) = r.summary["lead"], floes(plain), floes(r)
+    assert lead["mode"] == "managed" and lead["floes_cut"] > 10 and lead["pieces"] > 3 * lead["floes_cut"]
+    assert lead["pieces"] - lead["floes_cut"] == len(now) - len(was)
+    mass = [sum(area(p) * h for p, h in zip(*both)) for both in ((was, h_was), (now, h_now))]
+    assert mass[1] == pytest.approx(mass[0], rel=1e-9)
+    assert worst_overlap(now) < 0
+    inside = [p for p in now if p[:, 0].min() < 10 and np.abs(p[:, 1]).min() < 1]
+    assert max(map(area, inside)) <= np.pi / 4 * 0.35 ** 2 * (1 + 1e-9)
+    assert lead["concentration_after"] == pytest.approx(lead["concentration_before"], rel=5e-3)
+    assert "cut into" in r.result.stdout
+    assert r.series("ice_resistance").mean() > 0
+    assert r.summary["momentum_residual"] < 1e-10
+
+
+def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
+    """`bergtow field` writes the ice as it was before the lead, since the case that reads it opens the lead."""
+    case = changed(BASE, lead=MANAGED, run__duration=2)
+    made = run(tmp_path, case, name="made")
+    assert call("field", tmp_path / "case.yml", "-o", tmp_path / "f.h5").returncode == 0
+    read = run(tmp_path, changed(case, ice__field="f.h5"), name="read")
+    assert made.hash == read.hash and made.summary["lead"] == read.summary["lead"]
+    result = call("check", tmp_path / "case.yml")
+    lead = made.summary["lead"]
+    assert f"{lead['floes_cut']} floes" in result.stdout and f"cut into {lead['pieces']} pieces" in result.stdout
+    again = run(tmp_path, made.dir / "case.resolved.yml", name="again")
+    assert again.hash == made.hash
+
+
+BAD = {
+    "nothing is towed": ({"tow": {"mode": "none"}, "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow, and nothing is towed"),
+    "no body": ({"body": {"shape": "none"}, "tow": {"mode": "none"}, "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow"),
+    "no piece size": ({"lead": {"mode": "managed"}}, "lead.floe_size: is 0 m and a managed lead needs the size of its pieces"),
+    "no width": ({"lead": {"mode": "channel", "width": 0}}, "lead.width: is 0 m"),
+    "no length": ({"lead": {"mode": "channel", "length": 0}}, "lead.length: is 0 m"),
+    "tiny pieces": ({"lead": {"mode": "managed", "floe_size": 1e-5}}, "lead.floe_size: 1e-05 m makes up to"),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_leads_that_are_refused(tmp_path, kind):
+    changes, fragment = BAD[kind]
+    path = write_case(tmp_path, BASE | changes)
+    result = call("run", path, "-o", tmp_path / "out")
+    assert result.returncode == CASE and fragment in result.stderr, result.stderr
+    assert json.loads(path.read_text()) and "case.yml" in result.stderr

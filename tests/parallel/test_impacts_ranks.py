@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: MIT
+"""Collisions and panel loads: the same rows in the same order, to the bit, on any ranks and threads."""
+import subprocess
+
+import h5py
+import pytest
+
+from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, run
+
+ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
+KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
+# A body of infinite mass, whose contacts lie in the tiles of the floes, and a free one, whose contacts are one rank's.
+# The first is broad and in many tiles: it hits several floes in a step, found by several threads and ranks.
+CASES = {"speed": changed(TOW, **KEPT, domain={"length": 24, "width": 16}, ice__size=0.5, body={"length": 1.5, "width": 10, "shape": "rectangle", "x": 3}), "line": changed(TOW, **KEPT, tow={"mode": "line", "speed": 0.13, "line_length": 3}, body__shape="ship")}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def one(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(request.param)
+    return folder, run(folder, CASES[request.param], "--threads", 1)
+
+
+@pytest.mark.parametrize("ranks, threads", [(1, 3), (2, 1), (3, 2)])
+def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
+    folder, alone = one
+    result = subprocess.run(["mpirun", "--oversubscribe", "-n", str(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}", "--threads", str(threads)],
+                            cwd=folder, env=environment(**ROOT), capture_output=True, text=True, timeout=100)
+    assert result.returncode == DONE, result.stderr
+    many = Run(folder / f"out{ranks}", result)
+    assert differing(alone.dir / "result.h5", many.dir / "result.h5") == []
+    with h5py.File(many.dir / "result.h5") as f:
+        assert len(f["impacts/time"]) > 5 and f["panels/force"].shape[0] == 100
+    assert many.summary["impacts"] == alone.summary["impacts"]
