@@ -80,14 +80,17 @@ static char *field_of(const bt_bodies *b, int k, bt_idx i)
     return *(char **)((char *)b + bt_body_fields[k].array) + (size_t)i * bt_body_fields[k].size;
 }
 
+static char *vertices_of(const bt_bodies *b, int k, int64_t first)
+{
+    return *(char **)((char *)b + bt_vertex_fields[k].array) + (size_t)first * bt_vertex_fields[k].size;
+}
+
 static void pack(const bt_bodies *b, bt_idx i, parcels *p, int rank)
 {
     for (int k = 0; k < bt_n_body_fields; k++) add(p, rank, field_of(b, k, i), bt_body_fields[k].size);
     const int64_t first = b->offset[i], n = b->offset[i + 1] - first;
     add(p, rank, &n, sizeof n);
-    add(p, rank, b->vertices + 2 * first, 2 * (size_t)n * sizeof(double));
-    add(p, rank, b->outline + 2 * first, 2 * (size_t)n * sizeof(double));
-    add(p, rank, b->per_length + first, (size_t)n * sizeof(double));
+    for (int k = 0; k < bt_n_vertex_fields; k++) add(p, rank, vertices_of(b, k, first), (size_t)n * bt_vertex_fields[k].size);
 }
 
 /// Append the bodies of a delivery.
@@ -108,12 +111,11 @@ static void unpack(bt_bodies *b, const char *data, size_t n_bytes)
         }
         at += sizeof n;
         b->offset[i + 1] = first + n;
-        memcpy(b->vertices + 2 * first, data + at, 2 * (size_t)n * sizeof(double));
-        at += 2 * (size_t)n * sizeof(double);
-        memcpy(b->outline + 2 * first, data + at, 2 * (size_t)n * sizeof(double));
-        at += 2 * (size_t)n * sizeof(double);
-        memcpy(b->per_length + first, data + at, (size_t)n * sizeof(double));
-        at += (size_t)n * sizeof(double);
+        for (int k = 0; k < bt_n_vertex_fields; k++) {
+            const size_t bytes = (size_t)n * bt_vertex_fields[k].size;
+            memcpy(vertices_of(b, k, first), data + at, bytes);
+            at += bytes;
+        }
     }
 }
 
@@ -126,9 +128,7 @@ static void compact(bt_bodies *b, const uint8_t *keep)
         if (n != i) {
             for (int k = 0; k < bt_n_body_fields; k++) memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
             const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
-            memmove(b->vertices + 2 * to, b->vertices + 2 * from, 2 * (size_t)m * sizeof(double));
-            memmove(b->outline + 2 * to, b->outline + 2 * from, 2 * (size_t)m * sizeof(double));
-            memmove(b->per_length + to, b->per_length + from, (size_t)m * sizeof(double));
+            for (int k = 0; k < bt_n_vertex_fields; k++) memmove(vertices_of(b, k, to), vertices_of(b, k, from), (size_t)m * bt_vertex_fields[k].size);
             b->offset[n + 1] = to + m;
         }
         n++;
@@ -150,9 +150,10 @@ static void shrink(bt_bodies *b)
     b->offset = bt_realloc(b->offset, (size_t)cap + 1, sizeof *b->offset);
     b->cap = cap;
     const int64_t vertices = b->offset[b->n] + b->offset[b->n] / 8 + 64;
-    b->vertices = bt_realloc(b->vertices, 2 * (size_t)vertices, sizeof(double));
-    b->outline = bt_realloc(b->outline, 2 * (size_t)vertices, sizeof(double));
-    b->per_length = bt_realloc(b->per_length, (size_t)vertices, sizeof(double));
+    for (int k = 0; k < bt_n_vertex_fields; k++) {
+        void **array = (void **)((char *)b + bt_vertex_fields[k].array);
+        *array = bt_realloc(*array, (size_t)vertices, bt_vertex_fields[k].size);
+    }
     b->cap_vertices = vertices;
 }
 

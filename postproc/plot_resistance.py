@@ -58,7 +58,7 @@ def read(path):
         made, mean = run.number("concentration"), run.number("mean_ice_resistance_n")
         if not np.isfinite(mean):
             raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no steady window")
-        from_file = run.case.get("ice.field", "none") != "none"
+        from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
         return Point(path=run.path, title=style.title(run), asked=made if from_file else run.value("ice.concentration", made), concentration=made,
                      mean=mean, se=run.number("mean_ice_resistance_se_n"), reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),

@@ -89,7 +89,9 @@ def conditions(run):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
         words.append(f"{run.n_floes} floes")
-        if np.isfinite(run.value("ice.thickness")):
+        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):  # floes of their own thickness
+            words.append(f"{np.mean(run.thickness):.3g} m thick")
+        elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")
     mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
     if run.towed is not None and mode != "none" and np.isfinite(speed):

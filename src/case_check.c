@@ -188,6 +188,7 @@ static void follow(bt_case *c)
     follow_file(c, &c->ice.field);
     follow_file(c, &c->water.current_table);
     follow_file(c, &c->air.wind_table);
+    follow_file(c, &c->ice.outlines);
 }
 
 // ---- checks ----
@@ -245,7 +246,7 @@ static void check_region(const check *k)
 static void check_sizes(const check *k)
 {
     const bt_case *c = k->c;
-    if (c->ice.field || c->ice.concentration == 0) return;
+    if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
     if (!sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
     double lo = c->ice.size_min, hi = c->ice.size_max;
     bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
@@ -264,6 +265,19 @@ static void check_sizes(const check *k)
     double n = bt_case_expected_floes(c);
     if (n > largest_number_of_floes)
         fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %g are simulated; take larger floes or a smaller region", n, largest_number_of_floes);
+}
+
+static void check_outlines(const check *k)
+{
+    const bt_case *c = k->c;
+    if (!sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.nonconvex")) return;
+    if (c->ice.field && c->ice.outlines) fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
+    const bool lonlat = c->ice.outlines && c->ice.outlines_crs == BT_CRS_LONLAT, lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat);
+    if (lon != lat) fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
+    else if (lon && !lonlat) fault(k, "ice.origin_lon", "has no effect unless ice.outlines are read with ice.outlines_crs: lonlat; remove the origin or set it");
+    if (c->ice.outlines_crs == BT_CRS_LONLAT && !c->ice.outlines) fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
+    if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
+        fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
 }
 
 static void check_polygon(const check *k, const char *key, bt_body_shape shape, int n, const char *shape_key)
@@ -417,6 +431,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check_domain(&k);
     check_region(&k);
     check_sizes(&k);
+    check_outlines(&k);
     double v[2 * BT_MAX_VERTICES];
     int n;
     bool placed = check_body(&k, &n, v);
@@ -449,7 +464,7 @@ static double mean_square_size(const bt_case *c)
 
 double bt_case_expected_floes(const bt_case *c)
 {
-    if (c->ice.field) return 0;
+    if (c->ice.field || c->ice.outlines) return 0;
     double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
     double v[2 * BT_MAX_VERTICES];
     int n = bt_case_waterline(c, v);

@@ -87,9 +87,19 @@ static void print_ice(const bt_case *c, const ice_numbers *n)
 {
     printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
-    printf("floes                %s%.0f%s\n", c->ice.field ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : "");
+    const bool read = c->ice.field || c->ice.outlines;
+    printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : read ? " (read from the outlines)" : "");
     if (n->count < 1) return;
     printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
+}
+
+static void print_outlines(const bt_outline_counts *o)
+{
+    if (o->read)
+        printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64 " double or collinear vertices dropped\n", o->read, o->turned, o->dropped);
+    if (o->read && isfinite(o->lon)) printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI, o->lat * 180 / BT_PI);
+    if (o->hulled) printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled, o->hull_area);
+    if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);
 }
 
 static void print_body(const bt_case *c)
@@ -180,11 +190,12 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
 
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
-    const ice_numbers n = c->ice.field ? ice_of_field(c, f) : ice_of_case(c);
+    const ice_numbers n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
     printf("%s: valid\n", path);
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
+    print_outlines(&f->outlines);
     print_body(c);
     print_window(c);
     print_environment(c);
@@ -213,7 +224,7 @@ int bt_cmd_check(int argc, char **argv)
     bt_errors err = {0};
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
+    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
     else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
     bt_field_free(&f);

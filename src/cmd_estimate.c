@@ -55,7 +55,7 @@ int bt_cmd_estimate(int argc, char **argv)
     bt_errors err = {0};
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && c.ice.field) status = bt_field_read(&f, c.ice.field, &err);
+    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK && c.tow.mode == BT_TOW_NONE) {
         bt_errors_add(&err, "%s: %s, and the estimates are of the force on a towed body; %s", o.file.path,
                       c.body.shape == BT_BODY_ABSENT ? "body.shape: none" : "tow.mode: none",

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// bergtow field: the ice field of a case to an HDF5 file that a case can read back with ice.field.
+// bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with ice.outlines.
 #include "bergtow/field.h"
 #include "cmd.h"
 
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <strings.h>
 
 typedef struct {
     bt_cmd_case file;
@@ -18,19 +20,25 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
     case 'o': o->output = arg; return 0;
     case ARGP_KEY_END:
-        if (!o->output || !*o->output) argp_error(state, "no output file given; name one with -o FIELD.h5");
+        if (!o->output || !*o->output) argp_error(state, "no output file given; name one with -o FIELD.h5 or FIELD.geojson");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
 
 static const struct argp_option field_options[] = {
-    {"output", 'o', "FIELD.h5", 0, "HDF5 file to write", 0},
+    {"output", 'o', "FILE", 0, "file to write: HDF5 (FIELD.h5), or outlines in metres (FIELD.geojson)", 0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp field_argp = {.options = field_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
-                                       .doc = "Make the ice field of a case and write it; another case reads it with ice.field."};
+                                       .doc = "Make the ice field of a case, or read it from its ice.outlines, and write it; another case reads it with ice.field or ice.outlines."};
+
+static bool is_geojson(const char *path)
+{
+    const char *dot = strrchr(path, '.');
+    return dot && (!strcasecmp(dot, ".geojson") || !strcasecmp(dot, ".json"));
+}
 
 int bt_cmd_field(int argc, char **argv)
 {
@@ -41,15 +49,18 @@ int bt_cmd_field(int argc, char **argv)
     bt_errors err = {0};
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && c.ice.field) {
-        bt_errors_add(&err, "%s: ice.field: the case reads its field from %s; remove the key to make one", o.file.path, c.ice.field);
+    // A field that is read and written in the same form is the file there is.
+    const bool outlines = is_geojson(o.output);
+    if (status == BT_OK && c.ice.field && !outlines) {
+        bt_errors_add(&err, "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines with -o FIELD.geojson", o.file.path, c.ice.field);
         status = BT_ERR_CASE;
     }
     double start = bt_clock();
-    if (status == BT_OK) status = bt_field_generate(&c, &f, &err);
-    if (status == BT_OK) status = bt_field_write(&f, &c, o.output, &err);
+    if (status == BT_OK) status = bt_field_load(&c, &f, &err);
+    if (status == BT_OK) status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     if (status == BT_OK)
-        printf("%s: %d floes, concentration %.4f of %.6g m2, made in %.2f s\n", o.output, f.n, f.concentration, f.ice_area, bt_clock() - start);
+        printf("%s: %d floes, concentration %.4f of %.6g m2, %s in %.2f s\n", o.output, f.n, f.concentration, f.ice_area, c.ice.outlines || c.ice.field ? "read" : "made",
+               bt_clock() - start);
     bt_field_free(&f);
     bt_case_free(&c);
     free(o.file.set);

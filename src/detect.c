@@ -9,6 +9,7 @@
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "domain.h"
+#include "merge.h"
 #include "order.h"
 #include "pack.h"
 #include "pairs.h"
@@ -131,14 +132,29 @@ static void go_idle(bt_tile *t)
     t->overlap = 0;
 }
 
+/// Contacts that several parts of a floe have found are one.
+static void merge(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
+{
+    bt_merge_parts(w, s->man, s->n);
+    size_t kept = 0;
+    for (size_t k = 0; k < s->n; k++) {
+        if (s->man[k].n_points == 0) {
+            t->pairs[s->pair[k]].n_points = 0;
+            continue;
+        }
+        s->man[kept] = s->man[k];
+        s->pair[kept++] = s->pair[k];
+    }
+    s->n = kept;
+}
+
 static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
     bt_tile *t = &w->tiles->tile[k];
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, (size_t)t->n_pairs);
-    t->n_points = 0;
-    t->overlap = 0;
+    bool parts = false;
     for (bt_idx i = 0; i < t->n_pairs; i++) {
         bt_pair *p = &t->pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
@@ -148,13 +164,20 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         }
         double gap;
         bt_manifold *m = bt_pack_next(&s->pack, i);
-        const bool touch = bt_contacts_pair(w, p->a, p->b, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
+        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
         p->reach = gap + paths;
         if (!touch) {
             p->n_points = 0;
             continue;
         }
         bt_pack_keep(&s->pack);
+        parts = parts || p->part[0] || p->part[1];
+    }
+    if (parts) merge(w, t, &s->pack);
+    t->n_points = 0;
+    t->overlap = 0;
+    for (size_t i = 0; i < s->pack.n; i++) {
+        const bt_manifold *m = &s->pack.man[i];
         t->n_points += m->n_points;
         for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, -m->p[j].gap);
     }
@@ -217,11 +240,19 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
         for (bt_gid h = g + 1; h < b->n_global; h++) {
             const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
             if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) continue;
-            if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
-            double gap;
-            int32_t axis = -1;
-            if (bt_contacts_pair(w, i, j, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+            for (int p = bt_part_first(b, i); p >= 0; p = bt_part_next(b, i, p))
+                for (int q = bt_part_first(b, j); q >= 0; q = bt_part_next(b, j, q)) {
+                    if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
+                    double gap;
+                    int32_t axis = -1;
+                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+                }
         }
+    bt_merge_parts(w, *man, (size_t)*n_man);
+    bt_idx kept = 0;
+    for (bt_idx k = 0; k < *n_man; k++)
+        if ((*man)[k].n_points > 0) (*man)[kept++] = (*man)[k];
+    *n_man = kept;
 }
 
 double bt_world_overlap(bt_world *w)
@@ -246,7 +277,7 @@ double bt_world_overlap(bt_world *w)
                 bt_manifold m;
                 double gap;
                 int32_t axis = -1;
-                if (!bt_contacts_pair(w, own.pairs[i].a, own.pairs[i].b, 0, -1, &m, &gap, &axis)) continue;
+                if (!bt_contacts_parts(w, own.pairs[i].a, own.pairs[i].b, own.pairs[i].part, 0, -1, &m, &gap, &axis)) continue;
                 for (int j = 0; j < m.n_points; j++) deepest = bt_max(deepest, -m.p[j].gap);
             }
             free(own.pairs);

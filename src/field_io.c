@@ -18,11 +18,11 @@
 #include <unistd.h>
 
 #include "bergtow/field.h"
-#include "bergtow/shape.h"
+#include "bergtow/outline.h"
+#include "field_load.h"
 #include "fileio.h"
 #include "h5util.h"
 
-enum { MOST_MESSAGES = 10 };
 static const hsize_t MOST_FLOES = 20000000;
 
 // ---- write ----
@@ -73,35 +73,19 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
 
 typedef struct reader {
     hid_t file;
-    const char *path;
-    bt_errors *err;
-    int said;      // messages so far
-    bt_status status;
+    bt_nonconvex nonconvex;
+    bt_outline_counts counts;
+    bt_refusals r;
 } reader;
-
-static void refuse(reader *r, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
-
-static void refuse(reader *r, const char *fmt, ...)
-{
-    r->status = BT_ERR_CASE;
-    if (r->said > MOST_MESSAGES) return;
-    char text[400];
-    va_list ap;
-    va_start(ap, fmt);
-    vsnprintf(text, sizeof text, fmt, ap);
-    va_end(ap);
-    if (r->said++ == MOST_MESSAGES) bt_errors_add(r->err, "%s: more of the same; only the first %d are shown", r->path, MOST_MESSAGES);
-    else bt_errors_add(r->err, "%s: %s", r->path, text);
-}
 
 // Whole dataset of doubles or 64-bit integers with `width` columns (0: rank 1); NULL after a refusal. *rows: its length.
 static void *read_dataset(reader *r, const char *name, bool integers, hsize_t width, hsize_t most, hsize_t *rows)
 {
-    if (r->status != BT_OK) return NULL;
+    if (r->r.status != BT_OK) return NULL;
     void *data = NULL;
     hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT);
     if (d < 0) {
-        refuse(r, "dataset %s: is missing or damaged; write the file with `bergtow field`, or add it", name);
+        bt_refuse(&r->r, "dataset %s: is missing or damaged; write the file with `bergtow field`, or add it", name);
         return NULL;
     }
     hid_t space = H5Dget_space(d), type = H5Dget_type(d);
@@ -110,18 +94,18 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
     int rank = H5Sget_simple_extent_dims(space, dims, NULL), wanted = width ? 2 : 1;
     bool counts = class == H5T_INTEGER, numbers = counts || class == H5T_FLOAT;
     if (integers ? !counts : !numbers) {
-        refuse(r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers", integers ? "int64" : "float64");
+        bt_refuse(&r->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers", integers ? "int64" : "float64");
     } else if (rank != wanted || (width && dims[1] != width)) {
-        if (width) refuse(r, "dataset %s: must have two dimensions, the second of %llu", name, (unsigned long long)width);
-        else refuse(r, "dataset %s: must have one dimension", name);
+        if (width) bt_refuse(&r->r, "dataset %s: must have two dimensions, the second of %llu", name, (unsigned long long)width);
+        else bt_refuse(&r->r, "dataset %s: must have one dimension", name);
     } else if (dims[0] > most) {
-        refuse(r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
+        bt_refuse(&r->r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
                (unsigned long long)dims[0], (unsigned long long)most);
     } else {
         *rows = dims[0];
         data = bt_alloc((size_t)(dims[0] * (width ? width : 1)) + 1, 8);
         if (dims[0] > 0 && H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
-            refuse(r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
+            bt_refuse(&r->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
     }
     H5Tclose(type);
     H5Sclose(space);
@@ -132,7 +116,7 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
 static double read_ice_area(reader *r)
 {
     double area = NAN;
-    if (r->status != BT_OK) return area;
+    if (r->r.status != BT_OK) return area;
     hid_t a = H5Aopen_by_name(r->file, "/floes", "ice_area", H5P_DEFAULT, H5P_DEFAULT);
     if (a >= 0) {
         hid_t space = H5Aget_space(a), type = H5Aget_type(a);
@@ -144,25 +128,25 @@ static double read_ice_area(reader *r)
         H5Aclose(a);
     }
     if (!(area > 0) || !isfinite(area))
-        refuse(r, "attribute ice_area of /floes: is missing or not a positive number; give the area in m2 that the concentration refers to");
+        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or not a positive number; give the area in m2 that the concentration refers to");
     return area;
 }
 
 static void check_offsets(reader *r, const int64_t *offsets, hsize_t n, hsize_t n_vertices)
 {
-    if (r->status != BT_OK) return;
-    if (offsets[0] != 0) refuse(r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
+    if (r->r.status != BT_OK) return;
+    if (offsets[0] != 0) bt_refuse(&r->r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
     // Differences of hostile numbers overflow: compare, and only then subtract.
-    for (hsize_t i = 0; i < n && r->status == BT_OK; i++) {
+    for (hsize_t i = 0; i < n && r->r.status == BT_OK; i++) {
         int64_t a = offsets[i], b = offsets[i + 1];
         if (a < 0 || b <= a || (hsize_t)b > n_vertices)
-            refuse(r, "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
+            bt_refuse(&r->r, "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
                    (unsigned long long)i, (long long)a, (long long)b, (unsigned long long)n_vertices);
         else if (b - a > BT_MAX_VERTICES)
-            refuse(r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a), BT_MAX_VERTICES);
+            bt_refuse(&r->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a), BT_MAX_VERTICES);
     }
-    if (r->status == BT_OK && (hsize_t)offsets[n] != n_vertices)
-        refuse(r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld", (unsigned long long)n_vertices, (long long)offsets[n]);
+    if (r->r.status == BT_OK && (hsize_t)offsets[n] != n_vertices)
+        bt_refuse(&r->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld", (unsigned long long)n_vertices, (long long)offsets[n]);
 }
 
 static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *stored_area)
@@ -171,25 +155,31 @@ static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *sto
     const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * i;
     const char *fault = bt_shape_fault(n, v);
     if (fault) {
-        refuse(r, "floe %d: its outline is refused: %s", i, fault);
+        double own[2 * BT_MAX_VERTICES];
+        int n_own = n;
+        memcpy(own, v, 2 * (size_t)n * sizeof *v);
+        fault = bt_outline_admit(r->nonconvex, &n_own, own, &r->counts);
+    }
+    if (fault) {
+        bt_refuse(&r->r, "floe %d: its outline is refused: %s", i, fault);
         return;
     }
     bt_moments m = bt_shape_moments(n, v);
     if (hypot(m.cx, m.cy) > 1e-6 * m.radius)
-        refuse(r, "floe %d: the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
+        bt_refuse(&r->r, "floe %d: the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
                "add it to the pose", i, m.cx, m.cy);
-    if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) refuse(r, "floe %d: its pose is not finite", i);
+    if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) bt_refuse(&r->r, "floe %d: its pose is not finite", i);
     if (!(f->thickness[i] > 0) || !isfinite(f->thickness[i]))
-        refuse(r, "floe %d: thickness %g m is refused: it must be positive", i, f->thickness[i]);
+        bt_refuse(&r->r, "floe %d: thickness %g m is refused: it must be positive", i, f->thickness[i]);
     if (stored_area && !(fabs(stored_area[i] - m.area) <= 1e-9 * m.area))
-        refuse(r, "floe %d: area %g m2 is not that of its outline, %g m2; correct /floes/area or leave it out", i, stored_area[i], m.area);
+        bt_refuse(&r->r, "floe %d: area %g m2 is not that of its outline, %g m2; correct /floes/area or leave it out", i, stored_area[i], m.area);
     f->area[i] = stored_area ? stored_area[i] : m.area;
 }
 
 static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)
 {
-    if (r->status == BT_OK && rows != n)
-        refuse(r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows, (unsigned long long)n);
+    if (r->r.status == BT_OK && rows != n)
+        bt_refuse(&r->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows, (unsigned long long)n);
 }
 
 static void read_floes(reader *r, bt_field *f)
@@ -197,7 +187,7 @@ static void read_floes(reader *r, bt_field *f)
     hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
     bt_field_free(f);
     f->offsets = read_dataset(r, "/floes/offsets", true, 0, MOST_FLOES + 1, &n_offsets);
-    if (r->status == BT_OK && n_offsets < 1) refuse(r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
+    if (r->r.status == BT_OK && n_offsets < 1) bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
     hsize_t n = n_offsets ? n_offsets - 1 : 0;
     f->vertices = read_dataset(r, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
     check_offsets(r, f->offsets, n, n_vertices);
@@ -206,12 +196,12 @@ static void read_floes(reader *r, bt_field *f)
     f->thickness = read_dataset(r, "/floes/thickness", false, 0, MOST_FLOES, &n_thickness);
     same_length(r, "/floes/thickness", n_thickness, n);
     double *stored_area = NULL;
-    if (r->status == BT_OK && H5Lexists(r->file, "/floes/area", H5P_DEFAULT) > 0) {
+    if (r->r.status == BT_OK && H5Lexists(r->file, "/floes/area", H5P_DEFAULT) > 0) {
         stored_area = read_dataset(r, "/floes/area", false, 0, MOST_FLOES, &n_area);
         same_length(r, "/floes/area", n_area, n);
     }
     f->ice_area = read_ice_area(r);
-    if (r->status == BT_OK) {
+    if (r->r.status == BT_OK) {
         f->n = f->cap = (bt_idx)n;
         f->cap_vertices = (int64_t)n_vertices;
         f->area = bt_alloc((size_t)n, sizeof *f->area);
@@ -225,7 +215,35 @@ static void read_floes(reader *r, bt_field *f)
     free(stored_area);
 }
 
-bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
+// Floes that are not convex by their hulls; the others to the bit as they were read.
+static void take_hulls(bt_field *f)
+{
+    bt_field g;
+    bt_field_init(&g);
+    double sum = 0;
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
+        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+        double hull[2 * BT_MAX_VERTICES];
+        memcpy(hull, v, 2 * (size_t)n * sizeof *v);
+        const bool convex = bt_outline_convex(n, v);
+        bt_field_add(&g, convex ? n : bt_shape_hull(n, hull), hull, p[0], p[1], p[2], f->thickness[i]);
+        if (convex) { // centred once more, which changes last digits
+            memcpy(g.vertices + 2 * g.offsets[i], v, 2 * (size_t)n * sizeof *v);
+            memcpy(g.pose + 3 * (size_t)i, p, 3 * sizeof *p);
+            g.area[i] = f->area[i];
+        }
+        sum += g.area[i];
+    }
+    g.ice_area = f->ice_area;
+    g.concentration = sum / g.ice_area;
+    bt_field_free(f);
+    *f = g;
+}
+
+bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err) { return bt_field_read_as(f, path, BT_NONCONVEX_REFUSE, err); }
+
+bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     // The system's own reason first: HDF5 says "unable to open file" for all of them.
     FILE *probe = fopen(path, "rb");
@@ -241,7 +259,7 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
         bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);
         return BT_ERR_CASE;
     }
-    reader r = {.path = path, .err = err, .status = BT_OK};
+    reader r = {.nonconvex = nonconvex, .r = {.path = path, .err = err, .status = BT_OK}};
     r.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
     if (r.file < 0) {
         bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
@@ -249,9 +267,12 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
     }
     read_floes(&r, f);
     H5Fclose(r.file);
-    if (r.status != BT_OK) {
+    if (r.r.status == BT_OK) {
+        if (r.counts.hulled) take_hulls(f);
+        f->outlines = r.counts;
+    } else {
         bt_field_free(f);
         bt_field_init(f);
     }
-    return r.status;
+    return r.r.status;
 }

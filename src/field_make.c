@@ -214,16 +214,18 @@ static bt_status settle(const bt_case *c, const bt_yard *y, bt_field *f, double 
     return status;
 }
 
-static void set_thickness(const bt_case *c, bt_field *f)
+double bt_field_thickness(const bt_case *c, bt_idx i)
 {
     // ln h ~ N(μ, σ) with the mean and standard deviation asked for
     double h = c->ice.thickness, s2 = log1p(c->ice.thickness_spread * c->ice.thickness_spread);
-    for (bt_idx i = 0; i < f->n; i++) {
-        f->thickness[i] = h;
-        if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) continue;
-        bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
-        f->thickness[i] = h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2);
-    }
+    if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
+    bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
+    return h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2);
+}
+
+static void set_thickness(const bt_case *c, bt_field *f)
+{
+    for (bt_idx i = 0; i < f->n; i++) f->thickness[i] = bt_field_thickness(c, i);
 }
 
 static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)

@@ -11,12 +11,13 @@ static void array(const bt_comm *c, double **x, int64_t n)
 void bt_field_share(const bt_comm *c, bt_field *f)
 {
     if (c->size == 1) return;
-    struct { int64_t n, vertices; double ice_area, concentration; } head = {0};
+    struct { int64_t n, vertices; double ice_area, concentration; bt_outline_counts outlines; } head = {0};
     if (c->rank == 0) {
         head.n = f->n;
         head.vertices = f->offsets[f->n];
         head.ice_area = f->ice_area;
         head.concentration = f->concentration;
+        head.outlines = f->outlines;
     }
     bt_comm_bcast(c, &head, sizeof head);
     if (c->rank != 0) {
@@ -24,6 +25,7 @@ void bt_field_share(const bt_comm *c, bt_field *f)
         f->cap_vertices = head.vertices;
         f->ice_area = head.ice_area;
         f->concentration = head.concentration;
+        f->outlines = head.outlines;
         f->offsets = bt_realloc(f->offsets, (size_t)head.n + 1, sizeof *f->offsets);
     }
     bt_comm_bcast(c, f->offsets, ((size_t)head.n + 1) * sizeof *f->offsets);

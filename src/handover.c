@@ -43,7 +43,7 @@ static void free_list(list *l)
 static int most_vertices(const bt_comm *c, const bt_bodies *b)
 {
     double most = 0;
-    for (bt_idx i = 0; i < b->n; i++) most = bt_max(most, (double)(b->offset[i + 1] - b->offset[i]));
+    for (bt_idx i = 0; i < b->n; i++) most = bt_max(most, bt_body_corners(b, i));
     bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
     return (int)most;
 }
@@ -59,7 +59,7 @@ static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const 
         for (bt_idx i = 0; i < l->n; i++)
             for (int k = 0; k < PORTION; k++) {
                 const int64_t v = b->offset[l->body[i]] + from + k;
-                const bool there = v < b->offset[l->body[i] + 1];
+                const bool there = from + k < bt_body_corners(b, l->body[i]); // the outline, not its parts
                 rows[i][k][0] = there ? b->vertices[2 * v] : 0;
                 rows[i][k][1] = there ? b->vertices[2 * v + 1] : 0;
             }
@@ -84,7 +84,7 @@ bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roste
     double (*rows)[3] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[3] = bt_alloc((size_t)l.count, sizeof *block);
     for (bt_idx i = 0; i < l.n; i++) {
         const bt_idx k = l.body[i];
-        rows[i][0] = (double)(b->offset[k + 1] - b->offset[k]);
+        rows[i][0] = bt_body_corners(b, k);
         rows[i][1] = roster->thickness[l.gid[i]];
         rows[i][2] = b->area[k];
     }

@@ -216,6 +216,7 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
         for (bt_idx i = 0; i < out.n; i++) area += out.area[i];
         out.concentration = st->concentration_after = f->ice_area > 0 ? area / f->ice_area : 0;
         st->mean_piece = st->pieces > 0 ? pieces / (double)st->pieces : 0;
+        out.outlines = f->outlines;
         bt_field_free(f);
         *f = out;
     }
@@ -228,6 +229,11 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
 {
     *s = (bt_lead_stats){0};
     if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
+    if (f->outlines.split > 0) {
+        bt_errors_add(err, "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set ice.nonconvex to hull, or draw the lead in the file",
+                      c->path ? c->path : "case", (long long)f->outlines.split);
+        return BT_ERR_CASE;
+    }
     const double path[4] = {c->body.x, c->body.y, c->body.x + c->lead.length * cos(c->tow.direction), c->body.y + c->lead.length * sin(c->tow.direction)};
     const bt_lead l = {
         .name = c->path ? c->path : "case",

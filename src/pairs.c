@@ -23,20 +23,23 @@ void bt_pair_scratch_free(bt_pair_scratch *s)
     *s = (bt_pair_scratch){0};
 }
 
-static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX])
+/// Box of n vertices of body i, from its vertex `part` on.
+static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double box[N_BOX])
 {
     box[X] = b->pose[i].x;
     box[Y] = b->pose[i].y;
     box[LOW_X] = box[LOW_Y] = INFINITY;
     box[HIGH_X] = box[HIGH_Y] = -INFINITY;
-    for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
-        const double *v = b->outline + 2 * k;
+    for (int k = part; k < part + n; k++) {
+        const double *v = b->outline + 2 * (b->offset[i] + k);
         box[LOW_X] = bt_min(box[LOW_X], v[0]);
         box[LOW_Y] = bt_min(box[LOW_Y], v[1]);
         box[HIGH_X] = bt_max(box[HIGH_X], v[0]);
         box[HIGH_Y] = bt_max(box[HIGH_Y], v[1]);
     }
 }
+
+static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX]) { box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box); }
 
 /// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the nearest image
 /// of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole period.
@@ -47,12 +50,33 @@ static inline bool near(const bt_params *p, const double *a, const double *b, do
            (b[LOW_Y] + dy - a[HIGH_Y] <= clearance) & (a[LOW_Y] - b[HIGH_Y] - dy <= clearance);
 }
 
-static void append(bt_pair_scratch *s, size_t *n, const bt_bodies *b, bt_idx i, bt_idx j)
+static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int part_a, int part_b)
 {
-    if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) return;
     if (*n == s->cap_found) s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
-    const bool ordered = b->gid[i] < b->gid[j];
-    s->found[(*n)++] = (bt_pair){.a = ordered ? i : j, .b = ordered ? j : i, .axis = -1, .reach = -INFINITY};
+    s->found[(*n)++] = (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
+}
+
+/// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
+static void append(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, bt_idx j, double clearance)
+{
+    const bt_bodies *bd = &w->bodies;
+    if (bd->motion[i] != BT_DYNAMIC && bd->motion[j] != BT_DYNAMIC) return;
+    const bool ordered = bd->gid[i] < bd->gid[j];
+    const bt_idx a = ordered ? i : j, b = ordered ? j : i;
+    const int first_a = bt_part_first(bd, a), first_b = bt_part_first(bd, b);
+    if (first_a == 0 && first_b == 0) {
+        append_parts(s, n, a, b, 0, 0);
+        return;
+    }
+    for (int p = first_a; p >= 0; p = bt_part_next(bd, a, p)) {
+        double box[N_BOX];
+        box_of_part(bd, a, p, bd->mark[bd->offset[a] + p].count, box);
+        for (int q = first_b; q >= 0; q = bt_part_next(bd, b, q)) {
+            double other[N_BOX];
+            box_of_part(bd, b, q, bd->mark[bd->offset[b] + q].count, other);
+            if (near(&w->par, box, other, clearance)) append_parts(s, n, a, b, p, q);
+        }
+    }
 }
 
 /// Boxes of the bodies of tile k, after those there are; returns their number then.
@@ -77,7 +101,7 @@ static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, s
 {
     for (size_t i = i0; i < i1; i++)
         for (size_t j = j0 == i0 ? i + 1 : j0; j < j1; j++)
-            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance)) append(s, n, &w->bodies, s->body[i], s->body[j]);
+            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance)) append(w, s, n, s->body[i], s->body[j], clearance);
 }
 
 static size_t pairs_of_block(const bt_world *w, const bt_tile *t, bt_idx k, double clearance, double clearance_large, bt_pair_scratch *s)
@@ -95,7 +119,7 @@ static size_t pairs_of_block(const bt_world *w, const bt_tile *t, bt_idx k, doub
         double box[N_BOX];
         box_of(b, l, box);
         for (size_t i = 0; i < own; i++)
-            if (near(&w->par, box, s->box + N_BOX * i, clearance_large)) append(s, &n, b, l, s->body[i]);
+            if (near(&w->par, box, s->box + N_BOX * i, clearance_large)) append(w, s, &n, l, s->body[i], clearance_large);
     }
     return n;
 }
@@ -131,7 +155,7 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
         for (bt_idx o = l + 1; o < b->n; o++) {
             double other[N_BOX];
             box_of(b, o, other);
-            if (near(&w->par, box, other, clearance_large)) append(s, &n, b, l, o);
+            if (near(&w->par, box, other, clearance_large)) append(w, s, &n, l, o, clearance_large);
         }
         if (b->motion[l] != BT_DYNAMIC) continue;
         const bt_tile_range r = bt_pairs_range(w, l, clearance_small + ts->reach + ts->allowance);
@@ -141,7 +165,7 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
                 if (k < 0) continue;
                 const size_t end = add_boxes(w, k, s, 0);
                 for (size_t i = 0; i < end; i++)
-                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small)) append(s, &n, b, l, s->body[i]);
+                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small)) append(w, s, &n, l, s->body[i], clearance_small);
             }
     }
     return n;
@@ -152,7 +176,9 @@ static int by_gids(const void *p, const void *q, void *gids)
     const bt_pair *a = p, *b = q;
     const bt_gid *gid = gids;
     if (a->a != b->a) return gid[a->a] < gid[b->a] ? -1 : 1;
-    return gid[a->b] < gid[b->b] ? -1 : gid[a->b] > gid[b->b];
+    if (a->b != b->b) return gid[a->b] < gid[b->b] ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    return a->part[1] < b->part[1] ? -1 : a->part[1] > b->part[1];
 }
 
 /// What the old list knew of the pairs that stay: both lists are sorted, one walk matches them.

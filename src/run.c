@@ -50,7 +50,7 @@ typedef struct {
 static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = c->ice.field ? bt_field_read(f, c->ice.field, err) : bt_field_generate(c, f, err);
+    if (comm->rank == 0) status = bt_field_load(c, f, err);
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
@@ -297,6 +297,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     bt_status status = make_field(comm, c, &f, &lead, err);
     if (status == BT_OK) status = bt_comm_agree(comm, bt_setup_world(c, &f, &r.w, &r.roster, err));
     const double concentration = lead.mode == BT_LEAD_NONE ? f.concentration : lead.concentration_before;
+    const bt_outline_counts outlines = f.outlines;
     double thickness, radius;
     bt_estimate_field(&f, &thickness, &radius);
     bt_field_free(&f);
@@ -312,6 +313,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
             .mean_radius = radius,
             .concentration = concentration,
             .lead = lead,
+            .outlines = outlines,
             .tolerance = r.w->par.tolerance,
         };
         status = run_world(&r, err);

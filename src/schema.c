@@ -24,6 +24,8 @@ static const char *const bounds[] = {"wall", "periodic", "open", NULL};
 static const char *const end_bounds[] = {"wall", "periodic", "open", "moving", NULL};
 static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NULL};
 static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
+static const char *const crss[] = {"metres", "lonlat", NULL};
+static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
 static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
@@ -101,6 +103,14 @@ const bt_key bt_case_keys[] = {
     INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
     REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
     TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
+    TEXT("ice.outlines", ice.outlines, "none",
+         "GeoJSON file of floe outlines (FeatureCollection of Polygons; properties thickness in m and id are optional) read instead of making a field; relative to the folder of the case file"),
+    CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "metres",
+           "coordinates of the outlines: metres in the case's frame, or longitude and latitude in degrees (WGS84), projected about ice.origin_lon, ice.origin_lat (azimuthal equidistant, within 100 km)"),
+    REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]", "longitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
+    REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
+    CHOICE("ice.nonconvex", ice.nonconvex, nonconvexes, "refuse",
+           "outlines of a file that are not convex: refused, replaced by their hull (the area grows), or split into convex parts that move as one floe"),
 
     CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
     REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]", "length of a named shape along its own x, assumed"),

@@ -80,7 +80,11 @@ static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roste
         const int64_t first = f->offsets[i];
         const double *pose = f->pose + 3 * (size_t)i;
         bt_body_def d = {.motion = BT_DYNAMIC, .x = pose[0], .y = pose[1], .yaw = pose[2]};
-        floe_def(c, (int)(f->offsets[i + 1] - first), f->vertices + 2 * first, f->thickness[i], &d);
+        const int n = (int)(f->offsets[i + 1] - first);
+        floe_def(c, n, f->vertices + 2 * first, f->thickness[i], &d);
+        // The parts follow from the outline alone: the same on every rank, and nothing that a field file need hold.
+        bt_parts parts;
+        if (f->outlines.split && !bt_outline_convex(n, d.vertices) && bt_outline_split(n, d.vertices, &parts)) d.parts = &parts;
         d.large = sqrt(f->area[i] / BT_PI) > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = f->thickness[i];
     }

@@ -42,6 +42,21 @@ static void json_lead(bt_json *j, const bt_lead_stats *l)
     bt_json_close(j, '}');
 }
 
+static void json_outlines(bt_json *j, const bt_outline_counts *o)
+{
+    bt_json_open(j, "outlines", '{');
+    bt_json_int(j, "read", o->read);
+    bt_json_int(j, "turned", o->turned);
+    bt_json_int(j, "dropped_vertices", o->dropped);
+    bt_json_int(j, "hulled", o->hulled);
+    bt_json_number(j, "hull_area_added_m2", o->hull_area);
+    bt_json_int(j, "split", o->split);
+    bt_json_int(j, "parts", o->parts);
+    bt_json_number(j, "origin_lon_deg", o->read ? o->lon * 180 / BT_PI : NAN);
+    bt_json_number(j, "origin_lat_deg", o->read ? o->lat * 180 / BT_PI : NAN);
+    bt_json_close(j, '}');
+}
+
 static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
 {
     bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
@@ -111,6 +126,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "concentration", t->concentration);
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_lead(&j, &t->lead);
+    json_outlines(&j, &t->outlines);
     json_forces(&j, s, h, c);
     bt_impacts_json(&j, t->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
@@ -187,6 +203,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
            (long long)t->n_steps, t->dt, s->sim_time);
     bt_lead_stats_print(&t->lead);
+    const bt_outline_counts *o = &t->outlines;
+    if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
+    if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, h, c);
     bt_impacts_print(t->impacts);
     if (s->body && !isnan(s->estimate.along)) {

@@ -196,15 +196,13 @@ static void permute(bt_bodies *b, const sort_key *key)
     int64_t *offset = bt_realloc(NULL, (size_t)b->cap + 1, sizeof *offset);
     offset[0] = 0;
     for (size_t i = 0; i < n; i++) offset[i + 1] = offset[i] + (b->offset[key[i].from + 1] - b->offset[key[i].from]);
-    double **arrays[] = {&b->vertices, &b->outline, &b->per_length};
-    const size_t width[] = {2, 2, 1};
-    for (int k = 0; k < 3; k++) {
-        double *new = bt_realloc(NULL, width[k] * (size_t)b->cap_vertices, sizeof *new);
+    for (int k = 0; k < bt_n_vertex_fields; k++) {
+        const size_t size = bt_vertex_fields[k].size;
+        char **array = (char **)((char *)b + bt_vertex_fields[k].array), *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (int64_t)width[k] * offset[i], *arrays[k] + (int64_t)width[k] * b->offset[key[i].from],
-                   width[k] * sizeof *new * (size_t)(offset[i + 1] - offset[i]));
-        free(*arrays[k]);
-        *arrays[k] = new;
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size, size * (size_t)(offset[i + 1] - offset[i]));
+        free(*array);
+        *array = new;
     }
     free(b->offset);
     b->offset = offset;
@@ -308,7 +306,7 @@ bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n)
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) {
             const bt_pair *p = &t->tile[k].pairs[i];
             if (p->n_points > 0)
-                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt};
+                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], {p->part[0], p->part[1]}, p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt};
         }
     return trace;
 }
@@ -329,7 +327,9 @@ static int by_gids(const void *p, const void *q)
 {
     const bt_trace *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    return a->b < b->b ? -1 : a->b > b->b;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    return a->part[1] < b->part[1] ? -1 : a->part[1] > b->part[1];
 }
 
 void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
@@ -346,6 +346,7 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
         }
         bt_pair *p = &tile->pairs[tile->n_pairs++];
         *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].lt};
+        memcpy(p->part, trace[k].part, sizeof p->part);
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
         memcpy(p->ln, trace[k].ln, sizeof p->ln);
     }

@@ -35,13 +35,19 @@ const bt_body_field bt_body_fields[] = {
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
+const bt_body_field bt_vertex_fields[] = {
+    {offsetof(bt_bodies, vertices), 2 * sizeof(double)}, {offsetof(bt_bodies, outline), 2 * sizeof(double)}, FIELD(per_length), FIELD(mark),
+};
+const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_fields;
+
 void bt_world_free(bt_world *w)
 {
     if (!w) return;
     bt_bodies *b = &w->bodies;
     for (int k = 0; k < bt_n_body_fields; k++) free(*(void **)((char *)b + bt_body_fields[k].array));
-    void *arrays[] = {b->outline, b->offset, b->vertices, b->per_length, b->index_of};
-    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)b + bt_vertex_fields[k].array));
+    free(b->offset);
+    free(b->index_of);
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
     bt_domain_free(w->domain);
@@ -67,10 +73,40 @@ void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
     }
     if (n_vertices > b->cap_vertices) {
         const int64_t more = b->cap_vertices + b->cap_vertices / 4, cap = n_vertices > more ? n_vertices : more;
-        b->vertices = bt_realloc(b->vertices, 2 * (size_t)cap, sizeof *b->vertices);
-        b->outline = bt_realloc(b->outline, 2 * (size_t)cap, sizeof *b->outline);
-        b->per_length = bt_realloc(b->per_length, (size_t)cap, sizeof *b->per_length);
+        for (int k = 0; k < bt_n_vertex_fields; k++) {
+            void **array = (void **)((char *)b + bt_vertex_fields[k].array);
+            *array = bt_realloc(*array, (size_t)cap, bt_vertex_fields[k].size);
+        }
         b->cap_vertices = cap;
+    }
+}
+
+/// Marks and lengths of the n vertices of one polygon, from `first` on.
+static void close_polygon(bt_bodies *b, int64_t first, int n)
+{
+    for (int k = 0; k < n; k++) {
+        const double *p = b->vertices + 2 * (first + k), *q = b->vertices + 2 * (first + (k + 1) % n);
+        b->per_length[first + k] = 1 / hypot(q[0] - p[0], q[1] - p[1]);
+        b->mark[first + k].count = 0;
+    }
+    b->mark[first].count = (uint8_t)n;
+}
+
+/// The outline of a new body i, and its parts.
+static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
+{
+    int64_t at = b->offset[i];
+    memcpy(b->vertices + 2 * at, d->vertices, 2 * sizeof(double) * (size_t)d->n_vertices);
+    for (int k = 0; k < d->n_vertices; k++) b->mark[at + k].corner = (uint8_t)k;
+    close_polygon(b, at, d->n_vertices);
+    at += d->n_vertices;
+    const bt_parts *p = d->parts;
+    for (int j = 0, from = 0; p && j < p->n; from += p->count[j++], at = b->offset[i] + d->n_vertices + from) {
+        for (int k = 0; k < p->count[j]; k++) {
+            b->mark[at + k].corner = p->corner[from + k];
+            memcpy(b->vertices + 2 * (at + k), d->vertices + 2 * p->corner[from + k], 2 * sizeof(double));
+        }
+        close_polygon(b, at, p->count[j]);
     }
 }
 
@@ -81,18 +117,15 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
     assert(b->n == b->n_global); // bodies are added before they are dealt to ranks
     int64_t first = b->offset[b->n];
-    bt_world_reserve(b, b->n + 1, first + d->n_vertices);
+    const int n_vertices = d->n_vertices + (d->parts ? d->parts->n_vertices : 0);
+    bt_world_reserve(b, b->n + 1, first + n_vertices);
     const bt_idx i = b->n++;
     if ((b->n_global & (b->n_global - 1)) == 0) // a power of two: room for twice as many
         b->index_of = bt_realloc(b->index_of, 2 * (size_t)b->n_global + 2, sizeof *b->index_of);
     b->index_of[b->n_global] = i;
-    b->offset[i + 1] = first + d->n_vertices;
-    memcpy(b->vertices + 2 * first, d->vertices, 2 * sizeof(double) * (size_t)d->n_vertices);
+    b->offset[i + 1] = first + n_vertices;
+    add_polygons(b, i, d);
     bt_moments m = bt_shape_moments(d->n_vertices, d->vertices);
-    for (int k = 0; k < d->n_vertices; k++) {
-        const double *p = d->vertices + 2 * k, *q = d->vertices + 2 * ((k + 1) % d->n_vertices);
-        b->per_length[first + k] = 1 / hypot(q[0] - p[0], q[1] - p[1]);
-    }
     b->gid[i] = b->n_global++;
     b->pose[i] = (bt_pose){.x = d->x, .y = d->y, .yaw = d->yaw};
     b->vel[i] = b->vel_start[i] = b->vel_free[i] =

@@ -57,6 +57,10 @@ void bt_contacts_detect_all(bt_world *w, double margin);
 /// bound of the distance), axis_out its edge (numbered as in bt_pair).
 bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
 
+/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair; otherwise see src/manifold.c.
+bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin, int reference_before, bt_manifold *m, double *gap_out,
+                       int32_t *axis_out);
+
 /// All manifolds by testing all pairs, for tests; in the order of gids.
 void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man);
 

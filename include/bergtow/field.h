@@ -7,15 +7,28 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 
+/// What became of outlines that were read, instead of silence.
+typedef struct bt_outline_counts {
+    int64_t read;     ///< outlines of a GeoJSON file; 0 for other fields
+    int64_t turned;   ///< listed clockwise, and turned round
+    int64_t dropped;  ///< vertices left out: double, or in the middle of a straight line
+    int64_t hulled;   ///< floes replaced by their convex hull
+    double hull_area; ///< area that this added, m²
+    int64_t split;    ///< floes in convex parts
+    int64_t parts;    ///< their parts
+    double lon, lat;  ///< place of x = y = 0 for longitude and latitude, rad; NaN otherwise
+} bt_outline_counts;
+
 typedef struct bt_field {
     bt_idx n;              ///< floes
     int64_t *offsets;      ///< [n+1] first vertex of each floe
-    double *vertices;      ///< [offsets[n]][2] m, body frame: anticlockwise about the centroid
+    double *vertices;      ///< [offsets[n]][2] m, body frame: anticlockwise about the centroid; convex unless outlines.split
     double *pose;          ///< [n][3] x m, y m, yaw rad
     double *thickness;     ///< [n] m
     double *area;          ///< [n] m²
     double ice_area;       ///< m², the area that concentration refers to: ice region less the body's footprint
     double concentration;  ///< Σ area / ice_area as made
+    bt_outline_counts outlines; ///< of a field that was read
     bt_idx cap;            ///< floes the arrays have room for
     int64_t cap_vertices;  ///< vertices they have room for
 } bt_field;
@@ -30,6 +43,20 @@ void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, doub
 /// check. Reproducible from the case alone. f has been initialised; what it held is released. Errors: BT_ERR_CASE (impossible packing, named), BT_ERR_NUMERIC.
 bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err);
 
+/// The field of a case, made or read as it says (ice.field, ice.outlines). Errors: those of the function it calls.
+bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err);
+
+/// Floes of the case's GeoJSON file ice.outlines. Refused with the number of the feature, from 0: what is no polygon, has holes, too few or
+/// too many vertices, no area, edges that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body
+/// (both are named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
+
+/// Outlines where they lie, in metres of the case's frame, as GeoJSON that ice.outlines reads back. A complete file or none.
+bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
+
+/// Thickness of floe i by the law of the case, m.
+double bt_field_thickness(const bt_case *c, bt_idx i);
+
 /// Collective. The field of rank 0 to all ranks; f has been initialised.
 void bt_field_share(const bt_comm *c, bt_field *f);
 
@@ -39,6 +66,8 @@ void bt_field_share(const bt_comm *c, bt_field *f);
 /// Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err);
+/// The same, with outlines that are not convex as `nonconvex` says, and counted.
+bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err);
 
 /// Largest overlap depth of any two floes, and of any floe with the closed walls, the towed body and the floes given by
 /// hand, m (0 = none). By separating axes, independent of the contact detection.

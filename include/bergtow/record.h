@@ -6,6 +6,7 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/field.h"
 #include "bergtow/lead.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
@@ -100,6 +101,7 @@ typedef struct bt_run_totals {
     bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
+    bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
     const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     bt_phases phases;

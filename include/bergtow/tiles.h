@@ -35,6 +35,7 @@ enum { BT_COLOURS = 4, BT_PHASES = 5 }; ///< the fifth phase is the tile of the 
 /// A pair near enough to be looked at, and what its contact was in the last step.
 typedef struct bt_pair {
     bt_idx a, b;         ///< gid[a] < gid[b]
+    uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
     int32_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
     int32_t n_points;    ///< contact points in the last solution
     uint32_t feature[2]; ///< of those
@@ -74,7 +75,7 @@ typedef struct bt_tile {
     bool active;                    ///< its contacts are looked at in this step
     double margin;                  ///< m, of this step's detection
     // pair list
-    bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b)
+    bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b, parts)
     bt_idx n_pairs, cap_pairs;
     bool listed;                    ///< the list is valid for margin_listed
     double margin_listed;           ///< m
@@ -155,6 +156,7 @@ static inline bool bt_tiles_moves(const bt_tiles *t, bt_idx k) { return !t->rest
 /// What the last step left in a pair, by the names that last.
 typedef struct bt_trace {
     bt_gid a, b;
+    uint16_t part[2];
     int32_t n_points;
     uint32_t feature[2];
     double ln[2], lt;

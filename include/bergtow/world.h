@@ -16,6 +16,7 @@
 #define BERGTOW_WORLD_H
 
 #include "bergtow/base.h"
+#include "bergtow/outline.h"
 #include "bergtow/shape.h"
 
 typedef enum {
@@ -44,12 +45,21 @@ typedef struct bt_drag {
     double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
 } bt_drag;
 
+/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its own: contacts are found between
+/// parts, and act on the body. Rejected: parts as bodies that follow a parent. Everything that counts, sorts, moves, hashes or writes bodies would
+/// have to tell the two apart; this way only the pair search and the narrow phase know.
+typedef struct bt_mark {
+    uint8_t count;  ///< at the first vertex of the outline or a part: its number of vertices; 0 elsewhere
+    uint8_t corner; ///< vertex of the outline that stands here
+} bt_mark;
+
 /// What bt_world_add needs of a body.
 typedef struct bt_body_def {
     bt_motion motion;
     bool large;             ///< in no tile, on every rank, tested against all floes near its outline
     int n_vertices;
-    const double *vertices; ///< [n_vertices][2] m, convex, anticlockwise, centroid at the origin
+    const double *vertices; ///< [n_vertices][2] m, anticlockwise, centroid at the origin; convex without parts
+    const bt_parts *parts;  ///< of an outline that is not convex (bt_outline_split), or NULL
     double x, y, yaw;       ///< m, m, rad
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
     double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
@@ -64,13 +74,14 @@ typedef struct bt_bodies {
     bt_inv *inv;          ///< [n]
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
-    double *outline;      ///< [offset[n]][2] vertices turned by yaw, relative to the centroid, m
+    double *outline;      ///< [offset[n]][2] vertices, also those of parts, turned by yaw, relative to the centroid, m
     double *path;         ///< [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
     // cold
     bt_gid *gid;          ///< [n]
     int64_t *offset;      ///< [n+1] first vertex
+    bt_mark *mark;        ///< [offset[n]]
     double *vertices;     ///< [offset[n]][2] own frame, m
     double *per_length;   ///< [offset[n]] 1/length of the edge that starts at each vertex, 1/m
     double *radius;       ///< [n] m
@@ -159,6 +170,23 @@ void bt_world_free(bt_world *w);
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition is copied.
 bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
 
+/// Number of vertices of the outline of body i.
+static inline int bt_body_corners(const bt_bodies *b, bt_idx i) { return b->mark[b->offset[i]].count; }
+
+/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline itself, if that is convex.
+static inline int bt_part_first(const bt_bodies *b, bt_idx i)
+{
+    const int n = bt_body_corners(b, i);
+    return b->offset[i] + n < b->offset[i + 1] ? n : 0;
+}
+
+/// The one after it, −1 = none.
+static inline int bt_part_next(const bt_bodies *b, bt_idx i, int part)
+{
+    const int next = part + b->mark[b->offset[i] + part].count;
+    return b->offset[i] + next < b->offset[i + 1] ? next : -1;
+}
+
 /// Where body gid is stored on this rank now, −1 = not here.
 static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->bodies.index_of[gid]; }
 
@@ -172,6 +200,10 @@ typedef struct bt_body_field {
 } bt_body_field;
 extern const bt_body_field bt_body_fields[];
 extern const int bt_n_body_fields;
+
+/// Arrays over the vertices of the bodies; size: bytes a vertex.
+extern const bt_body_field bt_vertex_fields[];
+extern const int bt_n_vertex_fields;
 
 /// Room for n bodies and n_vertices vertices.
 void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);

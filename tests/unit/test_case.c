@@ -539,7 +539,7 @@ static void compare(const bt_key *keys, int n, const void *a, const void *b)
             same = ta && tb ? !strcmp(ta, tb) : ta == tb;
             // becomes absolute; compared as text below
             const size_t o = k->offset;
-            if (keys == bt_case_keys && (o == offsetof(bt_case, ice.field) || o == offsetof(bt_case, water.current_table) || o == offsetof(bt_case, air.wind_table))) same = true;
+            if (keys == bt_case_keys && (o == offsetof(bt_case, ice.field) || o == offsetof(bt_case, ice.outlines) || o == offsetof(bt_case, water.current_table) || o == offsetof(bt_case, air.wind_table))) same = true;
         }
         if (k->type == BT_KEY_POINTS) {
             const double *pa, *pb;

@@ -17,7 +17,11 @@
 #include "bergtow/field.h"
 #include "bergtow/shape.h"
 
-// HDF5 1.10 itself loses some blocks when it meets a damaged file.
+// HDF5 1.10 itself reads past the end of some damaged attributes, and loses some blocks. Which flipped bit
+// does it depends on the length of the case's text. Reads by our own code are still told.
+const char *__asan_default_suppressions(void);
+const char *__asan_default_suppressions(void) { return "interceptor_via_lib:libhdf5"; }
+
 const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void) { return "leak:libhdf5"; }
 

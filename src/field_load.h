@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+// What the readers of ice fields share: which outlines get in, and whether they lie where they can.
+#ifndef BT_FIELD_LOAD_H
+#define BT_FIELD_LOAD_H
+
+#include "bergtow/field.h"
+
+enum { BT_MOST_MESSAGES = 10 }; ///< faults of one file that are told one by one
+
+/// Faults of one file, the first few of them in words.
+typedef struct bt_refusals {
+    const char *path;
+    bt_errors *err;
+    int said;
+    bt_status status;
+} bt_refusals;
+
+void bt_refuse(bt_refusals *r, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
+
+/// May this outline be a floe? v [*n][2], clean and anticlockwise, becomes its hull if the case says so; what was done is counted. Returns why not,
+/// or NULL.
+const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outline_counts *counts);
+
+/// Refuse floes outside the domain, and floes that overlap each other, the towed body or a floe given by hand by more than the solver's slop.
+/// `noun`: what the file calls a floe.
+void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r);
+
+#endif

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: MIT
+// Simple polygons: cleaning, faults, convex parts, projection.
+#include "bergtow/outline.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double NEAR = 1e-9;   // lengths below this part of the extent are rounding (as in bt_shape_fault)
+static const double SLIVER = 1e-9; // a part of less than this part of the area is left out: nothing can lean on it
+
+static double cross(const double *o, const double *p, const double *q) { return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]); }
+
+static double extent_of(int n, const double *v)
+{
+    double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+    for (int i = 0; i < n; i++) {
+        x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
+        y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
+    }
+    return n > 0 ? hypot(x1 - x0, y1 - y0) : 0;
+}
+
+/// Is q between p and r on a straight line, or on one of them? A spike, where the line turns back, is not: it is a fault.
+static bool idle(const double *p, const double *q, const double *r, double tiny)
+{
+    const double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
+    if (hypot(ax, ay) <= tiny) return true;
+    const double cx = r[0] - p[0], cy = r[1] - p[1], l = hypot(cx, cy);
+    return l > 0 && ax * bx + ay * by > 0 && fabs(ax * cy - ay * cx) <= tiny * l;
+}
+
+int bt_outline_clean(int n, double *v)
+{
+    const double tiny = NEAR * extent_of(n, v);
+    // Each vertex against its neighbours as they stand, until none goes: the vertex before may have gone a moment ago.
+    for (bool changed = true; changed && n > 2;) {
+        changed = false;
+        for (int i = 0; i < n && n > 2; i++) {
+            const double *p = v + 2 * (i > 0 ? i - 1 : n - 1), *q = v + 2 * i, *r = v + 2 * (i + 1 < n ? i + 1 : 0);
+            if (!idle(p, q, r, tiny)) continue;
+            memmove(v + 2 * i, v + 2 * (i + 1), 2 * (size_t)(n - i - 1) * sizeof *v);
+            n--, i--;
+            changed = true;
+        }
+    }
+    return n;
+}
+
+double bt_outline_area2(int n, const double *v)
+{
+    double a = 0;
+    for (int i = 1; i + 1 < n; i++) a += cross(v, v + 2 * i, v + 2 * (i + 1));
+    return a;
+}
+
+static bool between(double a, double b, double x) { return bt_min(a, b) <= x && x <= bt_max(a, b); }
+
+/// Does c, on the line through a and b, lie on the segment?
+static bool on_segment(const double *a, const double *b, const double *c) { return between(a[0], b[0], c[0]) && between(a[1], b[1], c[1]); }
+
+/// Do the closed segments ab and cd have a point in common?
+static bool meet(const double *a, const double *b, const double *c, const double *d)
+{
+    if (bt_max(a[0], b[0]) < bt_min(c[0], d[0]) || bt_max(c[0], d[0]) < bt_min(a[0], b[0])) return false;
+    if (bt_max(a[1], b[1]) < bt_min(c[1], d[1]) || bt_max(c[1], d[1]) < bt_min(a[1], b[1])) return false;
+    const double c_ab = cross(a, b, c), d_ab = cross(a, b, d), a_cd = cross(c, d, a), b_cd = cross(c, d, b);
+    if (((c_ab > 0 && d_ab < 0) || (c_ab < 0 && d_ab > 0)) && ((a_cd > 0 && b_cd < 0) || (a_cd < 0 && b_cd > 0))) return true;
+    return (c_ab == 0 && on_segment(a, b, c)) || (d_ab == 0 && on_segment(a, b, d)) || (a_cd == 0 && on_segment(c, d, a)) ||
+           (b_cd == 0 && on_segment(c, d, b));
+}
+
+bool bt_outline_crosses(int n, const double *v)
+{
+    for (int i = 0; i < n; i++) {
+        const double *a = v + 2 * i, *b = v + 2 * ((i + 1) % n);
+        for (int j = i + 1; j < n; j++) {
+            const double *c = v + 2 * j, *d = v + 2 * ((j + 1) % n);
+            if (j == i + 1 || (i == 0 && j == n - 1)) { // neighbours share a vertex; a spike lies back on itself
+                const double *p = j == i + 1 ? a : b, *q = j == i + 1 ? b : a, *r = j == i + 1 ? d : c;
+                const bool back = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]) > 0;
+                if (back && fabs(cross(q, p, r)) <= NEAR * hypot(p[0] - q[0], p[1] - q[1]) * hypot(r[0] - q[0], r[1] - q[1])) return true;
+                continue;
+            }
+            if (meet(a, b, c, d)) return true;
+        }
+    }
+    return false;
+}
+
+const char *bt_outline_fault(int n, const double *v)
+{
+    if (n < 3) return "it has fewer than 3 vertices";
+    if (n > BT_MAX_VERTICES) return "it has more than 128 vertices";
+    for (int i = 0; i < 2 * n; i++)
+        if (!isfinite(v[i])) return "a vertex is not a finite number";
+    const double extent = extent_of(n, v), area2 = bt_outline_area2(n, v);
+    if (!(extent > 0) || !isfinite(extent * extent)) return "its vertices coincide or are out of range";
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
+        if (hypot(q[0] - p[0], q[1] - p[1]) <= NEAR * extent) return "two neighbouring vertices coincide";
+    }
+    if (bt_outline_crosses(n, v)) return "its edges cross or touch each other";
+    if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
+    if (area2 < 0) return "its vertices run clockwise; list them anticlockwise (from +x towards +y)";
+    return NULL;
+}
+
+bool bt_outline_convex(int n, const double *v) { return bt_shape_fault(n, v) == NULL; }
+
+// --- convex parts ----------------------------------------------------------------------------------------------------
+
+/// Is the corner a → b → c convex, by more than rounding?
+static bool left_turn(const double *a, const double *b, const double *c)
+{
+    return cross(a, b, c) > NEAR * hypot(b[0] - a[0], b[1] - a[1]) * hypot(c[0] - b[0], c[1] - b[1]);
+}
+
+/// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 when it is none.
+static double ear_quality(int m, const int *loop, int i, const double *v)
+{
+    const int before = loop[i > 0 ? i - 1 : m - 1], here = loop[i], after = loop[i + 1 < m ? i + 1 : 0];
+    const double *a = v + 2 * before, *b = v + 2 * here, *c = v + 2 * after;
+    const double area2 = cross(a, b, c);
+    if (!(area2 > 0)) return -1;
+    for (int k = 0; k < m; k++) {
+        if (loop[k] == before || loop[k] == here || loop[k] == after) continue;
+        const double *p = v + 2 * loop[k];
+        if (cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0) return -1;
+    }
+    const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]), ca = hypot(a[0] - c[0], a[1] - c[1]);
+    const double longest = bt_max(ab, bt_max(bc, ca));
+    return area2 / (longest * longest);
+}
+
+typedef struct ring { int n, at[BT_MAX_VERTICES]; } ring;
+
+static int next_of(const ring *r, int k) { return r->at[k + 1 < r->n ? k + 1 : 0]; }
+static int before_of(const ring *r, int k) { return r->at[k > 0 ? k - 1 : r->n - 1]; }
+
+/// Join b to a along an edge that both have, if the result is convex there.
+static bool join(ring *a, const ring *b, const double *v)
+{
+    for (int i = 0; i < a->n; i++)
+        for (int j = 0; j < b->n; j++) {
+            const int p = a->at[i], q = next_of(a, i);
+            if (b->at[j] != q || next_of(b, j) != p) continue;
+            const int i1 = i + 1 < a->n ? i + 1 : 0, j1 = j + 1 < b->n ? j + 1 : 0;
+            const int after_p = next_of(b, j1), before_q = before_of(b, j), before_p = before_of(a, i), after_q = next_of(a, i1);
+            if (!left_turn(v + 2 * before_p, v + 2 * p, v + 2 * after_p)) return false;
+            if (!left_turn(v + 2 * before_q, v + 2 * q, v + 2 * after_q)) return false;
+            // a from q round to p, then what b has between p and q.
+            ring all = {0};
+            for (int k = 0; k < a->n; k++) all.at[all.n++] = a->at[(i1 + k) % a->n];
+            for (int k = 1; k < b->n - 1; k++) all.at[all.n++] = b->at[(j1 + k) % b->n];
+            *a = all;
+            return true;
+        }
+    return false;
+}
+
+bool bt_outline_split(int n, const double *v, bt_parts *p)
+{
+    *p = (bt_parts){0};
+    ring *part = bt_alloc((size_t)n, sizeof *part);
+    int loop[BT_MAX_VERTICES], m = n, n_parts = 0;
+    for (int i = 0; i < n; i++) loop[i] = i;
+    bool sound = true;
+    while (m > 3 && sound) {
+        int best = -1;
+        double quality = -1;
+        for (int i = 0; i < m; i++) {
+            const double q = ear_quality(m, loop, i, v);
+            if (q > quality) quality = q, best = i;
+        }
+        sound = best >= 0;
+        if (!sound) break;
+        part[n_parts++] = (ring){3, {loop[best > 0 ? best - 1 : m - 1], loop[best], loop[best + 1 < m ? best + 1 : 0]}};
+        memmove(loop + best, loop + best + 1, (size_t)(m - best - 1) * sizeof *loop);
+        m--;
+    }
+    if (sound) part[n_parts++] = (ring){3, {loop[0], loop[1], loop[2]}};
+    for (int i = 0; i < n_parts; i++)
+        for (int j = i + 1; j < n_parts; j++)
+            if (join(&part[i], &part[j], v)) {
+                memmove(part + j, part + j + 1, (size_t)(n_parts - j - 1) * sizeof *part);
+                n_parts--;
+                j = i; // the grown part may now join one that was passed over
+            }
+    const double whole = bt_outline_area2(n, v);
+    double kept = 0;
+    for (int i = 0; i < n_parts && sound; i++) {
+        double own[2 * BT_MAX_VERTICES];
+        for (int k = 0; k < part[i].n; k++) memcpy(own + 2 * k, v + 2 * part[i].at[k], 2 * sizeof *own);
+        const double area2 = bt_outline_area2(part[i].n, own);
+        if (area2 <= SLIVER * whole) continue;
+        sound = bt_shape_fault(part[i].n, own) == NULL;
+        p->count[p->n++] = part[i].n;
+        for (int k = 0; k < part[i].n; k++) p->corner[p->n_vertices++] = (uint8_t)part[i].at[k];
+        kept += area2;
+    }
+    free(part);
+    return sound && fabs(kept - whole) <= 1e-6 * whole;
+}
+
+// --- projection ------------------------------------------------------------------------------------------------------
+
+#define WGS84_A 6378137.0               // m
+#define WGS84_E2 6.69437999014131705734e-3 // e² = f (2 − f), 1/f = 298.257223563
+
+/// Place on the ellipsoid, from the centre of the earth, m.
+static void on_ellipsoid(double lon, double lat, double p[3])
+{
+    const double s = sin(lat), normal = WGS84_A / sqrt(1 - WGS84_E2 * s * s);
+    p[0] = normal * cos(lat) * cos(lon);
+    p[1] = normal * cos(lat) * sin(lon);
+    p[2] = normal * (1 - WGS84_E2) * s;
+}
+
+void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east)
+{
+    double p[3], o[3];
+    on_ellipsoid(lon, lat, p);
+    on_ellipsoid(lon0, lat0, o);
+    const double dx = p[0] - o[0], dy = p[1] - o[1], dz = p[2] - o[2];
+    const double e = cos(lon0) * dy - sin(lon0) * dx, n = cos(lat0) * dz - sin(lat0) * (cos(lon0) * dx + sin(lon0) * dy);
+    const double s = sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s); // √(M N), mean curvature there
+    const double level = hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
+    const double stretch = level > 0 ? chord * (1 + chord * chord / (24 * radius * radius)) / level : 0;
+    *east = e * stretch;
+    *north = n * stretch;
+}

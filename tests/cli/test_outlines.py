@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: MIT
+"""Floe outlines in GeoJSON: what gets in, what is refused and by which name, where it lies, and that a round trip loses nothing."""
+import json
+import math
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, DONE, IO, area, call, changed, placed, run, worst_overlap, write_case
+
+BASE = {
+    "run": {"dt": 0.1, "duration": 2},
+    "domain": {"length": 20, "width": 10},
+    "ice": {"outlines": "floes.geojson", "thickness": 0.25},
+    "body": {"x": 2, "length": 2},
+}
+SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
+C_SHAPE = [[0, 0], [2, 0], [2, 0.5], [0.5, 0.5], [0.5, 1.5], [2, 1.5], [2, 2], [0, 2]]  # area 2.5, of its hull 4
+BOW = [[0, 0], [2, 2], [2, 0], [0, 1.5]]
+
+
+def at(ring, x, y):
+    return [[p[0] + x, p[1] + y] for p in ring]
+
+
+def feature(ring, close=True, **more):
+    ring = ring + ring[:1] if close else ring
+    return {"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [ring]}} | more
+
+
+def write(folder, *features, **more):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "floes.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": list(features)} | more))
+
+
+def read(path):
+    with h5py.File(path) as f:
+        g = f["floes"]
+        o, v, pose, h, a = (g[n][:] for n in ("offsets", "vertices", "pose", "thickness", "area"))
+    return [placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose)], h, a, pose
+
+
+def field(folder, case, *arguments, code=DONE, name="out.h5"):
+    r = call("field", write_case(folder, case), "-o", folder / name, *arguments)
+    assert r.returncode == code, r.stderr
+    return read(folder / name) if code == DONE and name.endswith("h5") else r.stderr
+
+
+def same_ring(p, q, tolerance):
+    """Equal up to the vertex that a ring begins with."""
+    p, q = np.array(p), np.array(q)
+    return len(p) == len(q) and any(np.abs(np.roll(q, k, axis=0) - p).max() <= tolerance for k in range(len(p)))
+
+
+def test_outlines_as_they_come(tmp_path):
+    """Closed or not, clockwise, with double and needless vertices and heights; ids and thicknesses; all where they were drawn."""
+    untidy = [[5, 3], [6, 3], [6, 3], [6, 3.4], [6, 4], [5, 4]]
+    write(tmp_path, feature(at(SQUARE, 5, 0), properties={"thickness": 0.7}), feature(at(SQUARE, 8, 0)[::-1]), feature(untidy, close=False),
+          feature([p + [12.5] for p in at(SQUARE, 8, 3)], properties=None),
+          feature([at(SQUARE, 11, 0) + at(SQUARE, 11, 0)[:1]], close=False, geometry={"type": "MultiPolygon", "coordinates": [[at(SQUARE, 11, 0)]]}))
+    rings, thickness, areas, _ = field(tmp_path, BASE)
+    for ring, (x, y) in zip(rings, [(5, 0), (8, 0), (5, 3), (8, 3), (11, 0)]):
+        assert same_ring(ring, at(SQUARE, x, y), 1e-12)
+        assert area(ring) > 0
+    assert thickness.tolist() == [0.7, 0.25, 0.25, 0.25, 0.25]
+    np.testing.assert_allclose(areas, 1, rtol=1e-13)
+    r = run(tmp_path, BASE)
+    o = r.summary["outlines"]
+    assert (o["read"], o["turned"], o["dropped_vertices"], o["hulled"], o["split"]) == (5, 1, 2, 0, 0)
+    assert r.summary["n_floes"] == 5
+    np.testing.assert_allclose(r.summary["concentration"], 5 / (200 - math.pi), rtol=1e-3)
+
+
+OPEN = {"domain__sides": "open"}
+REFUSED = {
+    # the second feature's ring, or the whole feature -> what the message must say; changes of the case
+    "not convex": (at(C_SHAPE, 8, 0), "not convex.*ice.nonconvex", {}),
+    "edges cross": (at(BOW, 8, 0), "cross", {}),
+    "edges cross, as hull": (at(BOW, 8, 0), "cross", {"ice__nonconvex": "hull"}),
+    "edges touch": ([[8, 0], [10, 0], [10, 2], [9, 0], [8, 2]], "touch", {"ice__nonconvex": "split"}),
+    "two vertices": ([[8, 0], [9, 0]], "fewer than 3", {}),
+    "on one line": ([[8, 0], [9, 0], [10, 0]], "fewer than 3|area is zero|cross", {}),
+    "too many": ([[9 + math.cos(2 * math.pi * k / 129), math.sin(2 * math.pi * k / 129)] for k in range(129)], "more than 128 vertices", {}),
+    "no numbers": ([[8, 0], [9, "x"], [9, 1]], "pair of numbers", {}),
+    "hole": ({"geometry": {"type": "Polygon", "coordinates": [at(SQUARE, 8, 0), at(SQUARE, 8.2, 0.2)]}}, "holes", {}),
+    "line": ({"geometry": {"type": "LineString", "coordinates": SQUARE}}, "not a Polygon", {}),
+    "nothing": ({"geometry": None}, "not a Polygon", {}),
+    "several": ({"geometry": {"type": "MultiPolygon", "coordinates": [[at(SQUARE, 8, 0)], [at(SQUARE, 8, 2)]]}}, "several polygons", {}),
+    "thickness": (feature(at(SQUARE, 8, 0), properties={"thickness": -1}), "thickness", {}),
+    "thickness with unit": (feature(at(SQUARE, 8, 0), properties={"thickness": "1 m"}), "thickness", {}),
+    "through a wall": (at(SQUARE, 8, 4.5), "outside the domain", {}),
+    "beyond an open side": (at(SQUARE, 8, 5.1), "outside the domain", OPEN),
+    "in the body": (at(SQUARE, 2, 0), "towed body", {}),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_refused_by_its_number(tmp_path, name):
+    """Feature 1 of three is at fault, and is named; nothing is written."""
+    ring, says, changes = REFUSED[name]
+    second = feature(ring, id="floe B") if isinstance(ring, list) else feature(SQUARE) | {"id": "floe B"} | ring
+    write(tmp_path, feature(at(SQUARE, 5, 0)), second, feature(at(SQUARE, 14, 0)))
+    said = field(tmp_path, changed(BASE, **changes), code=CASE)
+    assert len(said.splitlines()) == 1, said
+    assert "floes.geojson: feature 1" in said
+    assert __import__("re").search(says, said), said
+    if says not in ("towed body", "outside the domain"):
+        assert "(id floe B)" in said
+    assert not (tmp_path / "out.h5").exists()
+    assert call("check", tmp_path / "case.yml").returncode == CASE
+
+
+def test_beyond_an_open_side_by_less_than_half_gets_in(tmp_path):
+    write(tmp_path, feature(at(SQUARE, 8, 4.4)))
+    assert "outside" in field(tmp_path, BASE, code=CASE)
+    field(tmp_path, changed(BASE, **OPEN))
+
+
+@pytest.mark.parametrize("shift, found", [(0.9, True), (1.0, False), (0.9999, False)])
+def test_overlap_names_both(tmp_path, shift, found):
+    """The slop of the solver (a thousandth of the floe size) is left to the position projection; touching is no overlap."""
+    write(tmp_path, feature(at(SQUARE, 5, 3)), feature(at(SQUARE, 8, 0)), feature(at(SQUARE, 8 + shift, 0)))
+    if found:
+        assert "feature 1 and feature 2 overlap by 0.1 m" in field(tmp_path, BASE, code=CASE)
+    else:
+        field(tmp_path, BASE)
+
+
+def test_overlap_of_shores_not_of_hulls(tmp_path):
+    """A floe in the bay of another: no overlap of the outlines, but of the hull."""
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 5.8, 0.5)))
+    assert "feature 0 and feature 1 overlap" in field(tmp_path, changed(BASE, ice__nonconvex="hull"), code=CASE)
+    rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="split"))
+    assert same_ring(rings[0], at(C_SHAPE, 5, 0), 1e-12)
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 5.3, 0.5)))
+    assert "feature 0 and feature 1 overlap by 0.2 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+    write(tmp_path, feature(at(SQUARE, 5, 0)), feature([[5.4, 0.4], [5.6, 0.4], [5.6, 0.6], [5.4, 0.6]]))
+    assert "feature 0 and feature 1 overlap" in field(tmp_path, BASE, code=CASE), "one inside the other"
+
+
+@pytest.mark.parametrize("x, y", [(6.5, 0.35), (6.5, 1.25), (5.35, 0.8)])
+@pytest.mark.parametrize("last", [True, False])
+def test_overlap_with_every_part(tmp_path, x, y, last):
+    """A small floe a little in each arm of the C, and in its back; whichever of them comes first."""
+    small = feature([[x, y], [x + 0.4, y], [x + 0.4, y + 0.4], [x, y + 0.4]])
+    c = feature(at(C_SHAPE, 5, 0))
+    write(tmp_path, *([c, small] if last else [small, c]))
+    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+
+
+def test_hull_and_split_are_counted(tmp_path):
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
+    rings, _, areas, _ = field(tmp_path, changed(BASE, ice__nonconvex="hull"))
+    np.testing.assert_allclose(areas, [4, 1], rtol=1e-12)
+    assert same_ring(rings[0], [[5, 0], [7, 0], [7, 2], [5, 2]], 1e-12)
+    r = run(tmp_path, changed(BASE, ice__nonconvex="hull"), name="hull")
+    assert (r.summary["outlines"]["hulled"], r.summary["outlines"]["split"]) == (1, 0)
+    np.testing.assert_allclose(r.summary["outlines"]["hull_area_added_m2"], 1.5, rtol=1e-12)
+    assert "1 not convex and replaced by their hulls" in r.result.stdout
+    r = run(tmp_path, changed(BASE, ice__nonconvex="split"), name="split")
+    o = r.summary["outlines"]
+    assert (o["hulled"], o["split"], o["parts"], o["hull_area_added_m2"]) == (0, 1, 3, 0)
+    # The result shows the floe, not its parts.
+    assert r.summary["n_floes"] == 2
+    np.testing.assert_allclose(r.dataset("/floes/area"), [2.5, 1], rtol=1e-12)
+    assert r.dataset("/floes/offsets").tolist() == [0, 8, 12]
+    assert same_ring(placed(r.dataset("/floes/vertices")[:8], r.dataset("/frames/pose")[0, 0]), at(C_SHAPE, 5, 0), 1e-12)
+    said = call("check", write_case(tmp_path, changed(BASE, ice__nonconvex="split"))).stdout
+    assert "1 floes in 3 convex parts" in said
+
+
+def test_many_vertices_become_a_hull(tmp_path):
+    """A finely traced shore: too long for a floe as it is, but not for its hull."""
+    circle = [[9 + (1 - 0.1 * (k % 4 > 0)) * math.cos(2 * math.pi * k / 400), math.sin(2 * math.pi * k / 400) * (1 - 0.1 * (k % 4 > 0))] for k in range(400)]
+    write(tmp_path, feature(circle))
+    assert "128" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+    rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="hull"))
+    assert len(rings[0]) == 100
+
+
+@pytest.mark.parametrize("text, says", [("", "JSON"), ("{\"type\": \"FeatureCollection\",\n\"features\": [}", "floes.geojson:2: is not JSON"),
+                                        ("[1, 2]", "FeatureCollection"), ('{"type": "Polygon", "coordinates": []}', "FeatureCollection"),
+                                        ('{"type": "FeatureCollection", "features": []}', "0 features"), ("\x89HDF\r\n\x1a\n", "JSON"),
+                                        ('{"type": "FeatureCollection", "features": [3, null, {}]}', "feature 2")])
+def test_files_that_are_no_outlines(tmp_path, text, says):
+    (tmp_path / "floes.geojson").write_text(text)
+    assert says in field(tmp_path, BASE, code=CASE)
+
+
+def test_missing_file(tmp_path):
+    said = field(tmp_path, BASE, code=IO)
+    assert "floes.geojson" in said and "No such file" in said
+
+
+@pytest.mark.parametrize("changes, key", [
+    ({"ice__field": "a.h5"}, "ice.outlines"), ({"ice__origin_lon": 10}, "ice.origin_lon"), ({"ice__origin_lon": 10, "ice__origin_lat": 70}, "ice.origin_lon"),
+    ({"ice__outlines": None, "ice__outlines_crs": "lonlat"}, "ice.outlines_crs"), ({"ice__outlines": None, "ice__nonconvex": "split"}, "ice.nonconvex")])
+def test_keys_without_effect(tmp_path, changes, key):
+    write(tmp_path, feature(at(SQUARE, 8, 0)))
+    assert f": {key}: " in field(tmp_path, changed(BASE, **changes), code=CASE)
+
+
+def test_round_trip(tmp_path):
+    """A field made, written as outlines, and read again is the same field; so is one that is periodic and turned at the seams."""
+    made = changed(BASE, ice={"concentration": 0.7, "size": 0.8, "thickness_law": "lognormal"}, domain__ends="periodic")
+    rings, thickness, areas, pose = field(tmp_path / "made", made)
+    field(tmp_path / "made", made, name="made.geojson")
+    again = changed(BASE, ice={"outlines": "made/made.geojson"}, domain__ends="periodic")
+    rings2, thickness2, areas2, pose2 = field(tmp_path, again)
+    assert len(rings) == len(rings2) > 100
+    for p, q in zip(rings, rings2):
+        assert same_ring(p, q, 1e-12)
+    assert thickness.tolist() == thickness2.tolist()
+    np.testing.assert_allclose(areas2, areas, rtol=1e-12)
+    np.testing.assert_allclose(pose2[:, :2], pose[:, :2], atol=1e-12)
+    # A second round is the same to the bit, but for the last digits of centring; the file is plain GeoJSON.
+    field(tmp_path, again, name="second.geojson")
+    first = json.loads((tmp_path / "made/made.geojson").read_text())["features"]
+    second = json.loads((tmp_path / "second.geojson").read_text())["features"]
+    for a, b in zip(first, second):
+        np.testing.assert_allclose(a["geometry"]["coordinates"], b["geometry"]["coordinates"], atol=1e-13)
+    assert "domain.frame" in field(tmp_path, changed(again, domain__frame="geographic"), code=CASE), "metres of another frame"
+    assert "lonlat" in field(tmp_path, changed(again, ice__outlines_crs="lonlat"), code=CASE)
+
+
+def test_field_files_with_bays(tmp_path):
+    """HDF5 holds the outline, and the case that reads it says what becomes of it; the run is that of the outlines themselves."""
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
+    split = changed(BASE, ice__nonconvex="split")
+    field(tmp_path, split)
+    stored = changed(BASE, ice={"field": "out.h5", "thickness": 0.25})
+    r = call("check", write_case(tmp_path, stored))
+    assert r.returncode == CASE and "floe 0" in r.stderr and "not convex" in r.stderr and "ice.nonconvex" in r.stderr
+    a = run(tmp_path, split, name="a")
+    b = run(tmp_path, changed(stored, ice__nonconvex="split"), name="b")
+    assert (b.summary["outlines"]["split"], b.summary["outlines"]["parts"]) == (1, 3)
+    assert a.hash == b.hash
+    c = run(tmp_path, changed(stored, ice__nonconvex="hull"), name="c")
+    np.testing.assert_allclose(sorted(c.dataset("/floes/area")), [1, 4], rtol=1e-12)
+    np.testing.assert_allclose(c.summary["concentration"] * (200 - math.pi), 5, rtol=1e-3)
+    again = call("field", write_case(tmp_path, changed(stored, ice__nonconvex="split")), "-o", tmp_path / "back.geojson")
+    assert again.returncode == DONE, again.stderr
+    ring = json.loads((tmp_path / "back.geojson").read_text())["features"][0]["geometry"]["coordinates"][0]
+    assert same_ring(ring[:-1], at(C_SHAPE, 5, 0), 1e-12)
+
+
+def test_the_resolved_case_reads_the_same_outlines(tmp_path):
+    write(tmp_path, feature(at(C_SHAPE, 5, 0)))
+    a = run(tmp_path, changed(BASE, ice__nonconvex="split"), name="deep/down/a")
+    b = run(tmp_path, a.dir / "case.resolved.yml", name="b")
+    assert a.hash == b.hash
+
+
+# ---- longitude and latitude ----
+
+def vincenty(lon1, lat1, lon2, lat2):
+    """Geodesic on WGS84, degrees: distance m and azimuth rad from north to east [Vincenty 1975, Survey Review 23]."""
+    a, f = 6378137.0, 1 / 298.257223563
+    b = a * (1 - f)
+    u1, u2 = (math.atan((1 - f) * math.tan(math.radians(x))) for x in (lat1, lat2))
+    d = lam = math.radians(lon2 - lon1)
+    for _ in range(50):
+        ss = math.hypot(math.cos(u2) * math.sin(lam), math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
+        cs = math.sin(u1) * math.sin(u2) + math.cos(u1) * math.cos(u2) * math.cos(lam)
+        sigma = math.atan2(ss, cs)
+        sa = math.cos(u1) * math.cos(u2) * math.sin(lam) / ss
+        c2 = 1 - sa * sa
+        cm = cs - 2 * math.sin(u1) * math.sin(u2) / c2 if c2 else 0
+        c = f / 16 * c2 * (4 + f * (4 - 3 * c2))
+        lam = d + (1 - c) * f * sa * (sigma + c * ss * (cm + c * cs * (2 * cm * cm - 1)))
+    k = c2 * (a * a - b * b) / (b * b)
+    big_a = 1 + k / 16384 * (4096 + k * (k * (320 - 175 * k) - 768))
+    big_b = k / 1024 * (256 + k * (k * (74 - 47 * k) - 128))
+    ds = big_b * ss * (cm + big_b / 4 * (cs * (2 * cm * cm - 1) - big_b / 6 * cm * (4 * ss * ss - 3) * (4 * cm * cm - 3)))
+    return b * big_a * (sigma - ds), math.atan2(math.cos(u2) * math.sin(lam), math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
+
+
+LON, LAT = 19.3, 75.0
+LONLAT = changed(BASE, domain={"frame": "geographic", "length": 210e3, "width": 210e3, "ends": "open", "sides": "open"}, body={"shape": "none"},
+                 ice__outlines_crs="lonlat", ice__origin_lon=LON, ice__origin_lat=LAT)
+
+
+def triangle(lon, lat, metres):
+    dy, dx = metres / 111e3, metres / (111e3 * math.cos(math.radians(lat)))
+    return [[lon, lat], [lon + dx, lat], [lon, lat + dy]]
+
+
+@pytest.mark.parametrize("distance, error", [(1e3, 1e-4), (10e3, 1e-3), (90e3, 0.02)])
+@pytest.mark.parametrize("lat0", [60, 75, 89])
+@pytest.mark.parametrize("frame", ["geographic", "basin"])
+def test_projected_distances_and_azimuths(tmp_path, frame, lat0, distance, error):
+    """Against geodesics; error: how far from their ends (m) corners may lie at a distance (m) from the origin. Azimuthal equidistant means that both are true from the origin."""
+    places = [(math.radians(azimuth), distance) for azimuth in range(10, 360, 40)]
+    rings = []
+    for azimuth, d in places:
+        lat = lat0 + d * math.cos(azimuth) / 111.6e3 * (0.9 if lat0 < 89 else 0.5)
+        rings.append(triangle(LON + d * math.sin(azimuth) / (111.3e3 * math.cos(math.radians(lat))), lat, distance / 20))
+    write(tmp_path, *(feature(r) for r in rings))
+    case = changed(LONLAT, domain__frame=frame, ice__origin_lat=lat0)
+    if frame == "basin":
+        case["domain"] |= {"x0": -105e3}
+    got, *_ = field(tmp_path, case)
+    for ring, drawn in zip(got, rings):
+        assert area(ring) > 0
+        want = []
+        for lon, lat in drawn:
+            d, azimuth = vincenty(LON, lat0, lon, lat)
+            north, east = d * math.cos(azimuth), d * math.sin(azimuth)
+            want.append([east, north] if frame == "basin" else [north, east])
+        want = want if area(np.array(want)) > 0 else want[::-1]
+        assert same_ring(ring, want, error), (np.abs(np.array(want) - ring), want)
+
+
+def test_origin_in_the_middle(tmp_path):
+    """Also across the 180th meridian."""
+    for lon in (20.0, 179.999):
+        write(tmp_path, feature(triangle(lon - 0.004, 70, 50)), feature([[x if x <= 180 else x - 360, y] for x, y in triangle(lon + 0.004, 70.002, 50)]))
+        case = changed(LONLAT, ice__origin_lon=None, ice__origin_lat=None)
+        got, *_ = field(tmp_path, case)
+        corners = np.vstack(got)
+        assert np.abs(corners.min(axis=0) + corners.max(axis=0)).max() < 0.1
+        assert np.ptp(corners[:, 1]) < 500
+        o = run(tmp_path, changed(case, run__dt=1), name=f"run{lon}").summary["outlines"]
+        assert abs(o["origin_lat_deg"] - 70.001) < 1e-3 and abs(abs(o["origin_lon_deg"]) - lon) < 2e-3
+
+
+@pytest.mark.parametrize("ring, says", [([[75, 1900], [75, 1910], [80, 1910]], "longitude and latitude"), (triangle(LON + 5, LAT, 50), "100 km")])
+def test_what_is_no_place_near_by(tmp_path, ring, says):
+    write(tmp_path, feature(triangle(LON, LAT, 50)), feature(ring))
+    said = field(tmp_path, LONLAT, code=CASE)
+    assert "feature 1" in said and says in said
+
+
+def test_the_shipped_example(tmp_path):
+    """Made-up outlines: they say so, lie where they can, and a short tow meets them."""
+    from harness import ROOT
+    folder = ROOT / "cases/outlines"
+    drawn = json.loads((folder / "made_up.geojson").read_text())
+    assert "MADE UP" in drawn["description"]
+    r = run(tmp_path, folder / "outlines.yml", "--steps", 150)
+    o = r.summary["outlines"]
+    assert o["read"] == o["split"] == len(drawn["features"]) and o["parts"] > 3 * o["split"]
+    assert r.summary["unconverged_steps"] == 0 and r.summary["momentum_residual"] < 1e-9
+    assert r.series("ice_resistance").max() > 0
+    assert r.summary["max_overlap_relative"] < 0.01
