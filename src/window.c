@@ -25,7 +25,7 @@ typedef struct candidate {
     bt_pose place;
     double radius, mass, inertia;
     bt_vel was;
-    int64_t n, first; ///< corners of its outline at the place, in the list of them all
+    int64_t n, first; ///< its vertices at the place, with those of parts, in the list of them all
     bool stays;
 } candidate;
 
@@ -38,7 +38,7 @@ static void mean_floe(const bt_world *w, bt_window *v)
         const bt_idx i = bt_world_index(w, g);
         if (b->motion[i] != BT_DYNAMIC) continue;
         double perimeter = 0;
-        for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) perimeter += 1 / b->per_length[k];
+        for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
         v->mass += b->mass[i];
         v->water += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
         v->air += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
@@ -120,22 +120,31 @@ static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
     return p;
 }
 
+/// Vertices of the candidates, turned as at their places, relative to the centroids.
+typedef struct shapes {
+    double *vertex;  ///< [n][2] m
+    bt_mark *mark;   ///< [n]
+} shapes;
+
 static int by_gid(const void *p, const void *q)
 {
     const candidate *a = p, *b = q;
     return (a->gid > b->gid) - (a->gid < b->gid);
 }
 
-/// Collective. All floes that are due, by id; corners of their outlines at the places they would take.
-static candidate *collect(const bt_world *w, size_t *n, double **corner)
+/// Collective. All floes that are due, by id, and their shapes.
+static candidate *collect(const bt_world *w, size_t *n, shapes *shape)
 {
     const bt_bodies *b = &w->bodies;
-    size_t m = 0, n_corners = 0, all;
+    size_t m = 0, n_vertices = 0, all;
     candidate *mine = NULL;
-    double *own = NULL;
+    shapes own = {NULL, NULL};
     for (int pass = 0; pass < 2; pass++) { // to count, to fill
-        if (pass) mine = bt_alloc(m, sizeof *mine), own = bt_alloc(2 * n_corners, sizeof *own);
-        m = n_corners = 0;
+        if (pass) {
+            mine = bt_alloc(m, sizeof *mine);
+            own = (shapes){bt_alloc(2 * n_vertices, sizeof *own.vertex), bt_alloc(n_vertices, sizeof *own.mark)};
+        }
+        m = n_vertices = 0;
         for (bt_idx i = 0; i < b->n; i++) {
             if (!renewable(w, i) || !bt_domain_owns(w, i) || !due(w, i)) continue;
             int32_t turns;
@@ -147,16 +156,20 @@ static candidate *collect(const bt_world *w, size_t *n, double **corner)
             m++;
             for (int64_t k = 0; pass && k < count; k++) {
                 const double *q = b->vertices + 2 * (b->offset[i] + k);
-                own[2 * (n_corners + (size_t)k)] = p.c * q[0] - p.s * q[1];
-                own[2 * (n_corners + (size_t)k) + 1] = p.s * q[0] + p.c * q[1];
+                double *to = own.vertex + 2 * (n_vertices + (size_t)k);
+                to[0] = p.c * q[0] - p.s * q[1];
+                to[1] = p.s * q[0] + p.c * q[1];
+                own.mark[n_vertices + (size_t)k] = b->mark[b->offset[i] + k];
             }
-            n_corners += (size_t)count;
+            n_vertices += (size_t)count;
         }
     }
     candidate *list = bt_domain_gather_all(w, mine, m, sizeof *mine, n);
-    *corner = bt_domain_gather_all(w, own, n_corners, 2 * sizeof *own, &all);
+    shape->vertex = bt_domain_gather_all(w, own.vertex, n_vertices, 2 * sizeof *own.vertex, &all);
+    shape->mark = bt_domain_gather_all(w, own.mark, n_vertices, sizeof *own.mark, &all);
     free(mine);
-    free(own);
+    free(own.vertex);
+    free(own.mark);
     int64_t first = 0;
     for (size_t k = 0; k < *n; k++) {
         list[k].first = first;
@@ -171,8 +184,25 @@ static candidate *find(candidate *list, size_t n, bt_gid gid)
     return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
 }
 
+/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as bt_part_first.
+static int64_t first_polygon(const bt_mark *mark, int64_t n) { return mark[0].count < n ? mark[0].count : 0; }
+static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at) { return at + mark[at].count < n ? at + mark[at].count : -1; }
+
+/// Depth to which candidate c at its place and body i, (dx, dy) from there, overlap, m; <= 0: they do not.
+static double depth(const bt_bodies *b, bt_idx i, const candidate *c, const shapes *s, double dx, double dy)
+{
+    const bt_mark *own = s->mark + c->first, *other = b->mark + b->offset[i];
+    const double *own_vertex = s->vertex + 2 * c->first, *other_vertex = b->outline + 2 * b->offset[i];
+    const int64_t n = b->offset[i + 1] - b->offset[i];
+    double deepest = 0;
+    for (int64_t p = first_polygon(own, c->n); p >= 0; p = next_polygon(own, c->n, p))
+        for (int64_t q = first_polygon(other, n); q >= 0; q = next_polygon(other, n, q))
+            deepest = bt_max(deepest, -bt_apart_of(own[p].count, own_vertex + 2 * p, other[q].count, other_vertex + 2 * q, dx, dy).gap);
+    return deepest;
+}
+
 /// Mark the places that body i, where it is, does not leave free.
-static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t n, const double *corner, double *blocked)
+static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t n, const shapes *s, double *blocked)
 {
     const bt_bodies *b = &w->bodies;
     const bt_pose *p = &b->pose[i];
@@ -182,15 +212,13 @@ static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t 
         const double dx = bt_nearest_image(p->x - c->place.x, w->par.period_x), dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
         const double reach = b->radius[i] + c->radius;
         if (dx * dx + dy * dy >= reach * reach || c->gid == b->gid[i]) continue;
-        const int64_t first = b->offset[i];
-        const bt_apart a = bt_apart_of((int)c->n, corner + 2 * c->first, (int)(b->offset[i + 1] - first), b->outline + 2 * first, dx, dy);
-        if (a.gap < -slop) blocked[k] = 1;
+        if (depth(b, i, c, s, dx, dy) > slop) blocked[k] = 1;
     }
 }
 
 /// Collective. Which candidates stay: those whose place is held by a body that is no candidate, then those whose place is held by one of
 /// these, and so on; what is left can go all at once. Each round, all that it can tell: the order of nothing matters.
-static void settle_places(const bt_world *w, candidate *list, size_t n, const double *corner)
+static void settle_places(const bt_world *w, candidate *list, size_t n, const shapes *shape)
 {
     const bt_bodies *b = &w->bodies;
     double half = 0, widest = 0; // the places lie within this of the first
@@ -208,7 +236,7 @@ static void settle_places(const bt_world *w, candidate *list, size_t n, const do
             tested[i] = 1;
             if (b->motion[i] != BT_DYNAMIC && b->gid[i] != w->towed) continue; // walls leave room for the mother field
             if (fabs(bt_nearest_image(b->pose[i].x - list[0].place.x, w->par.period_x)) > half + widest + b->radius[i]) continue;
-            obstruct(w, i, list, n, corner, blocked);
+            obstruct(w, i, list, n, shape, blocked);
         }
         bt_domain_maxima(w, blocked, (int)n);
         more = false;
@@ -315,14 +343,15 @@ void bt_window_begin(bt_world *w)
     if (!(behind >= v->stride)) return; // a body that drifts back does not take the window with it
     v->rear += v->stride * floor(behind / v->stride);
     size_t n;
-    double *corner;
-    candidate *list = collect(w, &n, &corner);
+    shapes shape;
+    candidate *list = collect(w, &n, &shape);
     if (n > 0) {
-        settle_places(w, list, n, corner);
+        settle_places(w, list, n, &shape);
         renew(w, list, n);
     }
     free(list);
-    free(corner);
+    free(shape.vertex);
+    free(shape.mark);
     let_go(w);
 }
 

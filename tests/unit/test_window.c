@@ -2,6 +2,7 @@
 // The moving window floe by floe: what comes back, when, where, what waits for what, and what is counted.
 #include "scene.h"
 
+#include "bergtow/outline.h"
 #include "bergtow/window.h"
 
 enum { LENGTH = 40, AHEAD = 16 }; // zone 8 m, stride 2 m, rear at first body − 24 m
@@ -169,6 +170,30 @@ static void rings_go_at_once(void **state)
     }
 }
 
+/// A floe may lie in the bay of another's place, which is then free: shapes that are not convex are held against each other by their parts.
+static void bays_are_free(void **state)
+{
+    (void)state;
+    for (int deep = 0; deep < 2; deep++) {
+        bt_world *w = empty(0.1);
+        double v[16] = {-3, -3, 3, -3, 3, 3, 2, 3, 2, -2, -2, -2, -2, 3, -3, 3}; // a U, 4 m wide inside
+        bt_parts parts;
+        bt_body_def d = scene_prism(8, v, 36.4);
+        assert_true(bt_outline_split(8, v, &parts));
+        d.parts = &parts, d.x = 4;
+        bt_world_add(w, &d);
+        add_floe(w, 20, 0, 0);
+        add_body_and_window(w, 1, speed);
+        bt_world_step(w);
+        move(w, 0, 0, 9, 1);
+        move(w, 1, 4 - 20, deep ? -0.5 + v[1] : 1, 0); // into the bay; into the bottom of the U
+        run_until_rear(w, 8);
+        assert_true((pose(w, 0).y == 0) == !deep);
+        assert_int_equal(w->window->renewed, !deep);
+        bt_world_free(w);
+    }
+}
+
 /// A floe that the body carries along is never taken away from it; its place is missed once a lap. One that is pushed ahead by 10 m is
 /// renewed all the same, 5 m late.
 static void carried_along(void **state)
@@ -273,6 +298,7 @@ int main(void)
         cmocka_unit_test(come_back_as_they_were),
         cmocka_unit_test(wait_for_a_place),
         cmocka_unit_test(rings_go_at_once),
+        cmocka_unit_test(bays_are_free),
         cmocka_unit_test(carried_along),
         cmocka_unit_test(drifts_as_undisturbed_ice),
         cmocka_unit_test(does_not_go_back),
