@@ -34,4 +34,13 @@ double bt_case_expected_floes(const bt_case *c);
 /// Distance of the tow end from its start along the tow direction after time t, with the ramp, m.
 double bt_case_tow_distance(const bt_case *c, double t);
 
+/// Distance from the body to the end of the domain ahead of the tow, m.
+double bt_case_window_ahead(const bt_case *c);
+
+/// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case leaves it open.
+void bt_case_window_follow(bt_case *c);
+
+/// Checks of the moving window, as bt_case_check. The waterline is v [n][2], n = 0 without a body.
+void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err);
+
 #endif

@@ -16,6 +16,7 @@
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "domain.h"
 #include "phases.h"
 
@@ -167,6 +168,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .line_length = NAN,
         .carriage_x = NAN,
         .carriage_y = NAN,
+        .window_x = w->window ? bt_window_low(w->window) : NAN,
+        .window_renewed = w->window ? (double)w->window->renewed_now : NAN,
+        .window_waiting = w->window ? (double)w->window->waiting : NAN,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);

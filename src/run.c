@@ -237,6 +237,7 @@ static bt_status run_world(run *r, bt_errors *err)
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
+    r->totals.window = r->w->window;
     note_division(r);
     char stopped[64] = "";
     if (r->stop) {

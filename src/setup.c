@@ -11,6 +11,7 @@
 #include "bergtow/forces.h"
 #include "bergtow/impact.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "case_check.h"
 
 #define GRAVITY 9.81            // m/s²
@@ -30,7 +31,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .dt = c->run.dt,
         .x0 = c->domain.x0,
         .y0 = c->domain.y0,
-        .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+        .period_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
         .tolerance = c->solver.tolerance * bt_case_reference_speed(c),
         .max_sweeps = c->solver.max_sweeps,
@@ -327,6 +328,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
+    if (c->domain.ends == BT_BOUND_MOVING && with_body)
+        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes, c->domain.sides == BT_BOUND_WALL);
     *out = w;
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;

@@ -6,6 +6,7 @@
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "summary.h"
+#include "summary_window.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -217,6 +218,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
+    bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
                       "matters", (long long)t->floes_outside);

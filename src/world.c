@@ -14,6 +14,7 @@
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "domain.h"
 
 bt_world *bt_world_create(const bt_params *p)
@@ -31,7 +32,7 @@ bt_world *bt_world_create(const bt_params *p)
 const bt_body_field bt_body_fields[] = {
     FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
     FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
-    FIELD(stirred), FIELD(tile),
+    FIELD(stirred), FIELD(tile), FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
@@ -54,6 +55,7 @@ void bt_world_free(bt_world *w)
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
     free(w->tow);
+    free(w->window);
     free(w);
 }
 
@@ -143,6 +145,7 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->large[i] = d->large;
     b->stirred[i] = 1;
     b->tile[i][0] = b->tile[i][1] = 0;
+    b->home[i] = (bt_home){0};
     bt_world_turn_outline(w, i);
     w->tiles->labelled = false;
     return b->gid[i];
@@ -195,11 +198,13 @@ uint64_t bt_world_hash(const bt_world *w)
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
+        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
         sum += h;
     }
     for (bt_idx k = 0; k < w->tiles->n; k++)
         for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_scars; i++) sum += hash_scar(&w->tiles->tile[k].scars[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

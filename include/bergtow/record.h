@@ -48,6 +48,9 @@ typedef struct bt_sample {
     double crushing;        ///< contact points that crush (crush.h)
     double crushed_work;    ///< taken by them in the step, J
     double crushed_depth;   ///< deepest crush of a pair in contact, m
+    double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
+    double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
+    double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -105,6 +108,7 @@ typedef struct bt_run_totals {
     bt_stall stall;              ///< of the towed body
     bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
+    const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;

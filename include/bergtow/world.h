@@ -29,6 +29,13 @@ typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, ra
 typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
+/// Where a floe of a moving window belongs (window.h).
+typedef struct bt_home {
+    double x, y, yaw; ///< pose in the field as made, m, m, rad
+    int32_t copy;     ///< which repetition of that place, in lengths of the period along x
+    int32_t lap;      ///< periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+} bt_home;
+
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
 typedef struct bt_drag {
     double water_skin;  ///< ρ_w C_ws A, kg/m
@@ -89,6 +96,7 @@ typedef struct bt_bodies {
     uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
                           ///< changes a pose or velocity by hand
     int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
+    bt_home *home;        ///< [n]
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
     bt_gid n_global;
@@ -122,6 +130,7 @@ struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
+struct bt_window;
 struct bt_impacts;
 struct bt_environment;
 
@@ -151,6 +160,7 @@ typedef struct bt_world {
     struct bt_tiles *tiles;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
+    struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
