@@ -71,6 +71,9 @@ void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
 /// After the solve: velocities of large bodies and the tow line's impulse to all ranks. Collective.
 void bt_domain_settle(bt_world *w);
 
+/// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the caller frees. Collective.
+void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);
+
 /// Largest value of every body over the ranks that hold it: x [n bodies]. Collective.
 void bt_domain_largest(const bt_world *w, double *x);
 

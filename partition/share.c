@@ -60,6 +60,15 @@ static void *gather(const bt_comm *c, const void *mine, size_t n, size_t size, s
     return all;
 }
 
+void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all)
+{
+    if (w->domain) return gather(w->domain->comm, mine, n, size, n_all);
+    char *copy = bt_realloc(NULL, n * size + 1, 1);
+    if (n > 0) memcpy(copy, mine, n * size);
+    *n_all = n;
+    return copy;
+}
+
 /// Is body i held by another rank too?
 static bool shared(const bt_world *w, bt_idx i)
 {
@@ -275,7 +284,7 @@ static bt_gid find_fault(const bt_world *w)
         if (holders == 1) continue;
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
-        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i]};
+        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i], b->home[i].copy, b->home[i].lap};
         uint64_t h = 0;
         for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
             uint64_t u;

@@ -261,7 +261,7 @@ class Run:
     def period(self):
         """(P_x, P_y) m; 0 along a direction that is not periodic."""
         x0, x1, y0, y1 = self.box
-        return (x1 - x0 if self.case.get("domain.ends") == "periodic" else 0.0,
+        return (x1 - x0 if self.case.get("domain.ends") in ("periodic", "moving") else 0.0,
                 y1 - y0 if self.case.get("domain.sides") == "periodic" else 0.0)
 
     # ---- floes and bodies

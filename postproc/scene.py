@@ -232,7 +232,7 @@ class Scene:
         """Dashed lines along the edges of the domain that are open or periodic."""
         a, b, c, d = self._corners
         lines = []
-        if self.run.case.get("domain.ends") in ("open", "periodic"):
+        if self.run.case.get("domain.ends") in ("open", "periodic", "moving"):
             lines += [(a, d), (b, c)]
         if self.run.case.get("domain.sides") in ("open", "periodic"):
             lines += [(a, b), (d, c)]

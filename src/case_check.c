@@ -164,6 +164,7 @@ static void follow_file(const bt_case *c, char **file)
 static void follow(bt_case *c)
 {
     bool basin = c->domain.frame == BT_FRAME_BASIN;
+    if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
     fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
     fill(&c->domain.y0, -c->domain.width / 2);
     fill(&c->ice.x_min, c->domain.x0);
@@ -172,6 +173,7 @@ static void follow(bt_case *c)
     fill(&c->ice.y_max, c->domain.y0 + c->domain.width);
     fill(&c->body.width, c->body.length);
     fill(&c->body.x, basin ? c->domain.x0 + 2 * c->body.length : 0);
+    fill(&c->domain.ahead, bt_case_window_ahead(c));
     fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
     fill(&c->body.friction, c->ice.friction);
     fill(&c->body.restitution, c->ice.restitution);
@@ -418,6 +420,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
 {
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
+    bt_case_tow_course(&k);
     follow(c);
     bt_case_tow_follow(&k);
     bt_status loaded = bt_case_load_tables(c, err);
@@ -435,6 +438,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_tow_check(&k);
     follow_impact(c);
     if (placed) check_path(&k, n, v);
+    bt_case_check_window(c, n, v, from, err);
     check_water(&k);
     bt_case_check_environment(c, from, err);
     bt_case_check_lead(c, n, v, from, err);

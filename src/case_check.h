@@ -44,6 +44,8 @@ bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by
 bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
 void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
+/// The direction that way-points give, where the place of the body is known: a moving window lies by it.
+void bt_case_tow_course(const bt_check *k);
 /// Defaults of the tow that follow from other keys; body.x and body.y are there.
 void bt_case_tow_follow(const bt_check *k);
 /// Fastening points that are not given, from the waterline v [n][2].
@@ -55,5 +57,14 @@ bool bt_case_tow_start(const bt_case *c, double at[2]);
 /// The planned path; caller frees. Without way-points straight on. False with the reason in why.
 struct bt_path;
 bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
+
+/// Distance from the body to the end of the domain ahead of the tow, m.
+double bt_case_window_ahead(const bt_case *c);
+
+/// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case leaves it open.
+void bt_case_window_follow(bt_case *c);
+
+/// Checks of the moving window, as bt_case_check. The waterline is v [n][2], n = 0 without a body.
+void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err);
 
 #endif

@@ -106,6 +106,14 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
 
 // ---- defaults ----
 
+void bt_case_tow_course(const bt_check *k)
+{
+    bt_case *c = bt_check_case(k);
+    if (c->domain.frame == BT_FRAME_GEOGRAPHIC) fill(&c->body.x, 0);
+    if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction") && !isnan(c->body.x))
+        c->tow.direction = atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
+}
+
 void bt_case_tow_follow(const bt_check *k)
 {
     bt_case *c = bt_check_case(k);
@@ -115,8 +123,7 @@ void bt_case_tow_follow(const bt_check *k)
         if (!bt_check_given(k, "tow.speed")) c->tow.speed = speed;
         if (!bt_check_given(k, "tow.ramp")) c->tow.ramp = time;
     }
-    if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction"))
-        c->tow.direction = atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
+    bt_case_tow_course(k);
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
     fill(&c->tow.line_stiffness, c->tow.line.type == BT_ROPE_NUMBERS ? 10e3 : rope.stiffness);
     fill(&c->tow.line.breaking_load, rope.breaking);
@@ -258,6 +265,14 @@ static void check_waypoints(const bt_check *k)
     if (!bt_case_tow_path(c, &path, why)) {
         bt_check_fault(k, "tow.waypoints", "%s", why);
         return;
+    }
+    // As for the direction of a straight tow.
+    for (int i = 0; c->domain.ends == BT_BOUND_MOVING && i + 1 < c->tow.n_waypoints && bt_check_sound(k, "domain.ends"); i++) {
+        const double lx = c->tow.waypoints[2 * i + 2] - c->tow.waypoints[2 * i], ly = c->tow.waypoints[2 * i + 3] - c->tow.waypoints[2 * i + 1];
+        if (lx * bt_case_tow_sign(c) >= 0.5 * hypot(lx, ly)) continue;
+        bt_check_fault(k, "tow.waypoints", "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within 60 deg of that, or set domain.ends: periodic or open",
+                       i + 1, atan2(ly, lx) * 180 / BT_PI);
+        break;
     }
     // A vessel may be slower than its programme, and is not held to it.
     if (c->tow.mode != BT_TOW_THRUST && c->run.duration > 0 && c->body.shape != BT_BODY_ABSENT &&

@@ -147,6 +147,22 @@ static void print_body(const bt_case *c)
     if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c, mass * (1 + c->body.added_mass));
 }
 
+/// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.
+static void print_crushing(const bt_case *c, const ice_numbers *n)
+{
+    if (!(c->ice.crushing_pressure > 0) || n->count < 1) return;
+    const double line = c->ice.crushing_pressure * n->thickness;
+    printf("crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n", line, line * c->ice.crushing_least * n->thickness, line * n->size);
+}
+
+static void print_window(const bt_case *c)
+{
+    if (c->domain.ends != BT_BOUND_MOVING) return;
+    const double way = bt_case_tow_distance(c, c->run.duration);
+    printf("moving window        the body keeps %.4g m from its front and %.4g m from its rear; the tow is %.3g windows long\n", c->domain.ahead,
+           c->domain.length - c->domain.ahead, way / c->domain.length);
+}
+
 /// With a field file as it will be; of a field that is still to be made, the strip.
 static bt_status print_lead(const bt_case *c, bt_field *f, bt_errors *err)
 {
@@ -208,8 +224,10 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
+    print_crushing(c, &n);
     print_outlines(&f->outlines);
     print_body(c);
+    print_window(c);
     print_environment(c);
     const bt_status status = print_lead(c, f, err);
     print_step(c, &n);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/crush.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "domain.h"
@@ -152,6 +153,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
     bt_tile *t = &w->tiles->tile[k];
+    if (t->n_scars > 0) bt_crush_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, (size_t)t->n_pairs);
     bool parts = false;
@@ -182,6 +184,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, -m->p[j].gap);
     }
     bt_pack_units(w, k, &s->pack);
+    if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
 }
 
 static void detect(bt_world *w, bool again)

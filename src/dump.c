@@ -3,12 +3,14 @@
 //
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
 // share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
-// (it is no contact) is held at its solved value.
+// (it is no contact) is held at its solved value. With ice.crushing the bounds of the normal impulses are those at the solution.
 #include <math.h>
 #include <stdlib.h>
 
 #include "bergtow/fclib.h"
+#include "bergtow/crush.h"
 #include "bergtow/solver.h"
+#include "limit.h"
 
 typedef struct {
     int32_t contact; ///< in the order of the manifolds
@@ -20,7 +22,7 @@ typedef struct {
     bt_gid gid_a, gid_b;
     int point;
     bt_idx a, b;
-    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt;
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound;
 } row;
 
 static int by_gids(const void *p, const void *q)
@@ -58,7 +60,8 @@ static row *rows_of(const bt_world *w, int *n)
             for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
                 rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = i, .a = u->a, .b = u->b, .nx = u->nx,
                                      .ny = u->ny, .ran = u->ran[i], .rbn = u->rbn[i], .rat = u->rat, .rbt = u->rbt, .bias = u->bias[i],
-                                     .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0};
+                                     .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
+                                     .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel) : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;
@@ -101,6 +104,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     double *val = bt_alloc(4 * (size_t)most, sizeof *val);
     double *q = bt_alloc(2 * (size_t)n, sizeof *q), *mu = bt_alloc((size_t)n, sizeof *mu);
     double *u = bt_alloc(2 * (size_t)n, sizeof *u), *r = bt_alloc(2 * (size_t)n, sizeof *r);
+    double *bound = bt_alloc((size_t)n, sizeof *bound);
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
         const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
@@ -110,6 +114,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         r[2 * k] = p->ln;
         r[2 * k + 1] = p->lt;
         mu[k] = p->mu;
+        bound[k] = p->bound;
     }
     // Neighbours of a contact: the union of the contacts at its two bodies, in the order of the contacts.
     touch *near = NULL;
@@ -149,9 +154,9 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         for (int64_t e = ptr[i]; e < ptr[i + 1]; e++) wr += val[e] * r[col[e]];
         q[i] = u[i] - wr;
     }
-    bt_status status = bt_fclib_write_local(path, n, ptr, col, val, q, mu, NULL, u, r, "bergtow",
-                                            "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near};
+    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, "bergtow",
+                                              "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
+    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

@@ -85,10 +85,10 @@ static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_
     free(u);
 }
 
-bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                               const double *w_val, const double *q, const double *mu, const double *guess_r,
-                               const double *solution_u, const double *solution_r, const char *title,
-                               const char *description, bt_errors *err)
+bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                                 const double *w_val, const double *q, const double *mu, const double *guess_r,
+                                 const double *solution_u, const double *solution_r, const double *bound, const char *title,
+                                 const char *description, bt_errors *err)
 {
     bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
     if (status != BT_OK) return status;
@@ -105,6 +105,7 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
         bt_h5_write_text(&h, "/fclib_local/info/description", description ? description : "");
         bt_h5_write_text(&h, "/fclib_local/info/math_info",
                          "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent");
+        if (bound) bt_h5_write(&h, "/bound", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, bound);
         if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
         if (solution_r) {
             bt_h5_group(&h, "/solution");
@@ -118,4 +119,12 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
     if (status != BT_OK) unlink(temporary);
     free(temporary);
     return status;
+}
+
+bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                               const double *w_val, const double *q, const double *mu, const double *guess_r,
+                               const double *solution_u, const double *solution_r, const char *title,
+                               const char *description, bt_errors *err)
+{
+    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, title, description, err);
 }

@@ -68,7 +68,7 @@ static bool spans(double a0, double a1, double d0, double length)
 static void add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
-    int over_x = c->domain.ends == BT_BOUND_PERIODIC && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
     for (int ix = -over_x; ix <= over_x; ix++)
         for (int iy = -over_y; iy <= over_y; iy++) {
             double v[2 * BT_MAX_VERTICES];
@@ -86,7 +86,7 @@ bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors
                       c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
         return BT_ERR_CASE;
     }
-    y->periodic_x = c->domain.ends == BT_BOUND_PERIODIC && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
+    y->periodic_x = bt_bound_wraps(c->domain.ends) && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
     y->periodic_y = c->domain.sides == BT_BOUND_PERIODIC && spans(y->y0, y->y1, c->domain.y0, c->domain.width);
     y->ice_area = (y->x1 - y->x0) * (y->y1 - y->y0);
 

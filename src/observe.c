@@ -16,6 +16,7 @@
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "domain.h"
 #include "phases.h"
 
@@ -179,6 +180,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .repeats = (double)st->repeats,
         .outrun = st->outrun,
         .restitution_cut = st->restitution_cut,
+        .crushing = (double)st->n_crushing,
+        .crushed_work = st->crushed_work,
+        .crushed_depth = st->crushed_depth,
         .current_x = w->par.water_u,
         .current_y = w->par.water_v,
         .wind_x = w->par.air_u,
@@ -196,6 +200,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .vessel_drag = NAN,
         .vessel_inertia = NAN,
         .vessel_line = NAN,
+        .window_x = w->window ? bt_window_low(w->window) : NAN,
+        .window_renewed = w->window ? (double)w->window->renewed_now : NAN,
+        .window_waiting = w->window ? (double)w->window->waiting : NAN,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/crush.h"
 #include "kernel.h"
 
 enum { MAX_COLOURS = 64 };
@@ -155,6 +156,8 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
     }
     t->n_units = (bt_idx)s->n;
     if (s->n == 0) return;
+    const bool crush = bt_crush_on(w);
+    if (crush) bt_crush_reserve(t);
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (t->phase < BT_COLOURS) colour_units(w, t, s, next);
     else memset(s->colour, 0, s->n); // in sequence
@@ -162,6 +165,10 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
         bt_pair *p = &t->pairs[s->pair[i]];
         bt_unit *u = &t->units[next[s->colour[i]]++];
         fill_unit(w, &s->man[i], s->pair[i], p, u);
+        if (crush) {
+            bt_crush_fill(w, t, (bt_idx)(u - t->units), p, &s->man[i]);
+            bt_pack_bias(w, u, 1); // the gaps are others now
+        }
         p->n_points = u->n;
         for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
     }

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/crush.h"
 #include "bergtow/solver.h"
 #include "domain.h"
 #include "kernel.h"
@@ -24,6 +25,7 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
         for (int i = 0; i < u->n; i++) {
             u->push[i] = 0;
             u->after[i] = u->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
+            if (tile->limits) u->after[i] += tile->limits[j].grown[i]; // crushed in this step
             t->most = bt_max(t->most, -u->after[i]);
         }
     }

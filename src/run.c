@@ -20,6 +20,7 @@
 #include "bergtow/record.h"
 #include "bergtow/setup.h"
 #include "bergtow/solver.h"
+#include "bergtow/stall.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "bergtow/world.h"
@@ -185,6 +186,7 @@ static bt_status loop(run *r, bt_errors *err)
         if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
         bt_sample s;
         bt_observe(w, r->reference_speed, &s);
+        bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
         if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
         if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
@@ -237,6 +239,7 @@ static bt_status run_world(run *r, bt_errors *err)
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
+    r->totals.window = r->w->window;
     note_division(r);
     char stopped[64] = "";
     if (r->stop) {

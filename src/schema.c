@@ -21,6 +21,7 @@
 
 static const char *const frames[] = {"basin", "geographic", NULL};
 static const char *const bounds[] = {"wall", "periodic", "open", NULL};
+static const char *const end_bounds[] = {"wall", "periodic", "open", "moving", NULL};
 static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NULL};
 static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
 static const char *const crss[] = {"metres", "lonlat", NULL};
@@ -62,12 +63,14 @@ const bt_key bt_case_keys[] = {
     REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
     REAL("domain.y0", domain.y0, LENGTH, "= -width/2", ANYWHERE, "low corner of the domain"),
-    CHOICE("domain.ends", domain.ends, bounds, "wall", "boundaries at the ends of x"),
+    CHOICE("domain.ends", domain.ends, end_bounds, "wall", "boundaries at the ends of x; moving: the domain goes with the towed body, ice enters ahead and is dropped behind"),
     CHOICE("domain.sides", domain.sides, bounds, "wall", "boundaries at the ends of y"),
     REAL("domain.wall_friction", domain.wall_friction, RATIO, "0.1", "[0, 10]", "Coulomb coefficient between ice or body and walls, assumed"),
     REAL("domain.wall_restitution", domain.wall_restitution, RATIO, "0", "[0, 1]", "restitution at walls, assumed"),
     REAL("domain.ends_closing", domain.ends_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each end wall"),
     REAL("domain.sides_closing", domain.sides_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each side wall"),
+    REAL("domain.ahead", domain.ahead, LENGTH, "= from body.x to the end ahead of the tow; 0.6 domain.length where that and body.x are open and the ends moving", "(0, 1e7]",
+         "distance from the body to the end ahead of it, which ends: moving keeps; without body.x it says where the body stands; the default is assumed"),
 
     REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "area fraction of ice in the ice region less the body's footprint, 0 = open water"),
     REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
@@ -92,6 +95,9 @@ const bt_key bt_case_keys[] = {
     REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",
          "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & Løset 2013]"),
     REAL("ice.restitution", ice.restitution, RATIO, "0", "[0, 1]", "restitution of floe collisions, assumed"),
+    REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
+         "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = rigid contact without limit"),
+    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]", "least length of a contact / thickness of the floe that is crushed, assumed"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
     REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag of the floe's edge in water [Hunke & Comeau 2011]"),

@@ -11,6 +11,7 @@
 #include "bergtow/forces.h"
 #include "bergtow/impact.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "case_check.h"
 #include "setup_tow.h"
 
@@ -31,7 +32,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .dt = c->run.dt,
         .x0 = c->domain.x0,
         .y0 = c->domain.y0,
-        .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+        .period_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
         .tolerance = c->solver.tolerance * bt_case_reference_speed(c),
         .max_sweeps = c->solver.max_sweeps,
@@ -43,6 +44,8 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
         .size = size,
+        .crush_pressure = c->ice.crushing_pressure,
+        .crush_least = c->ice.crushing_least,
         .water_u = water[0],
         .water_v = water[1],
         .air_u = air[0],
@@ -70,6 +73,7 @@ static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body
     d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
     d->friction = c->ice.friction;
     d->restitution = c->ice.restitution;
+    d->thickness = h;
     d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
                              c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
 }
@@ -323,6 +327,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
+    if (c->domain.ends == BT_BOUND_MOVING && with_body)
+        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes, c->domain.sides == BT_BOUND_WALL);
     *out = w;
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;

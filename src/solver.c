@@ -11,6 +11,7 @@
 #include "bergtow/tow.h"
 #include "domain.h"
 #include "kernel.h"
+#include "limit.h"
 #include "pack.h"
 #include "phases.h"
 #include "restitution.h"
@@ -87,7 +88,8 @@ static void add_residual(bt_world *w, bt_idx k, const void *context, bt_totals *
     double sum = 0;
     int64_t rows = 0;
     for (bt_idx i = 0; i < tile->n_units; i++) {
-        t->most = bt_max(t->most, bt_unit_residual(&tile->units[i], w->bodies.vel, &sum));
+        const bt_unit *u = &tile->units[i];
+        t->most = bt_max(t->most, tile->limits ? bt_limited_residual(u, &tile->limits[i], w->bodies.vel, &sum) : bt_unit_residual(u, w->bodies.vel, &sum));
         rows += tile->units[i].n + 1;
     }
     const bt_tow *line = line_of(w, k);
@@ -155,10 +157,11 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     for (int c = 0; line && c < line->n_branches; c++) line_before[c] = line->branch[c].lambda;
     for (int64_t n = 0; n < o->times; n++) {
         double most = 0;
-        for (bt_idx i = 0; i < tile->n_units; i++) {
+        for (bt_idx i = 0; !tile->limits && i < tile->n_units; i++) {
             if (n == 0) fetch_ahead(ahead, i);
             most = bt_max(most, bt_update_unit(&tile->units[i], v, inv));
         }
+        for (bt_idx i = 0; tile->limits && i < tile->n_units; i++) most = bt_max(most, bt_update_limited(&tile->units[i], &tile->limits[i], v, inv));
         if (line) most = bt_max(most, bt_tow_update(line, &v[bt_world_towed(w)], inv[bt_world_towed(w)]));
         if (n == 0) t->most = bt_max(t->most, most);
         if (most <= ENOUGH * w->par.tolerance) break; // more would be for nothing until the neighbours have changed
@@ -201,12 +204,14 @@ static bt_anderson_verdict accelerate(bt_world *w, const bt_totals *t)
     return verdict;
 }
 
-static void clamp_friction(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+/// What a new geometry, or a bound, no longer allows of the impulses of the last step.
+static void clamp_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)context, (void)t;
     bt_tile *tile = &w->tiles->tile[k];
     for (bt_idx i = 0; i < tile->n_units; i++) {
         bt_unit *u = &tile->units[i];
+        for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
         u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
     }
 }
@@ -214,7 +219,7 @@ static void clamp_friction(bt_world *w, bt_idx k, const void *context, bt_totals
 /// Start from the impulses of the step before. True when there are any.
 static bool warm_start(bt_world *w)
 {
-    bt_phases_any_order(w, clamp_friction, NULL, &(bt_totals){0});
+    bt_phases_any_order(w, clamp_impulses, NULL, &(bt_totals){0});
     bt_tow *line = w->tiles->tile[w->tiles->n - 1].own ? line_of(w, w->tiles->n - 1) : NULL;
     if (line) bt_tow_warm_start(line, w->par.warm_start);
     const bool pressed = velocities_from_impulses(w);
@@ -295,6 +300,12 @@ static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
     bt_vel v = w->bodies.vel_free[i];
     if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow)) bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
     return v;
+}
+
+double bt_solver_normal_work(const bt_world *w, const bt_unit *u, int i)
+{
+    const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
+    return 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
 }
 
 double bt_solver_work(const bt_world *w, const bt_unit *u)

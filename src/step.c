@@ -3,6 +3,7 @@
 #include <math.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/crush.h"
 #include "bergtow/environment.h"
 #include "bergtow/forces.h"
 #include "bergtow/impact.h"
@@ -10,15 +11,17 @@
 #include "bergtow/sum.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "bergtow/world.h"
 #include "domain.h"
 #include "phases.h"
 
-static double wrap(double x, double low, double period)
+/// Into the period; *lap counts the periods that were taken off.
+static double wrap(double x, double low, double period, int32_t *lap)
 {
     if (period > 0) {
-        if (x < low) return x + period;
-        if (x >= low + period) return x - period;
+        if (x < low) return --*lap, x + period;
+        if (x >= low + period) return ++*lap, x - period;
     }
     return x;
 }
@@ -41,8 +44,9 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     }
     bt_pose *p = &b->pose[i];
     if (dx != 0 || dy != 0) {
-        p->x = wrap(p->x + dx, w->par.x0, w->par.period_x);
-        p->y = wrap(p->y + dy, w->par.y0, w->par.period_y);
+        int32_t across = 0;
+        p->x = wrap(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);
+        p->y = wrap(p->y + dy, w->par.y0, w->par.period_y, &across);
     }
     if (turn != 0) {
         p->yaw += turn;
@@ -220,6 +224,7 @@ void bt_world_step(bt_world *w)
     st->forces_s = st->detect_s = st->colour_s = st->solve_s = st->advance_s = st->exchange_s = 0;
     double t0 = bt_clock();
     bt_environment_begin(w); // U_w, U_a
+    bt_window_begin(w);
     bt_tiles_begin(w);
     clock_phase(w, &st->detect_s, &t0);
     bt_forces_predict(w); // U*, effective M
@@ -227,11 +232,13 @@ void bt_world_step(bt_world *w)
     clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
+    bt_crush_grow(w);
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
+    bt_window_advance(w);
     bt_domain_note(w);
     w->step++;
 #ifdef BT_VALIDATE

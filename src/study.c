@@ -15,7 +15,7 @@
 #include "tree.h"
 #include "value.h"
 
-static const char *const words[] = {"title", "base", "set", "parameters", "variants", "sampling", "samples", "repeats", "seed", "ranks", NULL};
+static const char *const words[] = {"title", "base", "set", "parameters", "variants", "with", "sampling", "samples", "repeats", "seed", "ranks", NULL};
 static const char *const samplings[] = {"grid", "latin-hypercube", NULL};
 
 typedef struct {
@@ -244,6 +244,30 @@ static void read_variants(const reader *r, const bt_node *map, int line)
     }
 }
 
+static void read_with(const reader *r, const bt_node *map, int line)
+{
+    bt_study *s = r->s;
+    if (map->kind != BT_NODE_MAP || map->n == 0) {
+        COMPLAIN(r, line, "with: needs values with keys; write with: {ice.concentration=0.2: {domain.width: 5 km}}");
+        return;
+    }
+    s->with = bt_alloc((size_t)map->n, sizeof *s->with);
+    for (int i = 0; i < map->n; i++) {
+        char where[160];
+        snprintf(where, sizeof where, "with: %.120s", map->key[i]);
+        bool known = false;
+        for (int p = 0; p < s->n_parameters; p++)
+            for (int v = 0; v < s->parameter[p].n && !known; v++) {
+                const size_t n = strlen(s->parameter[p].name);
+                known = !strncmp(map->key[i], s->parameter[p].name, n) && map->key[i][n] == '=' && !strcmp(map->key[i] + n + 1, s->parameter[p].value[v]);
+            }
+        if (!known) COMPLAIN(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list", where);
+        bt_study_variant *v = &s->with[s->n_with++];
+        v->name = strdup(map->key[i]);
+        read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->n_set);
+    }
+}
+
 /// The numbers of parameter p in condition c.
 static bt_rng draw(const bt_study *s, int p, int64_t c) { return bt_rng_start(s->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p); }
 
@@ -321,6 +345,7 @@ static void read_entries(const reader *r, const bt_node *root)
     if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->n_set);
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
+    if ((node = entry(root, "with", &line))) read_with(r, node, line);
     if ((node = entry(root, "sampling", &line)) && scalar(r, node, line, "sampling")) {
         int k = 0;
         while (samplings[k] && strcmp(samplings[k], node->text)) k++;
@@ -358,6 +383,15 @@ static void free_texts(char **text, int n)
     free(text);
 }
 
+static void free_sets(bt_study_variant *v, int n)
+{
+    for (int i = 0; i < n; i++) {
+        free(v[i].name);
+        free_texts(v[i].set, v[i].n_set);
+    }
+    free(v);
+}
+
 void bt_study_free(bt_study *s)
 {
     for (int i = 0; i < s->n_parameters; i++) {
@@ -365,11 +399,8 @@ void bt_study_free(bt_study *s)
         free(s->parameter[i].stratum);
         free_texts(s->parameter[i].value, s->parameter[i].n);
     }
-    for (int i = 0; i < s->n_variants; i++) {
-        free(s->variant[i].name);
-        free_texts(s->variant[i].set, s->variant[i].n_set);
-    }
-    free(s->variant);
+    free_sets(s->variant, s->n_variants);
+    free_sets(s->with, s->n_with);
     free_texts(s->set, s->n_set);
     free(s->path);
     free(s->text);
@@ -406,12 +437,15 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
     out->seed = (int64_t)(bt_rng_bits(&r) >> 2); // below 4.7e18
     int most = s->n_set + s->n_parameters + 1;
     for (int i = 0; i < s->n_variants; i++) most += s->variant[i].n_set;
+    for (int i = 0; i < s->n_with; i++) most += s->with[i].n_set;
     out->set = bt_alloc((size_t)most, sizeof *out->set);
     for (int i = 0; i < s->n_set; i++) out->set[out->n_set++] = strdup(s->set[i]);
     for (int p = 0; p < s->n_parameters; p++) {
         out->value[p] = value_in(s, p, out->condition);
         if (s->parameter[p].key >= 0) {
-            out->set[out->n_set++] = print("%s=%s", s->parameter[p].name, out->value[p]);
+            char *given = out->set[out->n_set++] = print("%s=%s", s->parameter[p].name, out->value[p]);
+            for (int i = 0; i < s->n_with; i++)
+                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++) out->set[out->n_set++] = strdup(s->with[i].set[k]);
             continue;
         }
         for (int i = 0; i < s->n_variants; i++)
@@ -449,6 +483,8 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     }
     for (int i = 0; i < s->n_variants; i++)
         for (int k = 0; k < s->variant[i].n_set; k++) fprintf(out, "variant %s: %s\n", s->variant[i].name, s->variant[i].set[k]);
+    for (int i = 0; i < s->n_with; i++)
+        for (int k = 0; k < s->with[i].n_set; k++) fprintf(out, "with %s: %s\n", s->with[i].name, s->with[i].set[k]);
     fprintf(out, "# base case with `set`\n%s", base);
     fclose(out);
     free(base);

@@ -6,6 +6,7 @@
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "summary.h"
+#include "summary_window.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,6 +20,8 @@
 #define MOMENTUM_LIMIT 1e-9
 /// Overlap above this fraction of the mean floe size is told.
 #define OVERLAP_LIMIT 0.01
+/// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other part sideways.
+#define CRUSH_LIMIT 0.3
 
 void bt_history_init(bt_history *h) { *h = (bt_history){.peak_tension = NAN}; }
 
@@ -49,6 +52,10 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     h->max_momentum_residual = bt_max_seen(h->max_momentum_residual, s->momentum_residual);
     if (!isnan(s->line_tension)) h->peak_tension = isnan(h->peak_tension) ? s->line_tension
                                                                           : bt_max(h->peak_tension, s->line_tension);
+    h->crushed_work += s->crushed_work;
+    h->max_crushed_depth = bt_max_seen(h->max_crushed_depth, s->crushed_depth);
+    h->max_crushing = bt_max_seen(h->max_crushing, s->crushing);
+    h->crushing_steps += s->crushing > 0;
     h->unconverged += s->unconverged != 0;
     h->repeats += (int64_t)s->repeats;
     h->outrun += s->outrun != 0;
@@ -225,11 +232,19 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
         bt_errors_add(&s->warnings, "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
                       "solver.position_sweeps", h->max_overlap, 100 * h->max_overlap / t->mean_size);
+    if (!(h->max_crushed_depth <= CRUSH_LIMIT * t->mean_size))
+        bt_errors_add(&s->warnings, "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they were, "
+                      "which is no model of that", h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
+    if (t->stall.windows)
+        bt_errors_add(&s->warnings, "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a path of a "
+                      "mean floe size: a jam%s", t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
+                      c->ice.crushing_pressure > 0 ? "" : "; rigid contact has no largest force: consider ice.crushing.pressure");
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
     warn_of_events(s, t->events);
     warn_of_programme(s, c);
+    bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
                       "matters", (long long)t->floes_outside);

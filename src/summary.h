@@ -15,6 +15,8 @@ typedef struct bt_history {
     double sum_contacts, sum_sweeps, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double peak_tension;             ///< NaN until there is a line
+    double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
+    int64_t crushing_steps;
     int64_t unconverged, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 

@@ -8,6 +8,7 @@
 #include "impact_report.h"
 #include "json.h"
 #include "summary.h"
+#include "summary_window.h"
 
 typedef struct phase_row { const char *name; double seconds; } phase_row;
 #define N_PHASES 7
@@ -164,12 +165,19 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "mean_sweeps", s->sweeps);
     bt_json_number(&j, "contacts_mean", s->contacts);
     bt_json_number(&j, "contact_work_j", h->contact_work);
+    bt_json_number(&j, "crushed_work_j", h->crushed_work);
+    bt_json_number(&j, "max_crushed_depth_m", h->max_crushed_depth);
+    bt_json_int(&j, "crushing_steps", h->crushing_steps);
+    bt_json_number(&j, "max_crushing_contacts", h->max_crushing);
+    bt_json_number(&j, "stalled_s", t->stall.time);
+    bt_json_int(&j, "stalled_windows", t->stall.windows);
     bt_json_int(&j, "positive_work_steps", h->positive_work);
     bt_json_int(&j, "repeated_solves", h->repeats);
     bt_json_int(&j, "outrun_steps", h->outrun);
     bt_json_int(&j, "restitution_cut_steps", h->restitution_cut);
     bt_json_number(&j, "momentum_residual", h->max_momentum_residual);
     bt_json_int(&j, "floes_outside", t->floes_outside);
+    bt_summary_window_json(&j, t->window);
     bt_json_number(&j, "ns_per_floe_step", s->ns_per_floe_step);
     phase_row rows[N_PHASES];
     phase_rows(&t->phases, rows);
@@ -244,6 +252,10 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
            t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
     printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);
+    if (c->ice.crushing_pressure > 0)
+        printf("  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n", h->crushed_work,
+               (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
+    bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);
     printf("\n ");

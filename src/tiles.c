@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/crush.h"
 #include "domain.h"
 
 #define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
@@ -18,6 +19,8 @@ static void free_tile(bt_tile *t)
 {
     free(t->pairs);
     free(t->units);
+    free(t->limits);
+    free(t->scars);
     free(t->unit_history);
     free(t->body_history);
     *t = (bt_tile){0};
@@ -298,16 +301,23 @@ bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n)
     const bt_tiles *t = w->tiles;
     const bt_gid *gid = w->bodies.gid;
     int64_t cap = 0;
-    for (bt_idx k = 0; k < t->n; k++)
+    for (bt_idx k = 0; k < t->n; k++) {
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) cap += t->tile[k].pairs[i].n_points > 0;
+        if (t->tile[k].own) cap += t->tile[k].n_scars;
+    }
     bt_trace *trace = bt_alloc((size_t)cap, sizeof *trace);
     *n = 0;
-    for (bt_idx k = 0; k < t->n; k++)
+    for (bt_idx k = 0; k < t->n; k++) {
+        for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_scars; i++) {
+            const bt_scar *s = &t->tile[k].scars[i];
+            trace[(*n)++] = (bt_trace){s->a, s->b, {s->part[0], s->part[1]}, s->n, {s->feature[0], s->feature[1]}, {s->depth[0], s->depth[1]}, 0, true};
+        }
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) {
             const bt_pair *p = &t->tile[k].pairs[i];
             if (p->n_points > 0)
-                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], {p->part[0], p->part[1]}, p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt};
+                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], {p->part[0], p->part[1]}, p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt, false};
         }
+    }
     return trace;
 }
 
@@ -340,6 +350,10 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
         const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
         if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
         bt_tile *tile = &t->tile[bt_tiles_of_pair(w, a, b)];
+        if (trace[k].scar) {
+            bt_crush_add(tile, &(bt_scar){trace[k].a, trace[k].b, {trace[k].part[0], trace[k].part[1]}, trace[k].n_points, {trace[k].feature[0], trace[k].feature[1]}, {trace[k].ln[0], trace[k].ln[1]}});
+            continue;
+        }
         if (tile->n_pairs == tile->cap_pairs) {
             tile->cap_pairs = tile->cap_pairs ? 2 * tile->cap_pairs : 16;
             tile->pairs = bt_realloc(tile->pairs, (size_t)tile->cap_pairs, sizeof *tile->pairs);

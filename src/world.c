@@ -8,11 +8,13 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/crush.h"
 #include "bergtow/impact.h"
 #include "bergtow/environment.h"
 #include "bergtow/solver.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
+#include "bergtow/window.h"
 #include "domain.h"
 
 bt_world *bt_world_create(const bt_params *p)
@@ -29,8 +31,8 @@ bt_world *bt_world_create(const bt_params *p)
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
     FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
-    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(drag), FIELD(motion), FIELD(large),
-    FIELD(stirred), FIELD(tile),
+    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
+    FIELD(stirred), FIELD(tile), FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
@@ -54,6 +56,7 @@ void bt_world_free(bt_world *w)
     bt_environment_free(w->environment);
     bt_tow_free(w->tow);
     bt_events_free(&w->events);
+    free(w->window);
     free(w);
 }
 
@@ -137,11 +140,13 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->inertia[i] = d->inertia;
     b->friction[i] = d->friction;
     b->restitution[i] = d->restitution;
+    b->thickness[i] = d->thickness;
     b->drag[i] = d->drag;
     b->motion[i] = (uint8_t)d->motion;
     b->large[i] = d->large;
     b->stirred[i] = 1;
     b->tile[i][0] = b->tile[i][1] = 0;
+    b->home[i] = (bt_home){0};
     bt_world_turn_outline(w, i);
     w->tiles->labelled = false;
     return b->gid[i];
@@ -177,6 +182,13 @@ static uint64_t mix_double(uint64_t h, double x)
     return mix(h ^ u);
 }
 
+static uint64_t hash_scar(const bt_scar *s)
+{
+    uint64_t h = mix(mix(mix((uint64_t)s->a) ^ (uint64_t)s->b) ^ ((uint64_t)s->part[0] << 16 | s->part[1]));
+    for (int i = 0; i < s->n; i++) h = mix_double(mix(h ^ s->feature[i]), s->depth[i]);
+    return h;
+}
+
 uint64_t bt_world_hash(const bt_world *w)
 {
     // The sum over bodies is associative: any order, any distribution.
@@ -187,9 +199,13 @@ uint64_t bt_world_hash(const bt_world *w)
         uint64_t h = mix((uint64_t)b->gid[i]);
         const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
         for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
+        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
         sum += h;
     }
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_scars; i++) sum += hash_scar(&w->tiles->tile[k].scars[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
     return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
 }

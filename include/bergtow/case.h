@@ -7,10 +7,12 @@
 #ifndef BERGTOW_CASE_H
 #define BERGTOW_CASE_H
 
+#include <math.h>
+
 #include "bergtow/base.h"
 
 typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // basin, geographic
-typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN } bt_bound;   // wall, periodic, open
+typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING } bt_bound; // wall, periodic, open, moving (ends only)
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
 typedef enum { BT_CRS_METRES, BT_CRS_LONLAT } bt_crs;                            // metres, lonlat
@@ -69,6 +71,7 @@ typedef struct bt_case {
         double wall_friction;  ///< Coulomb coefficient ice–wall
         double wall_restitution;
         double ends_closing, sides_closing; ///< inward speed of each wall, m/s
+        double ahead;          ///< from the body to the end ahead of the tow, kept where the ends are moving, m
     } domain;
     struct {
         double concentration;           ///< area fraction in the ice region less the body's footprint, 0..0.95
@@ -87,6 +90,8 @@ typedef struct bt_case {
         double density;                 ///< ρ_i, kg/m³
         double friction;                ///< μ ice–ice
         double restitution;             ///< e
+        double crushing_pressure;       ///< Pa; 0 = rigid contact
+        double crushing_least;          ///< least contact length / thickness
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;
@@ -246,6 +251,12 @@ int bt_case_floe_outline(const bt_floe_def *f, double *v);
 
 /// Mass of the towed body without added mass, kg.
 double bt_case_body_mass(const bt_case *c);
+
+/// Is space periodic between two such boundaries? A moving window is, along x (window.h).
+static inline bool bt_bound_wraps(bt_bound b) { return b == BT_BOUND_PERIODIC || b == BT_BOUND_MOVING; }
+
+/// +1 when the tow goes towards +x, −1 towards −x: where the moving window goes.
+static inline double bt_case_tow_sign(const bt_case *c) { return cos(c->tow.direction) < 0 ? -1 : 1; }
 
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *c);

@@ -21,4 +21,11 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
                                const double *solution_u, const double *solution_r, const char *title,
                                const char *description, bt_errors *err);
 
+/// The same with an upper bound of the normal impulses, 0 <= r_n <= bound [n] N s (u_n < 0 where it holds): what FCLIB's format does not know, stored
+/// as /bound beside it. NULL: none.
+bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                                 const double *w_val, const double *q, const double *mu, const double *guess_r,
+                                 const double *solution_u, const double *solution_r, const double *bound, const char *title,
+                                 const char *description, bt_errors *err);
+
 #endif

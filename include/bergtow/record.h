@@ -9,6 +9,7 @@
 #include "bergtow/event.h"
 #include "bergtow/field.h"
 #include "bergtow/lead.h"
+#include "bergtow/stall.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
@@ -48,6 +49,12 @@ typedef struct bt_sample {
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
     double moving;          ///< floes faster than 1 % of the reference speed
+    double crushing;        ///< contact points that crush (crush.h)
+    double crushed_work;    ///< taken by them in the step, J
+    double crushed_depth;   ///< deepest crush of a pair in contact, m
+    double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
+    double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
+    double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -102,8 +109,10 @@ typedef struct bt_run_totals {
     bt_lead_stats lead;          ///< what was cut into it then
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
+    bt_stall stall;              ///< of the towed body
     bt_outline_counts outlines;  ///< of a field that was read
     uint64_t state_hash;
+    const struct bt_window *window; ///< at the end of the run, NULL where the domain stands still
     bt_phases phases;
     // what the division among ranks has cost (domain.h); 0 for one rank
     int64_t divisions, moved_floes;

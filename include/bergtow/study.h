@@ -10,6 +10,8 @@
 //     variants:                            # sets of keys that go together, as one more parameter
 //       squares: {ice.shape: rectangles}
 //       hexagons: {ice.shape: polygons, ice.sides: 6}
+//     with:                                # keys that go with a value of a list, as written there
+//       ice.concentration=0.2: {domain.width: 5 km}
 //     sampling: grid                       # every combination; or latin-hypercube
 //     samples: 100                         # conditions of the Latin hypercube
 //     repeats: 20                          # fields of each condition
@@ -56,6 +58,8 @@ typedef struct bt_study {
     int n_parameters;
     bt_study_variant *variant;
     int n_variants;
+    bt_study_variant *with; ///< [n_with] name: "key=value" of a parameter
+    int n_with;
     bt_sampling sampling;
     int64_t samples, repeats, seed, ranks;
     int64_t n_conditions;

@@ -85,6 +85,10 @@ typedef struct bt_tile {
     bt_idx n_units, cap_units;
     int64_t n_points;
     double overlap;                 ///< deepest, m
+    // crushing (crush.h); NULL in rigid contact
+    struct bt_limit *limits;        ///< [n_units] bounds of the units
+    struct bt_scar *scars;          ///< [n_scars] what pairs of this tile have crushed
+    bt_idx cap_limits, n_scars, cap_scars;
     // acceleration (anderson.h)
     double *unit_history, *body_history;
     bt_idx cap_unit_history, cap_body_history;
@@ -160,9 +164,10 @@ typedef struct bt_trace {
     int32_t n_points;
     uint32_t feature[2];
     double ln[2], lt;
+    bool scar;           ///< not a contact but what the pair has crushed (crush.h): ln are the depths, m
 } bt_trace;
 
-/// Traces of the pairs in contact that this rank owns, [*n]; the caller frees.
+/// Traces of the pairs in contact, and of those that have crushed each other, that this rank owns, [*n]; the caller frees.
 bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n);
 /// Put traces, in any order, into the pair lists of empty tiles.
 void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n);

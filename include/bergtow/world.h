@@ -30,6 +30,13 @@ typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, ra
 typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
+/// Where a floe of a moving window belongs (window.h).
+typedef struct bt_home {
+    double x, y, yaw; ///< pose in the field as made, m, m, rad
+    int32_t copy;     ///< which repetition of that place, in lengths of the period along x
+    int32_t lap;      ///< periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+} bt_home;
+
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
 typedef struct bt_drag {
     double water_skin;  ///< ρ_w C_ws A, kg/m
@@ -58,6 +65,7 @@ typedef struct bt_body_def {
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
     double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
     double friction, restitution;
+    double thickness;       ///< of ice, m; 0 = no ice: it is never crushed (crush.h)
     bt_drag drag;
 } bt_body_def;
 
@@ -82,12 +90,14 @@ typedef struct bt_bodies {
     double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
     double *friction, *restitution; ///< [n]
+    double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no tile
     uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
                           ///< changes a pose or velocity by hand
     int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
+    bt_home *home;        ///< [n]
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
     bt_gid n_global;
@@ -108,6 +118,8 @@ typedef struct bt_params {
     int64_t position_sweeps;
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets tiles and skin, m
+    double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
+    double crush_least;    ///< least length of a contact / ice thickness
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -119,6 +131,7 @@ struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
+struct bt_window;
 struct bt_impacts;
 struct bt_environment;
 
@@ -134,6 +147,9 @@ typedef struct bt_step_stats {
     double overlap;          ///< deepest overlap at the start of the step, m
     bool restitution_cut;    ///< rebounds would have added energy somewhere and were lowered there
     double contact_work;     ///< J
+    double crushed_work;     ///< taken by contact points that crush, J
+    int64_t n_crushing;      ///< contact points that crush
+    double crushed_depth;    ///< deepest crush of a pair in contact, at the end, m
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
     double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s
@@ -145,6 +161,7 @@ typedef struct bt_world {
     struct bt_tiles *tiles;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
+    struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart

@@ -30,6 +30,8 @@ CASES = {
     "friction": changed(BASE, ice__friction=0.15, domain__wall_friction=0.1),
     "strong friction, loose": changed(BASE, ice__friction=0.5, domain__wall_friction=0.3, ice__concentration=0.7),
     "tow": changed(BASE, body=TOWED, tow={"mode": "speed", "speed": SPEED, "ramp": 0}, domain={"length": 9, "width": 6}, ice__friction=0.1),
+    "crushing": changed(BASE, ice__friction=0.15, domain__wall_friction=0.1, ice__crushing={"pressure": "30 Pa", "least_length": 0.2}),
+    "crushing, e = 0.4": changed(BASE, ice__restitution=0.4, ice__crushing={"pressure": "30 Pa"}),
     "line": changed(BASE, body=TOWED, tow={"mode": "line", "speed": SPEED, "ramp": 0, "line_length": 1, "line_damping": 300},
                     domain={"length": 9, "width": 6}, ice__friction=0.1, run__duration=8),
 }
@@ -43,6 +45,7 @@ class Problem:
             self.W = scipy.sparse.csr_matrix((g["W/x"][:], g["W/i"][:], g["W/p"][:]), shape=(g["W/m"][0],) * 2).toarray()
             self.q, self.mu = g["vectors/q"][:], g["vectors/mu"][:]
             self.u, self.r = f["solution/u"][:], f["solution/r"][:]
+            self.bound = f["bound"][:] if "bound" in f else np.full(len(self.mu), np.inf)
         self.n = len(self.mu)
 
 
@@ -85,6 +88,7 @@ def with_bounds(p, bound):
     unit = SPEED * np.median(scale)  # of the scaled impulses
     A, c = scale[:, None] * p.W * scale, scale * p.q / unit
     low, high = np.zeros(2 * p.n), np.full(2 * p.n, np.inf)
+    high[::2] = p.bound / scale[::2] / unit
     high[1::2] = bound / scale[1::2] / unit
     low[1::2] = -high[1::2]
     free = high - low > 1e-10
@@ -125,6 +129,9 @@ def test_the_problem_is_worth_solving(solved):
         limit = p.mu * p.r[::2]
         assert np.any(pressed & (friction > (1 - 1e-9) * limit)), "nothing slides"
         assert np.any(pressed & (friction < 0.9 * limit)), "nothing sticks"
+    if "crushing" in name:
+        crushed = p.u[::2] < -1e-3 * SPEED
+        assert crushed.sum() > 4 and np.any(pressed & ~crushed), "all or nothing is crushed"
 
 
 def test_stored_solution_obeys_the_law(solved):
@@ -133,7 +140,9 @@ def test_stored_solution_obeys_the_law(solved):
     scale = np.diag(p.W)
     small = 2 * TOLERANCE * SPEED
     np.testing.assert_allclose(p.W @ p.r + p.q, p.u, atol=1e-12)
-    assert rn.min() >= 0 and un.min() >= -small
+    free = rn < p.bound * (1 - TOLERANCE) - small / scale[::2]  # an impulse below its bound keeps the bodies apart
+    assert rn.min() >= 0 and un[free].min() >= -small
+    assert np.all(rn <= p.bound * (1 + 1e-6) + small / scale[::2])
     assert np.minimum(rn * scale[::2], un).max() <= small, "a contact presses and opens"
     assert np.all(np.abs(rt) <= p.mu * rn * (1 + 1e-12) + 1e-15 * rn.max())
     sticks = np.abs(rt) < p.mu * rn * (1 - TOLERANCE) - small / scale[1::2]
@@ -141,7 +150,7 @@ def test_stored_solution_obeys_the_law(solved):
     slides = np.abs(ut) > 10 * small
     assert np.all((rt * ut)[slides] <= 0), "friction drives"
     # The residual that the run reports is this one.
-    natural = np.maximum(np.abs(rn - np.maximum(0, rn - un / scale[::2])) * scale[::2],
+    natural = np.maximum(np.abs(rn - np.clip(rn - un / scale[::2], 0, p.bound)) * scale[::2],
                          np.abs(rt - np.clip(rt - ut / scale[1::2], -p.mu * rn, p.mu * rn)) * scale[1::2]).max()
     assert natural <= TOLERANCE * SPEED and natural <= r.series("residual")[-1] * (1 + 1e-3) + 1e-14
 

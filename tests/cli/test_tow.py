@@ -169,3 +169,15 @@ def test_a_lead_goes_round_the_corners(tmp_path):
             distance = np.minimum(distance, np.hypot(*(centre - p - s[:, None] * d).T))
         near.append((distance < 29).sum())
     assert near[0] == 0 and near[1] > 5
+
+
+def test_a_vessel_in_a_moving_window(tmp_path):
+    """Towards -x, round two corners, with ice that enters ahead: the window goes along, and all balances hold."""
+    case = changed(VESSEL, run__duration=1000, body={"length": 80, "draft": 30}, domain={"frame": "geographic", "length": 900, "width": 700, "ends": "moving", "sides": "periodic"},
+                   ice={"concentration": 0.4, "size": 40, "thickness": 1}, tow__waypoints=[[-350, 0], [-500, 80], [-2000, 80]], water=None)
+    r = run(tmp_path, case, "--quiet")
+    tow, ice, drag, inertia, thrust, vdrag, vinertia, vline = r.series("tow_force", "ice_resistance", "drag_force", "inertia_force", "vessel_thrust", "vessel_drag", "vessel_inertia", "vessel_line")
+    assert np.abs(tow - ice - drag - inertia).max() <= 1e-9 * np.abs([tow, ice, drag, inertia]).max() and np.abs(ice).max() > 1e3
+    assert np.abs(thrust - vdrag - vinertia - vline).max() <= 1e-9 * np.abs([thrust, vdrag, vinertia, vline]).max()
+    assert r.series("body_x")[-1] < -300 and np.nansum(r.series("window_renewed")) > 0
+    assert run(tmp_path, r.dir / "case.resolved.yml", "--quiet", name="again").hash == r.hash

@@ -51,10 +51,12 @@ ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ic
 # The same where the tide turns, in a managed lead: nothing rests, and between the walls the tiles go with the water.
 TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}}, tow__mode="line",
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
-CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE}
+# Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
+CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
+CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
 PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
-         "round": [(2, 1), (3, 2), (4, 1)], "tide": [(2, 2), (3, 1)]}
+         "round": [(2, 1), (3, 2), (4, 1)], "tide": [(2, 2), (3, 1)], "crush": [(1, 4), (2, 2), (3, 1)]}
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
@@ -102,6 +104,8 @@ def test_the_cases_show_what_they_are_for(alone, name):
         assert (np.abs(np.diff(pose[:, :, 0], axis=0)) > 15).any() and (np.abs(np.diff(pose[:, :, 1], axis=0)) > 12).any()
         area = r.dataset("/floes/area")
         assert area.max() > 15 * area.min()
+    if name == "crush":
+        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.5, r.summary
     if name == "round":
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 

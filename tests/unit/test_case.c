@@ -353,6 +353,7 @@ static void cross_checks_refuse(void **state)
         {"tow.waypoints=[]", "has 0 points"}, {"tow.waypoints=[[9,0],[9,0]]", "way-point 2 is where the one before it"}, {"tow.turn_radius=3", "no effect without tow.waypoints"},
         {"tow.waypoints=[[20,0],[20,2]];tow.turn_radius=3", "leaves no room for a turn"}, {"tow.waypoints=[[20,0]];tow.direction=10", "is not the direction from the body to the first way-point"},
         {"tow.mode=line;tow.waypoints=[[9,0]]", "is not ahead of where the towing end starts, (10"}, {"tow.waypoints=[[6,0],[6,10]];tow.speed=1", "into a wall after"},
+        {"domain.ends=moving;tow.waypoints=[[40,0],[41,3]]", "the leg from way-point 1 leads 71.5651 deg from x"},
         {"tow.mode=none;tow.waypoints=[[9,0]]", "have no effect with tow.mode: none"},
         {"tow.mode=line;tow.line.type=dyneema", "a named line needs a diameter"}, {"tow.mode=line;tow.line.diameter=0.1", "has no effect without a named line"},
         {"tow.mode=line;tow.line.branches=2;tow.branch2.length=0.9", "do not both reach the middle"}, {"tow.mode=thrust", "tow.vessel.mass: is 0 and tow.mode thrust needs it"},

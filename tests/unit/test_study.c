@@ -40,7 +40,7 @@ static void grid_holds_every_combination_once(void **state)
 {
     (void)state;
     bt_study s = read_text("base: a.yml\nset: {run.duration: 60 s}\nparameters:\n  ice.concentration: [0.2, 0.5, 80 %]\n  tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}\n"
-                           "variants:\n  squares: {ice.shape: rectangles, ice.aspect: 1}\n  hexagons: {ice.shape: polygons, ice.sides: 6}\nrepeats: 5\nseed: 7\n");
+                           "variants:\n  squares: {ice.shape: rectangles, ice.aspect: 1}\n  hexagons: {ice.shape: polygons, ice.sides: 6}\nwith:\n  ice.concentration=0.5: {domain.width: 40 m}\nrepeats: 5\nseed: 7\n");
     assert_int_equal(s.n_conditions, 18);
     assert_int_equal(bt_study_n_members(&s), 90);
     int64_t *seeds = bt_alloc(90, sizeof *seeds);
@@ -57,6 +57,7 @@ static void grid_holds_every_combination_once(void **state)
             bt_member_free(&other);
         }
         assert_true(has(&m, "run.duration=60 s"));
+        assert_true(has(&m, "domain.width=40 m") == has(&m, "ice.concentration=0.5"));
         assert_true(has(&m, "ice.shape=rectangles") == !strcmp(m.value[2], "squares") && has(&m, "ice.sides=6") == !strcmp(m.value[2], "hexagons"));
         bt_member_free(&m);
     }

@@ -51,6 +51,11 @@ static void summary_holds_the_numbers(void **state)
     assert_string_equal(json_value(json, "unconverged_steps"), "0");
     assert_string_equal(json_value(json, "positive_work_steps"), "0");
     assert_string_equal(json_value(json, "contact_work_j"), "-1200");
+    assert_string_equal(json_value(json, "crushed_work_j"), "225");
+    assert_string_equal(json_value(json, "crushing_steps"), "150");
+    assert_string_equal(json_value(json, "max_crushing_contacts"), "3");
+    assert_string_equal(json_value(json, "max_crushed_depth_m"), "0.01");
+    assert_string_equal(json_value(json, "stalled_s"), "0");
     assert_string_equal(json_value(json, "max_overlap_m"), "0.0001");
     assert_string_equal(json_value(json, "max_overlap_relative"), "5e-05");
     assert_string_equal(json_value(json, "state_hash"), "\"0123456789abcdef\"");
@@ -92,6 +97,7 @@ static void everything_wrong(bt_sample *s, int i)
     s->unconverged = i % 3 == 0;
     s->contact_work = i % 5 == 0 ? 1 : -1;
     s->overlap = 0.1;
+    s->crushed_depth = 0.9;
     s->momentum_residual = 1e-3;
     s->tow_force += 100;
     s->ice_resistance_budget -= 7;
@@ -118,11 +124,13 @@ static void every_doubt_is_told(void **state)
 
     t.stopped = "SIGTERM";
     t.floes_outside = 2;
+    t.stall = (bt_stall){.windows = 3, .time = 12};
     json = summary_of(&c, 600, &t, FLOES, everything_wrong);
     static const char *const told[] = {"stopped early: SIGTERM", "200 of 600 steps met the sweep limit",
                                        "120 of 600 steps the contacts added energy", "overlap by up to 0.1 m",
                                        "momentum is conserved only to 0.001", "2 floes left",
-                                       "differs from tow - drag - Coriolis - tilt - inertia", "by the momentum of the ice"};
+                                       "differs from tow - drag - Coriolis - tilt - inertia", "by the momentum of the ice",
+                                       "crushed to a depth of 0.9 m, 45 % of the mean floe size", "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++)
         if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
     assert_null(strstr(json, "the steady window is short"));

@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+// Crushing-limited contact against closed forms: creep at the limit force, stops, corners, friction, memory.
+#include "scene.h"
+
+#include "bergtow/crush.h"
+
+static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
+
+static bt_params params(double dt)
+{
+    bt_params p = scene_params(dt, 1);
+    p.crush_pressure = pressure;
+    p.crush_least = 0.01;
+    return p;
+}
+
+static bt_idx add_floe(bt_world *w, int n, double *v, double x, double y, double yaw, double vx, double h)
+{
+    bt_body_def d = scene_prism(n, v, sheet);
+    d.x = x, d.y = y, d.yaw = yaw, d.vx = vx, d.thickness = h;
+    return bt_world_add(w, &d);
+}
+
+static bt_idx add_square(bt_world *w, double x, double vx, double h)
+{
+    double v[8];
+    scene_square(1, v);
+    return add_floe(w, 4, v, x, 0, 0, vx, h);
+}
+
+static bt_vel *vel(bt_world *w, bt_gid g) { return &w->bodies.vel[bt_world_index(w, g)]; }
+static bt_pose *pose(bt_world *w, bt_gid g) { return &w->bodies.pose[bt_world_index(w, g)]; }
+
+/// Normal impulse of all contacts of the step, N s.
+static double pushed(const bt_world *w)
+{
+    double sum = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) sum += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
+    return sum;
+}
+
+/// A steady force (the slope of the sea surface) presses a floe edge-on against a wall, limit F = p h L. Below the limit it stands still;
+/// above, it goes on with the acceleration a − F/m into the ice, whose resistance stays F.
+static void pressed_against_a_wall(void **state)
+{
+    (void)state;
+    const double h = 0.1, limit = pressure * h, dt = 0.005, shares[] = {0.3, 0.999, 1.001, 1.5};
+    for (int i = 0; i < 4; i++) {
+        bt_params p = params(dt);
+        p.tilt_ax = shares[i] * limit / sheet;
+        bt_world *w = bt_world_create(&p);
+        add_square(w, 0, 0, h);
+        scene_wall(w, 0.5, -50, 5, 50, 0);
+        double v = 0, depth = 0;
+        for (int s = 0; s < 20; s++) {
+            bt_world_step(w);
+            assert_true(w->stats.converged);
+            v += bt_max(0, shares[i] - 1) * limit / sheet * dt;
+            depth += dt * v;
+            CHECK_CLOSE(vel(w, 0)->x, v, 1e-9);
+            CHECK_CLOSE(pose(w, 0)->x, depth, 1e-9);
+            CHECK_CLOSE(pushed(w) / dt, bt_min(1, shares[i]) * limit, 1e-6 * limit);
+            CHECK_CLOSE(w->stats.crushed_depth, depth, 1e-9);
+            assert_true(w->stats.n_crushing == (shares[i] > 1 ? 2 : 0));
+            assert_true(w->stats.overlap <= 1e-9);
+            assert_true(w->stats.position_sweeps == 0); // nothing to put right
+        }
+        bt_world_free(w);
+    }
+}
+
+/// A floe hits a wall edge-on: it stops after t = m v/(p h L), at the depth m v²/(2 p h L), and crushing has taken its energy.
+static void stop_at_constant_force(void **state)
+{
+    (void)state;
+    const double h = 0.1, v = 2, dt = 1e-4, brake = pressure * h / sheet, gap = 1.37 * v * dt; // the way to the wall crushes nothing
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_square(w, -gap, v, h);
+    scene_wall(w, 0.5, -50, 5, 50, 0);
+    double work = 0, energy = 0, stopped = 0;
+    for (int s = 1; s <= 500; s++) {
+        bt_world_step(w);
+        assert_true(w->stats.converged);
+        work += w->stats.crushed_work;
+        energy += w->stats.contact_work;
+        if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
+    }
+    CHECK_CLOSE(stopped, gap / v + v / brake, 2 * dt);
+    CHECK_CLOSE(pose(w, 0)->x, w->stats.crushed_depth, 1e-9);
+    CHECK_CLOSE(w->stats.crushed_depth, 0.5 * v * v / brake, v * dt);
+    CHECK_CLOSE(energy, -0.5 * sheet * v * v, 1e-9 * sheet * v * v);
+    CHECK_CLOSE(work, 0.5 * sheet * v * v, sheet * brake * brake * dt * dt); // all but what the last step took below the limit
+    bt_world_free(w);
+}
+
+/// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed, over the part, with
+/// the reduced mass; they end with the common velocity.
+static void two_floes(void **state)
+{
+    (void)state;
+    const double v = 1, dt = 1e-4;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    double bar[8] = {-2, -0.5, 2, -0.5, 2, 0.5, -2, 0.5};
+    add_square(w, 0, v, 0.3);
+    add_floe(w, 4, bar, 2.5, 0, 0, 0, 0.05);
+    const double reduced = sheet * 4 / 5, force = pressure * 0.05 * 1;
+    double work = 0;
+    for (int s = 0; s < 1000; s++) {
+        bt_world_step(w);
+        work += w->stats.crushed_work;
+        assert_true(w->stats.momentum_residual <= 1e-10);
+        assert_true(pushed(w) <= force * dt * (1 + 1e-12));
+    }
+    CHECK_CLOSE(vel(w, 0)->x, v / 5, 1e-8);
+    CHECK_CLOSE(vel(w, 1)->x, v / 5, 1e-8);
+    CHECK_CLOSE(w->stats.crushed_depth, 0.5 * reduced * v * v / force, v * dt);
+    CHECK_CLOSE(work, 0.5 * reduced * v * v, force * force * dt * dt / reduced);
+    CHECK_CLOSE(pose(w, 1)->x - pose(w, 0)->x, 2.5 - w->stats.crushed_depth, 1e-8);
+    bt_world_free(w);
+
+    w = bt_world_create(&p); // a body that is no ice: the floe's thickness; half a length of overlap on a slab that cannot turn
+    add_square(w, 0, v, 0.3);
+    double slab[8] = {-1, -1, 1, -1, 1, 1, -1, 1};
+    bt_body_def d = scene_prism(4, slab, sheet);
+    d.motion = BT_STATIC, d.large = true, d.x = 1.5, d.y = 1.25; // reaches down to y = 0.25: a quarter of the edge
+    bt_world_add(w, &d);
+    bt_world_step(w);
+    CHECK_CLOSE(pushed(w) / dt, pressure * 0.3 * 0.25, 1e-6 * pressure);
+    bt_world_free(w);
+}
+
+/// A corner of angle φ: a spring k = 2 p h tan(φ/2) that never gives back, depth v √(m/k), after a quarter of the period.
+static void corner(void **state)
+{
+    (void)state;
+    const double h = 0.1, v = 0.5, angles[] = {90, 40, 140};
+    for (int i = 0; i < 3; i++) {
+        const double half = 0.5 * angles[i] * BT_PI / 180;
+        // A kite with its tip at (0.5, 0) before centring.
+        double kite[8] = {0.5 - cos(half), -sin(half), 0.5, 0, 0.5 - cos(half), sin(half), -cos(half) - 0.5, 0};
+        bt_shape_centre(4, kite);
+        const double m = sheet * bt_shape_moments(4, kite).area, k = 2 * pressure * h * tan(half), deep = v * sqrt(m / k);
+        const double steps[] = {0.005, 0.1, 1, 8}; // Δt √(k/m)
+        for (int j = 0; j < 4; j++) {
+            const double dt = steps[j] * sqrt(m / k);
+            bt_params p = params(dt);
+            p.crush_least = 0;
+            p.slop = 1e-11; // lengths are looked at one slop deeper
+            bt_world *w = bt_world_create(&p);
+            add_floe(w, 4, kite, 0, 0, 0, v, h);
+            scene_wall(w, kite[2], -50, kite[2] + 5, 50, 0);
+            double work = 0, stopped = 0, depth = 0;
+            for (int s = 1; s < 3 * BT_PI / steps[j] + 4; s++) {
+                bt_world_step(w);
+                assert_true(w->stats.converged);
+                work += w->stats.crushed_work;
+                depth = bt_max(depth, w->stats.crushed_depth); // of pairs in contact: none where all rests
+                if (stopped == 0 && vel(w, 0)->x < 1e-9) stopped = s * dt;
+                if (s == 1) { // takes from the floe the energy that this depth costs
+                    CHECK_CLOSE(w->stats.crushed_work, 0.5 * k * pow(w->stats.crushed_depth, 2), 1e-8 * m * v * v);
+                    CHECK_CLOSE(w->stats.crushed_depth, v * dt / sqrt(1 + dt * dt * k / m), 1e-9);
+                }
+            }
+            if (j == 0) {
+                CHECK_CLOSE(depth, deep, 0.005 * deep);
+                CHECK_CLOSE(stopped, 0.5 * BT_PI * sqrt(m / k), 2 * dt);
+                CHECK_CLOSE(work, 0.5 * m * v * v, 0.005 * 0.5 * m * v * v);
+            }
+            print_message("dt √(k/m) %g: depth %.3f of v √(m/k)\n", steps[j], depth / deep);
+            assert_true(depth > 0.7 * deep && depth < 1.001 * deep);
+            CHECK_CLOSE(pose(w, 0)->x, depth, 1e-6);
+            assert_true(w->stats.overlap <= 1e-9);
+            bt_world_free(w);
+        }
+    }
+}
+
+/// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what crushing takes is
+/// the kinetic energy lost.
+static void friction_from_the_limit(void **state)
+{
+    (void)state;
+    const double h = 0.1, v = 1, slide = 3, mu = 0.2, dt = 1e-4, brake = pressure * h / sheet;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    double sq[8];
+    scene_square(1, sq);
+    bt_body_def d = scene_prism(4, sq, sheet);
+    d.thickness = h, d.vx = v, d.vy = slide;
+    d.inertia *= 1e9; // both points are at the limit: nothing else would keep it from turning
+    bt_world_add(w, &d);
+    scene_wall(w, 0.5, -50, 5, 50, mu);
+    double work = 0, crushed = 0;
+    for (int s = 0; s < 400; s++) {
+        bt_world_step(w);
+        assert_true(w->stats.converged);
+        work += w->stats.contact_work;
+        crushed += w->stats.crushed_work;
+        if (s * dt < 0.9 * v / brake) {
+            CHECK_CLOSE(slide - vel(w, 0)->y, mu * brake * (s + 1) * dt, 1e-8);
+            const double before = 0.5 * sheet * (v * v + slide * slide);
+            const double friction = mu * pressure * h * (pose(w, 0)->y + 0.5 * dt * (slide - vel(w, 0)->y)); // mean of both ends of the steps
+            CHECK_CLOSE(before - w->stats.kinetic_energy, crushed + friction, 1e-7 * before);
+        }
+        CHECK_CLOSE(work, w->stats.kinetic_energy - 0.5 * sheet * (v * v + slide * slide), 1e-8 * sheet);
+    }
+    CHECK_CLOSE(vel(w, 0)->x, 0, 1e-9);
+    CHECK_CLOSE(vel(w, 0)->y, slide - mu * v, 1e-7); // in all μ times the normal impulse, as in rigid contact
+    bt_world_free(w);
+}
+
+/// What is crushed stays so: the floe stands in its dent, leaves it, comes back without a force up to the dent's bottom; once it has been
+/// farther away than the memory reaches, it meets the wall's face again.
+static void memory(void **state)
+{
+    (void)state;
+    const double h = 0.1, v = 2, dt = 1e-3, back = 0.05;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_square(w, 0, v, h);
+    scene_wall(w, 0.5, -50, 5, 50, 0);
+    for (int s = 0; s < 200; s++) bt_world_step(w);
+    const double deep = pose(w, 0)->x;
+    assert_true(deep > 0.02 && w->tiles->tile[0].n_scars == 1);
+    for (int s = 0; s < 20; s++) bt_world_step(w);
+    CHECK_CLOSE(pose(w, 0)->x, deep, 0);
+    const uint64_t hash = bt_world_hash(w);
+    w->tiles->tile[0].scars[0].depth[0] *= 1 + 1e-15;
+    assert_true(bt_world_hash(w) != hash);
+
+    const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
+    for (int i = 0; i < 3; i++) {
+        const double out = away[i] * BT_CRUSH_MEMORY, start = pose(w, 0)->x;
+        vel(w, 0)->x = -0.5;
+        w->bodies.stirred[bt_world_index(w, 0)] = 1;
+        w->tiles->rest[0] = BT_REST_NO;
+        while (pose(w, 0)->x > -out) bt_world_step(w);
+        vel(w, 0)->x = back;
+        double free_until = 0;
+        for (int s = 0; s < 3000 && vel(w, 0)->x > 0; s++) {
+            if (vel(w, 0)->x == back) free_until = pose(w, 0)->x;
+            bt_world_step(w);
+        }
+        CHECK_CLOSE(free_until, away[i] < 1 ? start : 0, 2 * back * dt);
+        assert_true(w->stats.overlap <= 1e-9);
+        if (away[i] < 1) CHECK_CLOSE(pose(w, 0)->x, start, 1e-6); // m v < p h L Δt: the dent bears it
+    }
+    bt_world_free(w);
+}
+
+/// With restitution the floe rebounds once the limit bears it; it never comes back faster than e v, and crushing gives no energy.
+static void rebound_below_the_limit(void **state)
+{
+    (void)state;
+    const double h = 0.1, v = 2, e = 0.6, dt = 0.002, brake = pressure * h / sheet;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_square(w, 0, v, h);
+    bt_idx wall = scene_wall(w, 0.5, -50, 5, 50, 0);
+    w->bodies.restitution[wall] = e;
+    double before = v, depth = 0;
+    for (int s = 0; s < 100; s++) {
+        bt_world_step(w);
+        const double now = vel(w, 0)->x;
+        assert_true(w->stats.contact_work <= 1e-12);
+        if (before > 0) { // λ = min(m (1 + e) v, p h L Δt)
+            CHECK_CLOSE(now, bt_max(-e * before, before - brake * dt), 1e-9);
+            depth += bt_max(0, now) * dt;
+        } else {
+            CHECK_CLOSE(now, before, 0);
+        }
+        before = now;
+    }
+    assert_true(before < -1e-3 && depth > 0.01);
+    assert_true(w->tiles->tile[0].n_scars == 1);
+    for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_CRUSH_MEMORY; s++) bt_world_step(w);
+    assert_true(w->tiles->tile[0].n_scars == 0); // parted, forgotten
+    bt_world_free(w);
+}
+
+/// A body at a set speed presses a row of floes against a wall. Rigid, no force would do; here it is at most p h L of the weakest.
+static void body_at_a_set_speed(void **state)
+{
+    (void)state;
+    const double dt = 0.1, h = 0.1;
+    bt_params p = params(dt);
+    p.tolerance = 1e-9;
+    bt_world *w = bt_world_create(&p);
+    for (int k = 0; k < 4; k++) add_square(w, k, 0, k == 2 ? 0.5 * h : h);
+    double o[8] = {-1, -1, 1, -1, 1, 1, -1, 1};
+    bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = o, .x = -1.5, .vx = 0.1, .mass = 1};
+    bt_world_add(w, &d);
+    scene_wall(w, 3.5, -50, 8, 50, 0);
+    for (int s = 0; s < 20; s++) {
+        bt_world_step(w);
+        assert_true(w->stats.converged);
+        if (s == 0) continue; // the floes are set in motion
+        const bt_tile *t = w->tiles->tile;
+        for (bt_idx k = 0; k < w->tiles->n; k++)
+            for (bt_idx j = 0; j < t[k].n_units; j++) CHECK_CLOSE((t[k].units[j].ln[0] + t[k].units[j].ln[1]) / dt, 0.5 * pressure * h, 1e-4 * pressure * h);
+        CHECK_CLOSE(w->stats.crushed_work, 0.5 * pressure * h * 0.1 * dt, 1e-6 * pressure * h);
+    }
+    // The thin floe's two sides share what is crushed.
+    CHECK_CLOSE(pose(w, 0)->x, 0.2, 1e-6);
+    CHECK_CLOSE(pose(w, 3)->x, 3, 1e-6);
+    assert_true(pose(w, 2)->x > 2 - 1e-6 && pose(w, 2)->x < 2.2 + 1e-6);
+    bt_world_free(w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(pressed_against_a_wall), cmocka_unit_test(stop_at_constant_force), cmocka_unit_test(two_floes),
+        cmocka_unit_test(corner), cmocka_unit_test(friction_from_the_limit), cmocka_unit_test(memory),
+        cmocka_unit_test(rebound_below_the_limit), cmocka_unit_test(body_at_a_set_speed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

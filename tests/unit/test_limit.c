@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// One update of a manifold with bounded impulses against the definition, over random problems; and the windows of a stall.
+#include "scene.h"
+
+#include "bergtow/stall.h"
+#include "limit.h"
+
+/// A unit between two free bodies with random arms; n points.
+static bt_unit random_unit(uint64_t *rng, int n, const bt_inv inv[2])
+{
+    bt_unit u = {.a = 0, .b = 1, .n = n, .mu = 0};
+    const double turn = 7 * scene_uniform(rng);
+    u.nx = cos(turn), u.ny = sin(turn);
+    for (int i = 0; i < n; i++) {
+        u.ran[i] = 2 * scene_uniform(rng) - 1;
+        u.rbn[i] = 2 * scene_uniform(rng) - 1;
+        u.w[i] = inv[0].m + inv[1].m + inv[0].i * u.ran[i] * u.ran[i] + inv[1].i * u.rbn[i] * u.rbn[i];
+        u.mn[i] = 1 / u.w[i];
+        u.bias[i] = 0.2 * scene_uniform(rng) - 0.1;
+    }
+    u.rat = scene_uniform(rng), u.rbt = scene_uniform(rng);
+    u.wt = inv[0].m + inv[1].m + inv[0].i * u.rat * u.rat + inv[1].i * u.rbt * u.rbt;
+    u.mt = 1 / u.wt;
+    if (n > 1) {
+        u.w12 = inv[0].m + inv[1].m + inv[0].i * u.ran[0] * u.ran[1] + inv[1].i * u.rbn[0] * u.rbn[1];
+        const double det = u.w[0] * u.w[1] - u.w12 * u.w12;
+        u.per_det = det > 1e-9 * u.w[0] * u.w[1] ? 1 / det : 0;
+    }
+    return u;
+}
+
+/// After the update: 0 <= λ; w >= 0 below the bound; w <= 0 above zero; λ on its bound L(w) where w < 0. A point with a rising bound is exact
+/// when alone, a pair in the limit of many updates.
+static void the_law_of_one_manifold(void **state)
+{
+    (void)state;
+    uint64_t rng = 3;
+    int bound = 0, held = 0, open = 0, rising = 0;
+    for (int k = 0; k < 20000; k++) {
+        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)}, {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
+        const int n = 1 + (k & 1);
+        bt_unit u = random_unit(&rng, n, inv);
+        bt_limit l = {.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
+        for (int i = 0; i < n; i++) {
+            if (scene_uniform(&rng) < 0.2) continue; // no ice
+            l.flat[i] = l.most[i] = 0.5 * scene_uniform(&rng);
+            l.place[i] = bt_max(u.bias[i], 0);
+            if (scene_uniform(&rng) < 0.4) continue;
+            l.base[i] = l.flat[i] * bt_min(1, 1.5 * scene_uniform(&rng));
+            l.slope[i] = exp(4 * scene_uniform(&rng) - 2);
+            l.most[i] += scene_uniform(&rng);
+        }
+        bt_vel v[2];
+        for (int i = 0; i < 2; i++) v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
+        const double start[2] = {scene_uniform(&rng), n > 1 ? scene_uniform(&rng) : 0};
+        for (int i = 0; i < n; i++) u.ln[i] = start[i];
+        const bool flat = l.slope[0] == 0 && l.slope[1] == 0;
+        for (int turn = 0; turn < (n == 1 || flat ? 1 : 300); turn++) bt_update_limited(&u, &l, v, inv);
+        double sum = 0;
+        const bool tame = u.w[0] * u.w[1] - u.w12 * u.w12 > 0.05 * u.w[0] * u.w[1]; // turns converge by w12²/(w1 w2) each
+        if (n > 1 && !flat && !tame) continue;
+        assert_true(bt_limited_residual(&u, &l, v, &sum) < 1e-9);
+        for (int i = 0; i < n; i++) {
+            const double w = bt_normal_velocity(&u, i, &v[0], &v[1]) + u.bias[i], approach = bt_max(0, -(w - u.bias[i] + l.place[i]));
+            const double limit = bt_min(l.most[i], bt_max(l.flat[i], l.base[i] + l.slope[i] * approach)), tol = 1e-7;
+            assert_true(u.ln[i] >= 0 && u.ln[i] <= limit + tol);
+            if (u.ln[i] > tol) assert_true(w <= tol);
+            if (u.ln[i] < limit - tol) assert_true(w >= -tol);
+            assert_true(bt_limit_bound(&l, &u, i, v) == limit || fabs(bt_limit_bound(&l, &u, i, v) - limit) < 1e-12);
+            open += u.ln[i] == 0, held += u.ln[i] > 0 && w > -tol, bound += w < -1e-3, rising += w < -1e-3 && u.ln[i] > l.flat[i] + tol && u.ln[i] < l.most[i] - tol;
+        }
+    }
+    assert_true(open > 1000 && held > 1000 && bound > 1000 && rising > 1000);
+}
+
+/// Without a bound it is the rigid update, bit for bit but for the order of operations.
+static void no_bound_is_rigid(void **state)
+{
+    (void)state;
+    uint64_t rng = 8;
+    for (int k = 0; k < 2000; k++) {
+        const bt_inv inv[2] = {{1, 3}, {0.5, 0.7}};
+        bt_unit u = random_unit(&rng, 1 + (k & 1), inv), r;
+        u.mu = 0.3;
+        bt_vel v[2] = {{1, scene_uniform(&rng), 0, 0}, {scene_uniform(&rng), -1, 0.2, 0}}, x[2] = {v[0], v[1]};
+        r = u;
+        const bt_limit l = {.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
+        CHECK_CLOSE(bt_update_limited(&u, &l, v, inv), bt_update_unit(&r, x, inv), 1e-11);
+        for (int i = 0; i < 2; i++) CHECK_CLOSE(u.ln[i], r.ln[i], 1e-11);
+        CHECK_CLOSE(u.lt, r.lt, 1e-11);
+        CHECK_CLOSE(v[1].x, x[1].x, 1e-11);
+    }
+}
+
+/// Windows of 1 m of asked path at 0.5 m/s: stands for 10 s, goes for 10 s, holds (asks for nothing), creeps at 4 % and at 6 %.
+static void stall_windows(void **state)
+{
+    (void)state;
+    bt_stall s = {0};
+    double x = 3;
+    const struct { double asked, moves, time; int64_t windows; } parts[] = {{0.5, 0, 10, 5}, {0.5, 0.4, 10, 5}, {0, 0, 100, 5}, {0.5, 0.02, 10, 10}, {0.5, 0.03, 10, 10}};
+    bt_stall_add(&s, 0.05, 0.1, x, 0, 1);
+    for (int p = 0; p < 5; p++) {
+        for (int k = 0; k < (int)(parts[p].time / 0.1 + 0.5); k++) {
+            x += 0.1 * parts[p].moves;
+            bt_stall_add(&s, 0.1 * parts[p].asked, 0.1, x, 0, 1 - 1e-9);
+        }
+        assert_int_equal(s.windows, parts[p].windows);
+        CHECK_CLOSE(s.time, 2 * (double)parts[p].windows, 1e-6);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
