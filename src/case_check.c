@@ -71,7 +71,6 @@ __attribute__((format(printf, 3, 4))) static void fault(const check *k, const ch
 bt_case *bt_check_case(const bt_check *k) { return k->c; }
 bool bt_check_given(const bt_check *k, const char *key) { return given(k, key); }
 bool bt_check_sound(const bt_check *k, const char *keys) { return sound(k, keys); }
-
 void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...)
 {
     char why[512];
@@ -337,8 +336,8 @@ static void check_path(const check *k, int n, const double *v)
 {
     const bt_case *c = k->c;
     // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A vessel may be slower.
-    if (c->tow.mode == BT_TOW_NONE || c->tow.mode == BT_TOW_THRUST || c->tow.n_waypoints > 0) return; // way-points: case_tow.c
-    if (!(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
+    const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0; // way-points: case_tow.c
+    if (!straight || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
