@@ -16,7 +16,7 @@ void bt_domain_settle(bt_world *w)
     bt_bodies *b = &w->bodies;
     const bt_tiles *t = w->tiles;
     bt_vel *shift = w->solver->shifted ? w->solver->shift : NULL;
-    const size_t most = 6 * (size_t)(b->n - t->n_tiled) + 1;
+    const size_t most = 6 * (size_t)(b->n - t->n_tiled) + BT_MAX_BRANCHES;
     double *x = bt_alloc(most, sizeof *x);
     for (int pass = 0; pass < 2; pass++) {
         size_t n = 0;
@@ -30,9 +30,11 @@ void bt_domain_settle(bt_world *w)
             }
         }
         if (n == 0) break; // no large body can be moved: nothing that one rank knows alone
-        if (w->tow && pass == 0) x[n] = w->tow->lambda;
-        else if (w->tow) w->tow->lambda = x[n];
-        if (pass == 0) MPI_Bcast(x, (int)n + (w->tow ? 1 : 0), MPI_DOUBLE, d->large_owner, d->comm->mpi);
+        for (int k = 0; w->tow && k < BT_MAX_BRANCHES; k++, n++) {
+            if (pass == 0) x[n] = w->tow->branch[k].lambda;
+            else w->tow->branch[k].lambda = x[n];
+        }
+        if (pass == 0) MPI_Bcast(x, (int)n, MPI_DOUBLE, d->large_owner, d->comm->mpi);
     }
     free(x);
 }
@@ -291,6 +293,7 @@ static bt_gid find_fault(const bt_world *w)
             h = (h ^ u) * UINT64_C(0x9e3779b97f4a7c15);
             h ^= h >> 29;
         }
+        if (b->gid[i] == w->towed && w->tow) h ^= bt_tow_hash(w->tow);
         mine[n++] = (copy){b->gid[i], holders, h};
     }
     copy *all = gather(d->comm, mine, n, sizeof *mine, &n_all);

@@ -29,11 +29,12 @@
 #define BERGTOW_ANDERSON_H
 
 #include "bergtow/tiles.h"
+#include "bergtow/tow.h"
 #include "phases.h"
 
 #define BT_ANDERSON_DEPTH 4 // 6 to 16 need fewer sweeps on smooth problems, but stall on sticking and slipping heavy chains
 
-/// One scalar unknown with its history: the tow line.
+/// One scalar unknown with its history: a branch of the tow line.
 typedef struct bt_anderson_scalar {
     double f_before, g_before, df[BT_ANDERSON_DEPTH], dg[BT_ANDERSON_DEPTH];
 } bt_anderson_scalar;
@@ -54,7 +55,7 @@ typedef struct bt_anderson {
     double scale;              ///< power of two that the sums are multiplied by
     double gram[BT_ANDERSON_DEPTH][BT_ANDERSON_DEPTH];
     double gamma[BT_ANDERSON_DEPTH];
-    bt_anderson_scalar line;
+    bt_anderson_scalar line[BT_MAX_BRANCHES];
 } bt_anderson;
 
 typedef enum {

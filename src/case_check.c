@@ -19,7 +19,7 @@ static const double largest_number_of_floes = 20e6; // about 40 GB; also keeps b
 static const double largest_number_of_steps = 1e9;
 static const double largest_number_of_frames = 1e6;
 
-typedef struct {
+typedef struct bt_check {
     bt_case *c;
     const bt_origin *from;
     bt_errors *err;
@@ -66,6 +66,19 @@ __attribute__((format(printf, 3, 4))) static void fault(const check *k, const ch
     vsnprintf(why, sizeof why, fmt, ap);
     va_end(ap);
     bt_errors_add(k->err, "%s: %s", where, why);
+}
+
+bt_case *bt_check_case(const bt_check *k) { return k->c; }
+bool bt_check_given(const bt_check *k, const char *key) { return given(k, key); }
+bool bt_check_sound(const bt_check *k, const char *keys) { return sound(k, keys); }
+void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...)
+{
+    char why[512];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(why, sizeof why, fmt, ap);
+    va_end(ap);
+    fault(k, key, "%s", why);
 }
 
 static void fill(double *member, double value)
@@ -145,22 +158,6 @@ static void follow_file(const bt_case *c, char **file)
     }
     free(absolute);
     free(folder);
-}
-
-// Foremost point of the waterline in the tow direction; the middle when several corners are equally far ahead.
-static void follow_hull(bt_case *c, int n, const double *v)
-{
-    double ahead = c->tow.direction - c->body.yaw, ux = cos(ahead), uy = sin(ahead);
-    double most = -INFINITY, size = 0, x = 0, y = 0;
-    int count = 0;
-    for (int i = 0; i < n; i++) {
-        most = bt_max(most, v[2 * i] * ux + v[2 * i + 1] * uy);
-        size = bt_max(size, hypot(v[2 * i], v[2 * i + 1]));
-    }
-    for (int i = 0; i < n; i++)
-        if (v[2 * i] * ux + v[2 * i + 1] * uy >= most - 1e-9 * size) x += v[2 * i], y += v[2 * i + 1], count++;
-    fill(&c->tow.hull_x, count ? x / count : 0);
-    fill(&c->tow.hull_y, count ? y / count : 0);
 }
 
 static void follow(bt_case *c)
@@ -327,10 +324,6 @@ static void check_tow(const check *k)
         if (given(k, "tow.speed") && given(k, "tow.mode")) fault(k, "tow.speed", "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed", c->tow.speed);
         else c->tow.speed = 0;
     }
-    if (c->tow.mode == BT_TOW_LINE && !(c->tow.line_length > 0) && sound(k, "tow.line_length"))
-        fault(k, "tow.line_length", "is %g m and tow.mode line needs a line; give its length, as in 5 m", c->tow.line_length);
-    if (c->tow.mode == BT_TOW_LINE && !(c->tow.line_stiffness > 0) && sound(k, "tow.line_stiffness"))
-        fault(k, "tow.line_stiffness", "is %g N and tow.mode line needs a stiffness EA; give it, as in 10 kN", c->tow.line_stiffness);
     if (c->tow.mode != BT_TOW_SPEED) return;
     static const char *const start[] = {"body.vx", "body.vy", "body.yaw_rate"};
     const double value[] = {c->body.vx, c->body.vy, c->body.yaw_rate};
@@ -342,8 +335,9 @@ static void check_tow(const check *k)
 static void check_path(const check *k, int n, const double *v)
 {
     const bt_case *c = k->c;
-    // On a line the body follows the carriage, on the average at its speed, and would end up drawn against the wall.
-    if (c->tow.mode == BT_TOW_NONE || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp")) return;
+    // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A vessel may be slower.
+    const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0; // way-points: case_tow.c
+    if (!straight || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
@@ -356,6 +350,7 @@ static void check_path(const check *k, int n, const double *v)
     reach = bt_max(reach, 0);
     double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
     double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
+    if (c->tow.n_programme > 0) time = bt_case_tow_time(c, reach);
     fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
@@ -424,7 +419,9 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
 {
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
+    bt_case_tow_course(&k);
     follow(c);
+    bt_case_tow_follow(&k);
     bt_status loaded = bt_case_load_tables(c, err);
     size_t at_files = err->n;
     check_run(&k);
@@ -435,8 +432,9 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     double v[2 * BT_MAX_VERTICES];
     int n;
     bool placed = check_body(&k, &n, v);
-    follow_hull(c, n, v);
+    bt_case_tow_hull(c, n, v);
     check_tow(&k);
+    bt_case_tow_check(&k);
     follow_impact(c);
     if (placed) check_path(&k, n, v);
     bt_case_check_window(c, n, v, from, err);
@@ -477,12 +475,6 @@ int64_t bt_case_steps(const bt_case *c)
 {
     double steps = ceil(c->run.duration / c->run.dt * (1 - 1e-12));
     return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
-}
-
-double bt_case_tow_distance(const bt_case *c, double t)
-{
-    double ramp = c->tow.ramp;
-    return c->tow.speed * (t < ramp ? t * t / (2 * ramp) : t - ramp / 2);
 }
 
 double bt_case_body_mass(const bt_case *c)

@@ -31,8 +31,32 @@ void bt_case_check_lead(bt_case *c, int n, const double *v, const bt_origin *fro
 /// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
 double bt_case_expected_floes(const bt_case *c);
 
-/// Distance of the tow end from its start along the tow direction after time t, with the ramp, m.
+/// Length of path that the tow has led along after time t, with ramp or programme, m.
 double bt_case_tow_distance(const bt_case *c, double t);
+
+/// Time at which the tow has led along this way at the latest within the run, s.
+double bt_case_tow_time(const bt_case *c, double way);
+
+/// A check under way, for the checks that stand in files of their own (case_tow.c).
+typedef struct bt_check bt_check;
+bt_case *bt_check_case(const bt_check *k);
+bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
+bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
+void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+/// The direction that way-points give, where the place of the body is known: a moving window lies by it.
+void bt_case_tow_course(const bt_check *k);
+/// Defaults of the tow that follow from other keys; body.x and body.y are there.
+void bt_case_tow_follow(const bt_check *k);
+/// Fastening points that are not given, from the waterline v [n][2].
+void bt_case_tow_hull(bt_case *c, int n, const double *v);
+/// Programme, way-points, lines and vessel.
+void bt_case_tow_check(const bt_check *k);
+/// Where the towing end starts. False when two branches are too short to meet.
+bool bt_case_tow_start(const bt_case *c, double at[2]);
+/// The planned path; caller frees. Without way-points straight on. False with the reason in why.
+struct bt_path;
+bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
 
 /// Distance from the body to the end of the domain ahead of the tow, m.
 double bt_case_window_ahead(const bt_case *c);

@@ -77,8 +77,9 @@ static bool read_points(const bt_key *k, void *base, const bt_node *list, const 
         bt_errors_add(err, "%s: needs a list of points; give it as [[x, y], [x, y], ...]", where);
         return false;
     }
-    if (list->n < 3 || list->n > BT_MAX_VERTICES) {
-        bt_errors_add(err, "%s: has %d points; a polygon has 3 to %d", where, list->n, BT_MAX_VERTICES);
+    const int least = k->least > 0 ? k->least : 3, most = k->most > 0 ? k->most : BT_MAX_VERTICES;
+    if (list->n < least || list->n > most) {
+        bt_errors_add(err, "%s: has %d points; a %s has %d to %d", where, list->n, k->most > 0 ? "list here" : "polygon", least, most);
         return false;
     }
     double *p = bt_alloc((size_t)list->n, 2 * sizeof *p);
@@ -89,7 +90,8 @@ static bool read_points(const bt_key *k, void *base, const bt_node *list, const 
         if (!good) bt_errors_add(err, "%s: point %d is not a pair; give it as [x, y]", where, i + 1);
         for (int j = 0; j < 2 && good; j++) {
             char why[BT_WHY];
-            good = bt_value_read_coordinate(k, point->item[j]->text, &p[2 * i + j], why);
+            const bt_key column = bt_schema_column(k, j);
+            good = bt_value_read_coordinate(&column, point->item[j]->text, &p[2 * i + j], why);
             if (!good) bt_errors_add(err, "%s: point %d: %s", where, i + 1, why);
         }
     }

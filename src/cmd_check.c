@@ -5,6 +5,7 @@
 // much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
 #include "bergtow/environment.h"
 #include "bergtow/field.h"
+#include "bergtow/rope.h"
 #include "bergtow/lead.h"
 #include "bergtow/shape.h"
 #include "case_check.h"
@@ -93,6 +94,26 @@ static void print_ice(const bt_case *c, const ice_numbers *n)
     printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
 }
 
+/// mass: of the body with added mass, kg.
+static void print_line(const bt_case *c, double mass)
+{
+    const bool thrust = c->tow.mode == BT_TOW_THRUST;
+    const double vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass), reduced = thrust ? mass * vessel / (mass + vessel) : mass;
+    double k = c->tow.line_stiffness / c->tow.line_length;
+    if (c->tow.line.branches > 1) k += c->tow.branch2.stiffness / c->tow.branch2.length; // as if parallel
+    const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
+    printf("line                 %s, %d x %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", rope.name, (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
+           c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load, c->tow.line.breaking_load > 0 ? "" : " = never breaks");
+    if (c->tow.line.type != BT_ROPE_NUMBERS)
+        printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
+               rope.stiffness, rope.breaking, rope.source);
+    printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(reduced / k));
+    if (!thrust) return;
+    const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
+    printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,
+           c->tow.vessel.bollard_pull * (1 - r * r));
+}
+
 static void print_outlines(const bt_outline_counts *o)
 {
     if (o->read)
@@ -121,9 +142,9 @@ static void print_body(const bt_case *c)
         printf("tow                  none, free drift\n");
         return;
     }
-    printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", c->tow.mode == BT_TOW_LINE ? "line" : "speed", speed, bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
-    if (c->tow.mode == BT_TOW_LINE)
-        printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(mass * (1 + c->body.added_mass) * c->tow.line_length / c->tow.line_stiffness));
+    static const char *const modes[] = {[BT_TOW_NONE] = "none", [BT_TOW_SPEED] = "speed", [BT_TOW_LINE] = "line", [BT_TOW_THRUST] = "thrust"};
+    printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", modes[c->tow.mode], speed, bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
+    if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c, mass * (1 + c->body.added_mass));
 }
 
 /// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.

@@ -87,7 +87,8 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
             int count;
             memcpy(&p, member, sizeof p);
             memcpy(&count, (char *)base + k->offset_count, sizeof count);
-            for (int j = 0; j < 2 * count; j++) scale_real(c, k, &p[j], ratio, err);
+            const bt_key column[2] = {bt_schema_column(k, 0), bt_schema_column(k, 1)};
+            for (int j = 0; j < 2 * count; j++) scale_real(c, &column[j % 2], &p[j], ratio, err);
             break;
         }
         case BT_KEY_TEXT: {
@@ -111,6 +112,9 @@ bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
     scale_members(c, bt_case_keys, bt_n_case_keys, c, ratio, err);
     for (bt_idx i = 0; i < c->n_floes; i++) scale_members(c, bt_floe_keys, bt_n_floe_keys, &c->floes[i], ratio, err);
     if (err->n > before) return BT_ERR_CASE;
+    // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
+    c->tow.line.type = BT_ROPE_NUMBERS;
+    c->tow.line.diameter = 0;
     return bt_case_finish(c, err);
 }
 
@@ -127,6 +131,7 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
                  "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that of the original.\n"
                  "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are those of full scale, and\n"
                  "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
+                 "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the stiffness.\n"
                  "%s"
                  "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. Otherwise rounding changes the shaken\n"
                  "# field into another of the same statistics (not so with ice.shake: 0).\n"

@@ -225,6 +225,29 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
     return status;
 }
 
+/// From the body through the way-points (corners are not rounded), after the last straight on, lead.length in all. Returns the number of points.
+static int planned_path(const bt_case *c, double *path)
+{
+    double left = c->lead.length, ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    int n = 1;
+    path[0] = c->body.x;
+    path[1] = c->body.y;
+    for (int k = 0; k < c->tow.n_waypoints && left > 0; k++) {
+        const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1], far = hypot(dx, dy);
+        if (far == 0) continue;
+        ux = dx / far, uy = dy / far;
+        const double leg = bt_min(far, left);
+        path[2 * n] = path[2 * n - 2] + leg * ux;
+        path[2 * n + 1] = path[2 * n - 1] + leg * uy;
+        left -= leg;
+        n++;
+    }
+    if (left <= 0) return n;
+    path[2 * n] = path[2 * n - 2] + left * ux;
+    path[2 * n + 1] = path[2 * n - 1] + left * uy;
+    return n + 1;
+}
+
 bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err)
 {
     *s = (bt_lead_stats){0};
@@ -234,20 +257,23 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
                       c->path ? c->path : "case", (long long)f->outlines.split);
         return BT_ERR_CASE;
     }
-    const double path[4] = {c->body.x, c->body.y, c->body.x + c->lead.length * cos(c->tow.direction), c->body.y + c->lead.length * sin(c->tow.direction)};
+    double *path = bt_alloc((size_t)c->tow.n_waypoints + 2, 2 * sizeof *path);
+    const int n = planned_path(c, path);
     const bt_lead l = {
         .name = c->path ? c->path : "case",
         .mode = c->lead.mode,
         .width = c->lead.width,
         .floe_size = c->lead.floe_size,
-        .n = 2,
+        .n = n,
         .path = path,
         .x0 = c->domain.x0,
         .y0 = c->domain.y0,
         .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
     };
-    return bt_lead_cut(&l, f, s, err);
+    const bt_status status = bt_lead_cut(&l, f, s, err);
+    free(path);
+    return status;
 }
 
 void bt_lead_stats_print(const bt_lead_stats *s)

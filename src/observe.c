@@ -82,11 +82,38 @@ static double budget_impulse(const bt_world *w, const bt_totals *seen, double dx
     const bt_idx t = bt_world_towed(w);
     if (b->motion[t] != BT_DYNAMIC) return bt_sum_value(&seen->sum[BUDGET]);
     double jx = (b->vel[t].x - b->vel_free[t].x) / b->inv[t].m, jy = (b->vel[t].y - b->vel_free[t].y) / b->inv[t].m;
-    if (w->tow && w->tow->mode == BT_TOW_LINE) {
-        jx -= w->tow->lambda * w->tow->lx;
-        jy -= w->tow->lambda * w->tow->ly;
+    for (int k = 0; bt_tow_has_line(w->tow) && k < w->tow->n_branches; k++) {
+        jx -= w->tow->branch[k].lambda * w->tow->branch[k].lx;
+        jy -= w->tow->branch[k].lambda * w->tow->branch[k].ly;
     }
     return jx * dx + jy * dy;
+}
+
+/// Tension, length and end of the line; the body's share along the course.
+static void observe_line(const bt_tow *tow, bt_sample *s)
+{
+    const bt_branch *b = &tow->branch[0];
+    s->line_tension = bt_tow_tension(tow, 0);
+    s->line_length = b->length;
+    s->carriage_x = tow->carriage_x;
+    s->carriage_y = tow->carriage_y;
+    s->tow_force = s->line_tension * (b->lx * tow->ux + b->ly * tow->uy);
+    for (int k = 1; k < tow->n_branches; k++) {
+        const double t = bt_tow_tension(tow, k);
+        s->tow_force += t * (tow->branch[k].lx * tow->ux + tow->branch[k].ly * tow->uy);
+        s->line_tension = bt_max(s->line_tension, t);
+    }
+    s->line_tension_1 = bt_tow_tension(tow, 0);
+    if (tow->n_branches > 1) s->line_tension_2 = bt_tow_tension(tow, 1);
+    if (tow->mode != BT_TOW_THRUST) return;
+    const bt_vessel *v = &tow->vessel;
+    s->vessel_x = tow->carriage_x;
+    s->vessel_y = tow->carriage_y;
+    s->vessel_speed = v->vd2;
+    s->vessel_thrust = v->thrust / tow->dt;
+    s->vessel_drag = v->kd * (v->vd2 - v->ud);
+    s->vessel_inertia = v->mass * (v->vd2 - v->vd1) / tow->dt;
+    s->vessel_line = s->tow_force; // both along the course
 }
 
 static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
@@ -112,12 +139,8 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->body_vx = b->vel[t].x;
     s->body_vy = b->vel[t].y;
     s->body_yaw_rate = b->vel[t].w;
-    if (tow->mode == BT_TOW_LINE) {
-        s->line_tension = bt_tow_tension(tow);
-        s->line_length = tow->length;
-        s->carriage_x = tow->carriage_x;
-        s->carriage_y = tow->carriage_y;
-        s->tow_force = s->line_tension * (tow->lx * dx + tow->ly * dy);
+    if (bt_tow_has_line(tow)) {
+        observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {
         s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
     } else {
@@ -168,6 +191,15 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .line_length = NAN,
         .carriage_x = NAN,
         .carriage_y = NAN,
+        .line_tension_1 = NAN,
+        .line_tension_2 = NAN,
+        .vessel_x = NAN,
+        .vessel_y = NAN,
+        .vessel_speed = NAN,
+        .vessel_thrust = NAN,
+        .vessel_drag = NAN,
+        .vessel_inertia = NAN,
+        .vessel_line = NAN,
         .window_x = w->window ? bt_window_low(w->window) : NAN,
         .window_renewed = w->window ? (double)w->window->renewed_now : NAN,
         .window_waiting = w->window ? (double)w->window->waiting : NAN,

@@ -46,7 +46,7 @@ void bt_order_measure(bt_tiles *t)
 static bool has_work(const bt_world *w, bt_idx k)
 {
     const bt_tiles *t = w->tiles;
-    return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && w->tow && w->tow->mode == BT_TOW_LINE));
+    return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
 /// Strips: which way they are stacked, and which of them each pair of rows (or columns) begins or continues.

@@ -36,6 +36,8 @@ struct bt_record {
     bt_sample merged;      ///< of the steps of the present entry
     int64_t n_merged;
     double last_flush;     ///< bt_clock
+    hid_t events[4];       ///< time, kind, subject, value
+    int64_t n_events;      ///< written
     bt_frames frames;
     bt_impact_store impacts;
 };
@@ -58,6 +60,33 @@ static void create_series(bt_record *r)
     }
 }
 
+static void create_events(bt_record *r)
+{
+    static const char *const names[4] = {"/events/time", "/events/kind", "/events/subject", "/events/value"};
+    static const char *const units[4] = {"s", "", "", "see kind"};
+    static const char *const texts[4] = {"end of the step", "index into kind_names", "which branch (line_broken) or way-point (waypoint), from 1",
+                                         "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"};
+    bt_h5_group(&r->h5, "/events");
+    for (int k = 0; k < 4; k++) {
+        r->events[k] = bt_h5_growing(&r->h5, names[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){64, 1}, false);
+        bt_h5_attr_text(&r->h5, names[k], "units", units[k]);
+        bt_h5_attr_text(&r->h5, names[k], "description", texts[k]);
+    }
+    bt_h5_write_names(&r->h5, "/events/kind_names", BT_EVENT_KINDS, bt_event_names);
+}
+
+bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err)
+{
+    if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
+    r->h5.err = err;
+    for (; r->n_events < e->n; r->n_events++) {
+        const bt_event *v = &e->event[r->n_events];
+        const void *const column[4] = {&v->time, &v->kind, &v->subject, &v->value};
+        for (int k = 0; k < 4; k++) bt_h5_append(&r->h5, r->events[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, (hsize_t)r->n_events, 1, column[k]);
+    }
+    return r->h5.status;
+}
+
 static void record_free(bt_record *r)
 {
     bt_history_free(&r->history);
@@ -72,6 +101,8 @@ static bt_status close_file(bt_record *r)
 {
     for (int k = 0; k < bt_n_series_fields; k++)
         if (r->series[k] >= 0) H5Dclose(r->series[k]);
+    for (int k = 0; k < 4; k++)
+        if (r->events[k] >= 0) H5Dclose(r->events[k]);
     bt_frames_close(&r->frames);
     bt_impact_store_close(&r->impacts);
     return bt_h5_close(&r->h5);
@@ -113,6 +144,7 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     r->buffer = bt_alloc((size_t)bt_n_series_fields * BUFFER, sizeof *r->buffer);
     r->series = bt_alloc((size_t)bt_n_series_fields, sizeof *r->series);
     for (int k = 0; k < bt_n_series_fields; k++) r->series[k] = -1;
+    for (int k = 0; k < 4; k++) r->events[k] = -1;
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, "result.h5");
     bt_status status = bt_comm_agree(comm, comm->rank == 0 ? prepare_dir(r, resolved, err) : BT_OK);
@@ -123,6 +155,7 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
         bt_h5_write_text(&r->h5, "/case", resolved);
         bt_h5_write_text(&r->h5, "/case_as_given", c->text ? c->text : "");
         create_series(r);
+        create_events(r);
         bt_frames_create(&r->frames, &r->h5, comm, b);
         status = bt_comm_agree(comm, r->h5.status); // what the others wrote is in the file: now it may be told
         if (status == BT_OK) {

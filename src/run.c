@@ -188,6 +188,7 @@ static bt_status loop(run *r, bt_errors *err)
         bt_observe(w, r->reference_speed, &s);
         bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
+        if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
         if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
         status = agree(r, status);
         // A frame at the first step at or after each multiple of the interval, and at the end.
@@ -232,6 +233,7 @@ static bt_status run_world(run *r, bt_errors *err)
     bt_progress_end(&r->progress);
 
     r->totals.n_steps = r->w->step;
+    r->totals.events = &r->w->events;
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
     r->totals.impacts = r->w->impacts;
     r->totals.floes_outside = count_outside(r);

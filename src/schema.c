@@ -29,7 +29,8 @@ static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
 static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
-static const char *const tow_modes[] = {"none", "speed", "line", NULL};
+static const char *const tow_modes[] = {"none", "speed", "line", "thrust", NULL};
+static const char *const rope_types[] = {"numbers", "steel-wire", "polypropylene", "dyneema", NULL};
 static const char *const conversions[] = {"none", "duration", "crushing", NULL};
 static const char *const corners[] = {"given", "real", NULL};
 static const char *const tilts[] = {"none", "slope", "geostrophic", "dynamic", NULL};
@@ -139,15 +140,45 @@ const bt_key bt_case_keys[] = {
     REAL("body.drag.air_form", body.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag over the sail [Hunke & Comeau 2011]"),
     REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]", "skin drag of air over the body [Hunke & Comeau 2011]"),
 
-    CHOICE("tow.mode", tow.mode, tow_modes, "speed", "none: free drift; speed: the body's velocity is prescribed; line: a carriage pulls it on a line"),
-    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed) or of the carriage (mode line) [Yulmetov & Løset 2017]"),
-    REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow from the x axis towards y"),
-    REAL("tow.ramp", tow.ramp, TIME, "5 s", "[0, 1e6]", "time in which the speed rises linearly from 0, assumed"),
-    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, mode line, assumed"),
-    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "10 kN", "[0, 1e12]", "EA: tension per unit of relative stretch, mode line, assumed"),
-    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]", "tension per stretching speed, mode line, assumed"),
-    REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own x"),
-    REAL("tow.hull_y", tow.hull_y, LENGTH, "= foremost point of the waterline", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
+    CHOICE("tow.mode", tow.mode, tow_modes, "speed", "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on a line; thrust: a vessel does, by its own power"),
+    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed), of the end (mode line), or that the vessel keeps to if it can (mode thrust) [Yulmetov & Løset 2017]; with a programme its largest"),
+    REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow at the start, from the x axis towards y; with way-points that from the body to the first"),
+    REAL("tow.ramp", tow.ramp, TIME, "5 s", "[0, 1e6]", "time in which the speed rises linearly from 0, assumed; with a programme the time of its largest speed"),
+    {.name = "tow.programme", .type = BT_KEY_POINTS, .unit = BT_UNIT_SPEED, .preset = "none", .range = "[0, 50]", AT(tow.programme), .unit_first = BT_UNIT_TIME,
+     .range_first = "[0, 1e9]", .offset_count = offsetof(bt_case, tow.n_programme), .least = 1, .most = 10000,
+     .doc = "speed over time, [[time, speed], ...], linear between and constant outside, instead of speed and ramp: ramp, hold, stop"},
+    {.name = "tow.waypoints", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = ANYWHERE, AT(tow.waypoints),
+     .offset_count = offsetof(bt_case, tow.n_waypoints), .least = 1, .most = 10000,
+     .doc = "[[x, y], ...] that the end of the line (mode speed: the body, which keeps its yaw) goes through from where it starts; after the last it goes straight on"},
+    REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]", "radius of the corners at way-points, 0 = sharp"),
+    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, modes line and thrust, assumed"),
+    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "= 10 kN, of a named line its own", "[0, 1e12]", "EA: tension per unit of relative stretch, assumed unless the line is named"),
+    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]", "tension per stretching speed, assumed"),
+    REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline, of two branches the outermost on the +y side of the tow", "[-1e5, 1e5]",
+         "where the line is fastened, from the centroid along the body's own x"),
+    REAL("tow.hull_y", tow.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
+    CHOICE("tow.line.type", tow.line.type, rope_types, "numbers",
+           "numbers: as line_stiffness says; a name gives EA and breaking load from the diameter (unless they are given): steel-wire 6x19 and 8-strand polypropylene [Orcina, OrcaFlex manual], dyneema [MoorPy, NREL]"),
+    REAL("tow.line.diameter", tow.line.diameter, LENGTH, "0 m", "[0, 1]", "diameter of a named line"),
+    INT("tow.line.branches", tow.line.branches, "1", "[1, 2]", "lines from hull to towing end: one, or two as a bridle"),
+    REAL("tow.line.breaking_load", tow.line.breaking_load, FORCE, "= 0 N, of a named line its own when new", "[0, 1e12]",
+         "mean tension of a step above which the branch is broken for good, 0 = never"),
+    REAL("tow.branch2.hull_x", tow.branch2.hull_x, LENGTH, "= outermost point of the waterline on the -y side of the tow", "[-1e5, 1e5]", "where the second branch is fastened, along the body's own x"),
+    REAL("tow.branch2.hull_y", tow.branch2.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]", "where the second branch is fastened, along the body's own y"),
+    REAL("tow.branch2.length", tow.branch2.length, LENGTH, "= tow.line_length", "(0, 1e5]", "length of the second branch, unstretched"),
+    REAL("tow.branch2.stiffness", tow.branch2.stiffness, FORCE, "= tow.line_stiffness", "(0, 1e12]", "EA of the second branch"),
+    REAL("tow.branch2.damping", tow.branch2.damping, DAMPING, "= tow.line_damping", "[0, 1e12]", "tension per stretching speed of the second branch"),
+    REAL("tow.branch2.breaking_load", tow.branch2.breaking_load, FORCE, "= tow.line.breaking_load", "[0, 1e12]", "breaking load of the second branch, 0 = never"),
+    REAL("tow.vessel.mass", tow.vessel.mass, MASS, "0 kg", "[0, 1e12]", "mass of the vessel without added mass, needed by mode thrust; the vessel touches no ice, assumed"),
+    REAL("tow.vessel.added_mass", tow.vessel.added_mass, RATIO, "0.05", "[0, 10]", "added mass / mass of the vessel, assumed"),
+    REAL("tow.vessel.bollard_pull", tow.vessel.bollard_pull, FORCE, "0 N", "[0, 1e9]", "thrust at rest at full power, needed by mode thrust"),
+    REAL("tow.vessel.free_speed", tow.vessel.free_speed, SPEED, "0 m/s", "[0, 50]",
+         "free-running speed at full power, needed by mode thrust; the net pull is bollard_pull x (1 - (speed / free_speed)^2), assumed"),
+    REAL("tow.vessel.free_resistance", tow.vessel.free_resistance, FORCE, "= 0.4 tow.vessel.bollard_pull", "[0, 1e9]",
+         "resistance of the vessel at its free-running speed, quadratic below it, assumed"),
+    REAL("tow.vessel.lateral_drag", tow.vessel.lateral_drag, RATIO, "20", "[0, 1000]", "drag of the vessel across its course / along it at the same speed, assumed"),
+    REAL("tow.vessel.lookahead", tow.vessel.lookahead, LENGTH, "= tow.line_length", "(0, 1e6]",
+         "how far ahead on its path lies the point that the vessel steers for, assumed [line-of-sight guidance: Fossen 2011]"),
 
     CHOICE("lead.mode", lead.mode, lead_modes, "none",
            "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that reach into it; or those floes cut into pieces"),
@@ -286,6 +317,13 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
         }
     if (bt_suggest_distance(name, "floes") < least) best = "floes";
     return best;
+}
+
+bt_key bt_schema_column(const bt_key *k, int column)
+{
+    bt_key c = *k;
+    if (column == 0 && k->range_first) c.unit = k->unit_first, c.range = k->range_first;
+    return c;
 }
 
 void bt_schema_preset(const bt_key *keys, int n, void *base)

@@ -24,6 +24,9 @@ typedef struct bt_key {
     const char *const *choices; ///< NULL-terminated names of a choice
     size_t offset;       ///< of the member in bt_case (bt_floe_def for bt_floe_keys)
     size_t offset_count; ///< of the number of points
+    int least, most;     ///< number of points; 0 = 3 and BT_MAX_VERTICES, a polygon
+    bt_unit unit_first;  ///< of the first of each pair where range_first says that it differs
+    const char *range_first;
     const char *doc;     ///< one sentence with its source
 } bt_key;
 
@@ -45,6 +48,9 @@ bool bt_schema_is_section(const char *name);
 
 /// The key, section or last part of a key closest to a mistyped dotted name, or NULL. The text is static or lies in buffer.
 const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64]);
+
+/// A key of points as that of one column, 0 or 1, with its unit and range.
+bt_key bt_schema_column(const bt_key *k, int column);
 
 /// Set the members of all keys to their defaults; NaN for those that follow from other keys.
 void bt_schema_preset(const bt_key *keys, int n, void *base);

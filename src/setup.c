@@ -13,6 +13,7 @@
 #include "bergtow/tow.h"
 #include "bergtow/window.h"
 #include "case_check.h"
+#include "setup_tow.h"
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
@@ -133,32 +134,13 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
         .drag = bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
                                c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
     };
-    bt_tow *t = w->tow = bt_alloc(1, sizeof *w->tow);
-    *t = (bt_tow){
-        .mode = c->tow.mode,
-        .ux = cos(c->tow.direction),
-        .uy = sin(c->tow.direction),
-        .speed = c->tow.speed,
-        .ramp = c->tow.ramp,
-        .length0 = c->tow.line_length,
-        .k = c->tow.mode == BT_TOW_LINE ? c->tow.line_stiffness / c->tow.line_length : 0,
-        .c = c->tow.line_damping,
-        .hull_x = c->tow.hull_x,
-        .hull_y = c->tow.hull_y,
-        .dt = c->run.dt,
-        .travel_x = c->body.x,
-        .travel_y = c->body.y,
-    };
+    bt_tow *t = w->tow = bt_setup_tow(c);
     if (prescribed) {
         const double s = bt_tow_speed(t, 0);
         d.vx = s * t->ux;
         d.vy = s * t->uy;
         d.yaw_rate = 0;
     }
-    // The carriage starts a line's length ahead of the fastening point: taut, without tension.
-    const double cy = cos(c->body.yaw), sy = sin(c->body.yaw);
-    t->carriage_x = c->body.x + cy * t->hull_x - sy * t->hull_y + t->length0 * t->ux;
-    t->carriage_y = c->body.y + sy * t->hull_x + cy * t->hull_y + t->length0 * t->uy;
     w->towed = bt_world_add(w, &d);
     r->thickness[w->towed] = c->body.draft + c->body.sail;
 }
@@ -198,13 +180,14 @@ static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
     return n;
 }
 
-/// Are a and b apart, also while a moves by (dx, dy) relative to b? Separating axes of the convex hull of both ends of the
+/// Are a, displaced by from, and b apart, also while a moves on by (dx, dy) relative to b? Separating axes of the convex hull of both ends of the
 /// path: edge normals of a and of b, and the normal of the path.
-static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, double dx, double dy)
+static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
 {
     const bt_bodies *bd = &w->bodies;
     double d[2];
     bt_world_offset(w, a, b, d);
+    d[0] -= from[0], d[1] -= from[1];
     const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
     for (int64_t k = 0; k <= na + nb; k++) {
         double nx = -dy, ny = dx;
@@ -230,6 +213,31 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, double dx, doub
     return false;
 }
 
+/// Displacement of body m, of prescribed velocity, from the start until time t.
+static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
+{
+    d[0] = w->bodies.vel[m].x * t, d[1] = w->bodies.vel[m].y * t;
+    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, t, d);
+}
+
+/// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
+static bool meet(const bt_case *c, const bt_world *w, bt_idx i, bt_idx j, bool wall)
+{
+    const bool bent = c->tow.n_waypoints > 0 && (i == w->towed || j == w->towed);
+    const int pieces = bent ? 500 : 1;
+    double from[2] = {0, 0};
+    for (int k = 1; k <= pieces; k++) {
+        double di[2], dj[2];
+        displacement(c, w, i, c->run.duration * k / pieces, di);
+        displacement(c, w, j, c->run.duration * k / pieces, dj);
+        const double to[2] = {dj[0] - di[0], dj[1] - di[1]};
+        if (wall && (w->bodies.motion[j] == BT_STATIC || (to[0] == 0 && to[1] == 0))) return false;
+        if (!apart_on_path(w, j, i, from, to[0] - from[0], to[1] - from[1])) return true;
+        from[0] = to[0], from[1] = to[1];
+    }
+    return false;
+}
+
 /// Two bodies of infinite mass pass through each other without a contact: no prescribed path may cross such a body.
 static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roster *r, bt_idx first_wall, bt_errors *err)
 {
@@ -241,17 +249,8 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
             if (b->motion[j] == BT_DYNAMIC || i >= first_wall) continue;
             const bool towed = i == w->towed || j == w->towed;
             if (j == w->towed || j >= first_wall) {
-                // Relative displacement of j. Walls that stand may hold fixed bodies (piers) and were checked with the tow.
-                double way[2] = {0, 0};
-                const bt_idx moving[2] = {j, i};
-                for (int k = 0; k < 2; k++) {
-                    const double sign = k ? -1 : 1, reach = bt_case_tow_distance(c, c->run.duration);
-                    const bt_idx m = moving[k];
-                    way[0] += sign * (m == w->towed ? reach * cos(c->tow.direction) : b->vel[m].x * c->run.duration);
-                    way[1] += sign * (m == w->towed ? reach * sin(c->tow.direction) : b->vel[m].y * c->run.duration);
-                }
-                if (j >= first_wall && (b->motion[j] == BT_STATIC || (way[0] == 0 && way[1] == 0))) continue;
-                if (apart_on_path(w, j, i, way[0], way[1])) continue;
+                // Walls that stand may hold fixed bodies (piers) and were checked with the tow.
+                if (!meet(c, w, i, j, j >= first_wall)) continue;
                 bt_errors_add(err, "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
                               "fixed floe, or tow on a line", c->path ? c->path : "case", r->names[j - r->n_floes],
                               towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");

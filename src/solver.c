@@ -38,7 +38,7 @@ void bt_solver_free(bt_solver *s)
 /// The line, in the pass of the last tile on the rank that owns the large bodies.
 static bt_tow *line_of(const bt_world *w, bt_idx tile)
 {
-    return tile == w->tiles->n - 1 && w->tow && w->tow->mode == BT_TOW_LINE ? w->tow : NULL;
+    return tile == w->tiles->n - 1 && bt_tow_has_line(w->tow) ? w->tow : NULL;
 }
 
 // --- velocities from impulses ----------------------------------------------------------------------------------------
@@ -60,7 +60,7 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
         bt_store(&v[u->b], inv[u->b], &vb);
     }
     const bt_tow *line = line_of(w, k);
-    if (line) bt_tow_apply(line, line->lambda, &v[bt_world_towed(w)], inv[bt_world_towed(w)]);
+    if (line) bt_tow_apply(line, &v[bt_world_towed(w)], inv[bt_world_towed(w)]);
 }
 
 /// U* + M⁻¹ Jᵀ λ from scratch: what increments have rounded away does not build up. True when some impulse is not zero.
@@ -153,7 +153,8 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
         }
     }
     bt_tow *line = line_of(w, k);
-    const double line_before = line ? line->lambda : 0;
+    double line_before[BT_MAX_BRANCHES] = {0};
+    for (int c = 0; line && c < line->n_branches; c++) line_before[c] = line->branch[c].lambda;
     for (int64_t n = 0; n < o->times; n++) {
         double most = 0;
         for (bt_idx i = 0; !tile->limits && i < tile->n_units; i++) {
@@ -166,7 +167,8 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
         if (most <= ENOUGH * w->par.tolerance) break; // more would be for nothing until the neighbours have changed
     }
     if (o->record) bt_anderson_collect(o->record, tile, x, x + 3 * (size_t)tile->n_units, t);
-    if (o->record && line) bt_anderson_collect_scalar(o->record, &w->solver->anderson->line, line_before, line->lambda, line->w, t);
+    for (int c = 0; o->record && line && c < line->n_branches; c++)
+        bt_anderson_collect_scalar(o->record, &w->solver->anderson->line[c], line_before[c], line->branch[c].lambda, line->branch[c].w, t);
     if (x != few) free(x);
 }
 
@@ -197,7 +199,8 @@ static bt_anderson_verdict accelerate(bt_world *w, const bt_totals *t)
         if (k < ts->n - 1 ? ts->awake[k] : tile->own) bt_anderson_move_bodies(a, verdict, tile, w->bodies.vel);
     }
     bt_tow *line = ts->tile[ts->n - 1].own ? line_of(w, ts->n - 1) : NULL;
-    if (line && verdict != BT_ANDERSON_STAY) line->lambda = bt_anderson_moved(a, verdict, &a->line, line->lambda);
+    for (int c = 0; line && verdict != BT_ANDERSON_STAY && c < line->n_branches; c++)
+        line->branch[c].lambda = bt_anderson_moved(a, verdict, &a->line[c], line->branch[c].lambda);
     return verdict;
 }
 
@@ -295,7 +298,7 @@ void bt_solver_solve(bt_world *w)
 static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
 {
     bt_vel v = w->bodies.vel_free[i];
-    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && w->tow && w->tow->mode == BT_TOW_LINE) bt_tow_apply(w->tow, w->tow->lambda, &v, w->bodies.inv[i]);
+    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow)) bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
     return v;
 }
 

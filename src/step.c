@@ -76,7 +76,6 @@ static bool at_rest(const bt_world *w, const bt_tile *t)
 static void advance(bt_world *w)
 {
     bt_tiles *ts = w->tiles;
-    const double dt = w->par.dt;
     // Tiles move with the water where that is not periodic.
     bt_environment_advance(w);
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
@@ -99,13 +98,7 @@ static void advance(bt_world *w)
     ts->moved_any += farthest;
     bt_domain_maxima(w, &out, 1);
     ts->relabel = out > ts->allowance;
-    if (w->tow) {
-        bt_tow *t = w->tow;
-        double speed = bt_tow_speed(t, t->time + dt);
-        t->carriage_x += dt * speed * t->ux;
-        t->carriage_y += dt * speed * t->uy;
-        t->time = (double)(w->step + 1) * dt;
-    }
+    bt_tow_advance(w);
 }
 
 enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
@@ -158,10 +151,11 @@ static void balance(bt_world *w)
 #pragma omp critical
         bt_totals_merge(&all, &t);
     }
-    if (w->tow && w->tow->mode == BT_TOW_LINE && ts->tile[ts->n - 1].own) {
-        bt_sum_add(&all.sum[APPLIED_X], w->tow->lambda * w->tow->lx);
-        bt_sum_add(&all.sum[APPLIED_Y], w->tow->lambda * w->tow->ly);
-        bt_sum_add(&all.sum[EXCHANGED], w->tow->lambda);
+    for (int k = 0; bt_tow_has_line(w->tow) && ts->tile[ts->n - 1].own && k < w->tow->n_branches; k++) {
+        const bt_branch *b = &w->tow->branch[k];
+        bt_sum_add(&all.sum[APPLIED_X], b->lambda * b->lx);
+        bt_sum_add(&all.sum[APPLIED_Y], b->lambda * b->ly);
+        bt_sum_add(&all.sum[EXCHANGED], b->lambda);
     }
     bt_domain_reduce(w, &all);
     double x[N_BALANCE];

@@ -167,6 +167,30 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
                       "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
 }
 
+/// A mean over a ramp or a stop is none of a steady tow.
+static void warn_of_programme(bt_summary *s, const bt_case *c)
+{
+    const double *p = c->tow.programme;
+    for (int i = 0; i + 1 < c->tow.n_programme && s->window.n > 0; i++) {
+        if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= s->window.start || p[2 * i] >= s->window.end) continue;
+        bt_errors_add(&s->warnings, "the speed programme goes from %g to %g m/s within the steady window, %g to %g s; end the run before, or read the series",
+                      p[2 * i + 1], p[2 * i + 3], s->window.start, s->window.end);
+        return;
+    }
+}
+
+/// A line that broke changes what the means stand for.
+static void warn_of_events(bt_summary *s, const bt_events *e)
+{
+    for (int64_t i = 0; e && i < e->n; i++) {
+        if (e->event[i].kind != BT_EVENT_LINE_BROKEN && e->event[i].kind != BT_EVENT_ADRIFT) continue;
+        char text[160];
+        bt_event_describe(&e->event[i], text);
+        bt_errors_add(&s->warnings, "at %g s %s%s", e->event[i].time, text,
+                      s->window.n > 0 && e->event[i].time > s->window.start ? ": within the steady window, whose means mix before and after" : "");
+    }
+}
+
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body)
 {
@@ -218,6 +242,8 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
+    warn_of_events(s, t->events);
+    warn_of_programme(s, c);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "

@@ -12,6 +12,7 @@
 
 typedef struct phase_row { const char *name; double seconds; } phase_row;
 #define N_PHASES 7
+enum { MAX_EVENTS = 40 }; // told one by one; all are in result.h5
 
 static void phase_rows(const bt_phases *p, phase_row rows[N_PHASES])
 {
@@ -100,6 +101,31 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, co
     bt_json_close(j, '}');
 }
 
+static void json_events(bt_json *j, const bt_events *e)
+{
+    bt_json_open(j, "events", '[');
+    for (int64_t i = 0; e && i < e->n && i < MAX_EVENTS; i++) {
+        bt_json_open(j, NULL, '{');
+        bt_json_number(j, "time_s", e->event[i].time);
+        bt_json_string(j, "kind", bt_event_names[e->event[i].kind]);
+        bt_json_int(j, "subject", e->event[i].subject);
+        bt_json_number(j, "value", e->event[i].value);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, ']');
+    bt_json_int(j, "n_events", e ? e->n : 0);
+}
+
+static void print_events(const bt_events *e)
+{
+    char text[160];
+    for (int64_t i = 0; e && i < e->n && i < MAX_EVENTS; i++) {
+        bt_event_describe(&e->event[i], text);
+        printf("  event               %g s: %s\n", e->event[i].time, text);
+    }
+    if (e && e->n > MAX_EVENTS) printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - MAX_EVENTS);
+}
+
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes)
 {
     bt_json j = {0};
@@ -162,6 +188,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     snprintf(hash, sizeof hash, "%016" PRIx64, t->state_hash);
     bt_json_string(&j, "state_hash", hash);
     bt_json_string(&j, "stopped", t->stopped);
+    json_events(&j, t->events);
     bt_json_open(&j, "warnings", '[');
     for (size_t i = 0; i < s->warnings.n; i++) bt_json_string(&j, NULL, s->warnings.text[i]);
     bt_json_close(&j, ']');
@@ -221,6 +248,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (h->n)
         printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
                (long long)h->unconverged);
+    print_events(t->events);
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
            t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
     printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);

@@ -233,7 +233,7 @@ void bt_value_write(const bt_key *k, const void *base, FILE *out)
         for (int i = 0; i < n; i++) {
             fputs(i ? ", [" : "[[", out);
             for (int j = 0; j < 2; j++) {
-                bt_units_format(p[2 * i + j], k->unit, number, sizeof number);
+                bt_units_format(p[2 * i + j], bt_schema_column(k, j).unit, number, sizeof number);
                 fprintf(out, "%s%s", j ? ", " : "", number);
             }
             fputs(i == n - 1 ? "]]" : "]", out);

@@ -54,7 +54,8 @@ void bt_world_free(bt_world *w)
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
-    free(w->tow);
+    bt_tow_free(w->tow);
+    bt_events_free(&w->events);
     free(w->window);
     free(w);
 }

@@ -19,7 +19,8 @@ typedef enum { BT_CRS_METRES, BT_CRS_LONLAT } bt_crs;                           
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
 typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
-typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE } bt_tow_mode;         // none, speed, line
+typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE, BT_TOW_THRUST } bt_tow_mode; // none, speed, line, thrust
+typedef enum { BT_ROPE_NUMBERS, BT_ROPE_STEEL, BT_ROPE_POLYPROPYLENE, BT_ROPE_DYNEEMA } bt_rope_type; // numbers, steel-wire, polypropylene, dyneema
 typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC, BT_TILT_DYNAMIC } bt_tilt; // none, slope, geostrophic, dynamic
 typedef enum { BT_LEAD_NONE, BT_LEAD_CHANNEL, BT_LEAD_MANAGED } bt_lead_mode;    // none, channel, managed
 
@@ -121,13 +122,36 @@ typedef struct bt_case {
     } body;
     struct {
         bt_tow_mode mode;
-        double speed;            ///< of the body (speed) or of the carriage (line), m/s
-        double direction;        ///< heading of the tow from +x towards +y, rad
+        double speed;            ///< of the body (speed), of the end (line), the vessel's limit (thrust), m/s; the programme's largest
+        double direction;        ///< heading of the tow at the start from +x towards +y, rad
         double ramp;             ///< time over which the speed rises linearly from 0, s
+        double *programme;       ///< [n_programme][2] time s, speed m/s; none = ramp and speed
+        int n_programme;
+        double *waypoints;       ///< [n_waypoints][2] m; none = straight on
+        int n_waypoints;
+        double turn_radius;      ///< m, of the corners at way-points; 0 = sharp
         double line_length;      ///< L0 unstretched, m
         double line_stiffness;   ///< EA, N
         double line_damping;     ///< c, N s/m
         double hull_x, hull_y;   ///< fastening point, body frame, m; default the foremost point of the waterline
+        struct {
+            bt_rope_type type;   ///< a name that gives stiffness and breaking load
+            double diameter;     ///< m, of a named line
+            int64_t branches;    ///< 1, or 2: a bridle
+            double breaking_load;///< N, 0 = never breaks
+        } line;
+        struct {                 ///< the second branch; default: as the first, on the other side of the hull
+            double hull_x, hull_y, length, stiffness, damping, breaking_load;
+        } branch2;
+        struct {                 ///< mode thrust, see tow.h
+            double mass;         ///< kg
+            double added_mass;   ///< C_m
+            double bollard_pull; ///< N
+            double free_speed;   ///< m/s
+            double free_resistance; ///< N at the free-running speed
+            double lateral_drag; ///< drag across / along
+            double lookahead;    ///< m
+        } vessel;
     } tow;
     struct {
         bt_lead_mode mode;       ///< what the vessel has done to the ice ahead

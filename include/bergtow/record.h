@@ -6,6 +6,7 @@
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
+#include "bergtow/event.h"
 #include "bergtow/field.h"
 #include "bergtow/lead.h"
 #include "bergtow/stall.h"
@@ -25,7 +26,10 @@ typedef struct bt_sample {
     double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
-    double line_tension, line_length, carriage_x, carriage_y; ///< N, m, m, m (NaN without a line)
+    double line_tension, line_length, carriage_x, carriage_y; ///< N (the larger of two branches), m (the first), m, m (NaN without a line)
+    double line_tension_1, line_tension_2; ///< N by branch; NaN without it
+    double vessel_x, vessel_y, vessel_speed; ///< m, m, m/s along its course (NaN without a vessel)
+    double vessel_thrust, vessel_drag, vessel_inertia, vessel_line; ///< N along its course: thrust = drag + inertia + line
     double current_x, current_y, wind_x, wind_y; ///< m/s, of the step (its middle, where they change)
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
@@ -115,6 +119,7 @@ typedef struct bt_run_totals {
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    const bt_events *events;     ///< what happened, or NULL
     const struct bt_impacts *impacts; ///< collisions of the towed body, NULL = none told apart
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
@@ -137,6 +142,10 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 /// returns BT_ERR_IO; only the first adds a message. Rank 0 records; on others nothing is done, and the status is not
 /// that of rank 0: agree on it.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
+
+/// Write the events that came since the last call into /events (time, kind, subject, value; names of the kinds in kind_names). On rank 0, as
+/// for bt_record_sample.
+bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 
 /// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
 /// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies]; and

@@ -16,6 +16,7 @@
 #define BERGTOW_WORLD_H
 
 #include "bergtow/base.h"
+#include "bergtow/event.h"
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 
@@ -166,6 +167,7 @@ typedef struct bt_world {
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
+    bt_events events;        ///< what happened when, the same on all ranks
     double drift_x, drift_y; ///< displacement of the water since time zero, m
     bt_step_stats stats;
 } bt_world;

@@ -117,7 +117,7 @@ static bt_world *line_world(double dt, double k, double c, double speed, bt_drag
     d.drag = drag;
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
-    *w->tow = (bt_tow){.mode = BT_TOW_LINE, .ux = 1, .speed = speed, .length0 = 10, .k = k, .c = c, .dt = dt, .carriage_x = 10};
+    *w->tow = (bt_tow){.mode = BT_TOW_LINE, .ux = 1, .speed = speed, .branch[0] = {.length0 = 10, .k = k, .c = c}, .n_branches = 1, .dt = dt, .carriage_x = 10};
     return w;
 }
 
@@ -136,7 +136,7 @@ static void spring_towed_mass(void **state)
         const double t = s * dt;
         worst_u = bt_max(worst_u, fabs(w->bodies.vel[bt_world_index(w, 0)].x - v * (1 - cos(om * t))));
         // The tension of a step is its mean, at t − Δt/2 to second order; with θ = 0 it is taken at the step's start.
-        worst_t = bt_max(worst_t, fabs(bt_tow_tension(w->tow) - peak * sin(om * (t - 0.5 * dt))));
+        worst_t = bt_max(worst_t, fabs(bt_tow_tension(w->tow, 0) - peak * sin(om * (t - 0.5 * dt))));
     }
     assert_true(w->stats.converged);
     CHECK_CLOSE(worst_u, 0, 0.003 * 2 * v);
@@ -144,7 +144,7 @@ static void spring_towed_mass(void **state)
     // Slack: it coasts at 2V, faster than the carriage, without any force.
     for (int s = 0; s < 100; s++) bt_world_step(w);
     CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, 2 * v, 0.003 * 2 * v);
-    CHECK_CLOSE(bt_tow_tension(w->tow), 0, 0);
+    CHECK_CLOSE(bt_tow_tension(w->tow, 0), 0, 0);
     bt_world_free(w);
 }
 
@@ -161,7 +161,7 @@ static void line_is_stable_and_carries_the_drag(void **state)
             assert_true(w->stats.converged);
             largest = bt_max(largest, fabs(w->bodies.vel[bt_world_index(w, 0)].x));
         }
-        CHECK_CLOSE(bt_tow_tension(w->tow), kd * v * v, 1e-4 * kd * v * v);
+        CHECK_CLOSE(bt_tow_tension(w->tow, 0), kd * v * v, 1e-4 * kd * v * v);
         CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 0)].x, v, 1e-4 * v);
         assert_true(largest <= 2.05 * v);
         bt_world_free(w);
@@ -173,8 +173,8 @@ static void line_turns_the_body(void **state)
 {
     (void)state;
     bt_world *w = line_world(0.1, 50, 20, 0.13, (bt_drag){.water_skin = 80, .yaw = 20});
-    w->tow->hull_x = 0;
-    w->tow->hull_y = 0.6;
+    w->tow->branch[0].hull_x = 0;
+    w->tow->branch[0].hull_y = 0.6;
     for (int s = 0; s < 20000; s++) bt_world_step(w);
     CHECK_CLOSE(remainder(w->bodies.pose[bt_world_index(w, 0)].yaw + 0.5 * BT_PI, 2 * BT_PI), 0, 0.02);
     bt_world_free(w);

@@ -346,10 +346,22 @@ static void cross_checks_refuse(void **state)
         {"body.shape=polygon", "body.vertices: is missing"}, {"body.vertices=[[0,0],[1,0],[0,1]]", "the shape is not polygon"},
         {"body.shape=polygon;body.vertices=[[0,0],[0,1],[1,0]]", "the waterline is refused"}, {"body.shape=square;body.width=1", "the shape is square"},
         {"water.tilt=geostrophic", "needs the Coriolis force"}, {"water.slope_x=0.001", "has no effect without water.tilt"},
+        {"tow.programme=[[0,1],[5,2],[5,0]]", "point 3 is at 5 s, not after the one before"}, {"tow.programme=[[0,1],[5,60]]", "point 2: 60 is out of range; give a value in [0, 50] m/s"},
+        {"tow.programme=[[0 m,1]]", "point 1: m is the unit of a length and this is a time"}, {"tow.programme=[[0,0],[5,1]];tow.speed=2", "has no effect with tow.programme, whose largest speed is 1 m/s"},
+        {"tow.programme=[[0,0],[5,1]];tow.ramp=4", "reaches its largest speed at 5 s"}, {"tow.mode=none;tow.programme=[[0,1]]", "has no effect with tow.mode: none"},
+        {"body.shape=square;tow.programme=[[0,8],[10,8]]", "a wall stands after 67 m; shorten the run to 8.37 s"},
+        {"tow.waypoints=[]", "has 0 points"}, {"tow.waypoints=[[9,0],[9,0]]", "way-point 2 is where the one before it"}, {"tow.turn_radius=3", "no effect without tow.waypoints"},
+        {"tow.waypoints=[[20,0],[20,2]];tow.turn_radius=3", "leaves no room for a turn"}, {"tow.waypoints=[[20,0]];tow.direction=10", "is not the direction from the body to the first way-point"},
+        {"tow.mode=line;tow.waypoints=[[9,0]]", "is not ahead of where the towing end starts, (10"}, {"tow.waypoints=[[6,0],[6,10]];tow.speed=1", "into a wall after"},
+        {"domain.ends=moving;tow.waypoints=[[40,0],[41,3]]", "the leg from way-point 1 leads 71.5651 deg from x"},
+        {"tow.mode=none;tow.waypoints=[[9,0]]", "have no effect with tow.mode: none"},
+        {"tow.mode=line;tow.line.type=dyneema", "a named line needs a diameter"}, {"tow.mode=line;tow.line.diameter=0.1", "has no effect without a named line"},
+        {"tow.mode=line;tow.line.branches=2;tow.branch2.length=0.9", "do not both reach the middle"}, {"tow.mode=thrust", "tow.vessel.mass: is 0 and tow.mode thrust needs it"},
+        {"tow.mode=thrust;tow.vessel.mass=1;tow.vessel.bollard_pull=1;tow.vessel.free_resistance=2", "thrust does not grow with speed"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         char copy[128];
-        const char *set[4];
+        const char *set[8];
         int n = 0;
         snprintf(copy, sizeof copy, "%s", bad[i].set);
         for (char *part = strtok(copy, ";"); part; part = strtok(NULL, ";")) set[n++] = part;
@@ -370,6 +382,9 @@ static void cross_checks_let_pass(void **state)
         "domain.ends=open;tow.speed=50", "domain.ends=periodic;tow.speed=50", "tow.mode=none", "body.shape=none", "tow.mode=line;body.vx=1", "tow.speed=0", "ice.concentration=0;ice.size=1 mm",
         "domain.sides=open;body.length=11;body.x=12", "domain.sides_closing=0.4", "body.vertices=none", "body.x=none", "domain.length=0.3;domain.x0=-0.1;ice.x_max=0.2;body.shape=none;ice.size=0.1",
         "ice.size_law=power;ice.size_min=0.5;ice.size_max=5", "water.tilt=geostrophic;water.latitude=75",
+        "tow.programme=[[0,8],[10,0]]", "tow.programme=[[0,0],[1,7],[8,7]];tow.speed=7;tow.ramp=1", "tow.waypoints=[[20,0],[40,3]];tow.direction=0;tow.turn_radius=10",
+        "tow.mode=line;tow.waypoints=[[11,0],[9,0]]", "tow.mode=line;tow.line.branches=2;tow.branch2.length=5.5", "tow.mode=line;tow.line.type=steel-wire;tow.line.diameter=20 mm",
+        "tow.mode=thrust;tow.vessel.mass=1 t;tow.vessel.bollard_pull=1 kN;tow.vessel.free_speed=2;tow.speed=50",
     };
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
         char copy[128];
@@ -515,7 +530,10 @@ static void fill_randomly(const bt_key *keys, int n, void *members)
         if (k->type == BT_KEY_POINTS) {
             int count = 3 + (int)(random_bits() % 6);
             double *p = bt_alloc((size_t)count, 2 * sizeof *p), *old;
-            for (int j = 0; j < 2 * count; j++) p[j] = random_in(k);
+            for (int j = 0; j < 2 * count; j++) {
+                const bt_key column = bt_schema_column(k, j % 2);
+                p[j] = random_in(&column);
+            }
             memcpy(&old, m, sizeof old);
             free(old);
             memcpy(m, &p, sizeof p);

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+// The list of events; see bergtow/event.h.
+#include "bergtow/event.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+const char *const bt_event_names[BT_EVENT_KINDS] = {
+    [BT_EVENT_LINE_BROKEN] = "line_broken",
+    [BT_EVENT_ADRIFT] = "adrift",
+    [BT_EVENT_WAYPOINT] = "waypoint",
+};
+
+void bt_events_add(bt_events *e, double time, bt_event_kind kind, int64_t subject, double value)
+{
+    if (e->n == e->cap) {
+        e->cap = e->cap ? 2 * e->cap : 16;
+        e->event = bt_realloc(e->event, (size_t)e->cap, sizeof *e->event);
+    }
+    e->event[e->n++] = (bt_event){time, kind, subject, value};
+}
+
+void bt_events_free(bt_events *e)
+{
+    free(e->event);
+    *e = (bt_events){0};
+}
+
+void bt_event_describe(const bt_event *e, char out[160])
+{
+    switch (e->kind) {
+    case BT_EVENT_LINE_BROKEN: snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", e->subject, e->value); break;
+    case BT_EVENT_ADRIFT: snprintf(out, 160, "no branch of the tow line is left: the body drifts, at first at %.3g m/s", e->value); break;
+    case BT_EVENT_WAYPOINT: snprintf(out, 160, "way-point %" PRId64 " passed after %.5g m", e->subject, e->value); break;
+    default: snprintf(out, 160, "event of kind %" PRId64 ", subject %" PRId64 ", value %.6g", e->kind, e->subject, e->value);
+    }
+}
