@@ -13,8 +13,8 @@ MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
 HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
 
-# -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler.
-BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -Ipartition -MMD -MP -ffp-contract=off -fno-math-errno \
+# -ffp-contract=off -mno-fma and never -ffast-math: the same bits in every build of one compiler.
+BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -Ipartition -MMD -MP -ffp-contract=off -mno-fma -fno-math-errno \
           -Wall -Wextra -Wpedantic -Wshadow $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
@@ -60,7 +60,7 @@ REV := $(BUILD)/revision.h
 $(REV): FORCE
 	@mkdir -p $(BUILD)
 	@printf '#define BT_REVISION "%s"\n#define BT_COMPILER "%s"\n#define BT_FLAGS "%s"\n' \
-	  '$(REVISION)' "$$($(CC) --version | head -1)" '$(OPT_$(CONFIG)) -ffp-contract=off' > $@.new
+	  '$(REVISION)' "$$($(CC) --version | head -1)" '$(OPT_$(CONFIG)) -ffp-contract=off -mno-fma' > $@.new
 	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
 
 $(BUILD)/%.o: %.c $(STAMP) | $(REV)
