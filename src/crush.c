@@ -240,5 +240,11 @@ void bt_crush_grow(bt_world *w)
     bt_domain_reduce(w, &t);
     st->crushed_work = bt_sum_value(&t.sum[WORK]);
     st->n_crushing = (int64_t)bt_sum_value(&t.sum[POINTS]);
+    // Pairs that have come to rest against each other have no units.
+    const bt_tiles *ts = w->tiles;
+    for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx i = 0; ts->tile[k].own && ts->tile[k].n_units == 0 && i < ts->tile[k].n_scars; i++)
+            for (int j = 0; j < ts->tile[k].scars[i].n; j++) t.most = bt_max(t.most, ts->tile[k].scars[i].depth[j]);
+    bt_domain_maxima(w, &t.most, 1);
     st->crushed_depth = t.most;
 }

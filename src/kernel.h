@@ -37,35 +37,38 @@ static inline void bt_store(bt_vel *v, bt_inv inv, const bt_vel *x)
     if (inv.m > 0) *v = *x;
 }
 
-/// Gauss–Seidel update of a manifold: both normals together, then the friction of both as one. The normals are the
-/// exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them, none). Two
-/// points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
+/// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them,
+/// none). Two points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
 /// times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points that coincide) the
-/// first of the single cases that holds is taken. The tangential rows of the points are the same (manifold.c), so only
-/// the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two separate unknowns would drift apart along their null space
-/// and eat up the friction cone. Returns the largest correction, m/s.
-static inline double bt_update_unit(bt_unit *u, bt_vel *v, const bt_inv *inv)
+/// first of the single cases that holds is taken.
+static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
 {
-    bt_vel va = v[u->a], vb = v[u->b];
-    const bt_inv ia = inv[u->a], ib = inv[u->b];
-    const double dx = vb.x - va.x, dy = vb.y - va.y, un = u->nx * dx + u->ny * dy;
-    const double u1 = un + u->rbn[0] * vb.w - u->ran[0] * va.w + u->bias[0];
-    double l1, l2 = 0;
+    const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
+    const double u1 = un + u->rbn[0] * vb->w - u->ran[0] * va->w + u->bias[0];
+    *l2 = 0;
     if (u->n == 1) {
-        l1 = bt_max(0, u->ln[0] - u1 * u->mn[0]);
-    } else {
-        const double u2 = un + u->rbn[1] * vb.w - u->ran[1] * va.w + u->bias[1];
-        // Velocities with both impulses taken off.
-        const double b1 = u1 - u->w[0] * u->ln[0] - u->w12 * u->ln[1], b2 = u2 - u->w12 * u->ln[0] - u->w[1] * u->ln[1];
-        l1 = (u->w12 * b2 - u->w[1] * b1) * u->per_det;
-        l2 = (u->w12 * b1 - u->w[0] * b2) * u->per_det;
-        if (!(u->per_det > 0 && l1 >= 0 && l2 >= 0)) {
-            const double only1 = bt_max(0, -b1 * u->mn[0]), only2 = bt_max(0, -b2 * u->mn[1]);
-            const bool first = b2 + u->w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
-            l1 = first ? only1 : 0;
-            l2 = first ? 0 : only2;
-        }
+        *l1 = bt_max(0, u->ln[0] - u1 * u->mn[0]);
+        return;
     }
+    const double u2 = un + u->rbn[1] * vb->w - u->ran[1] * va->w + u->bias[1];
+    // Velocities with both impulses taken off.
+    const double b1 = u1 - u->w[0] * u->ln[0] - u->w12 * u->ln[1], b2 = u2 - u->w12 * u->ln[0] - u->w[1] * u->ln[1];
+    *l1 = (u->w12 * b2 - u->w[1] * b1) * u->per_det;
+    *l2 = (u->w12 * b1 - u->w[0] * b2) * u->per_det;
+    if (!(u->per_det > 0 && *l1 >= 0 && *l2 >= 0)) {
+        const double only1 = bt_max(0, -b1 * u->mn[0]), only2 = bt_max(0, -b2 * u->mn[1]);
+        const bool first = b2 + u->w12 * only1 >= 0 || only2 == 0; // then the second point opens by itself
+        *l1 = first ? only1 : 0;
+        *l2 = first ? 0 : only2;
+    }
+}
+
+/// Take the normal impulses l1 and l2, with the friction that they allow: of both points as one. The tangential rows of the points are the
+/// same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two separate unknowns would drift
+/// apart along their null space and eat up the friction cone. Returns the largest correction, m/s.
+static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v, const bt_inv *inv)
+{
+    const bt_inv ia = inv[u->a], ib = inv[u->b];
     const double d1 = l1 - u->ln[0], d2 = l2 - u->ln[1];
     if (d1 == 0 && d2 == 0 && l1 + l2 == 0) { // apart, as before: half of the units of a step
         if (u->lt == 0) return 0;
@@ -77,6 +80,15 @@ static inline double bt_update_unit(bt_unit *u, bt_vel *v, const bt_inv *inv)
     bt_store(&v[u->a], ia, &va);
     bt_store(&v[u->b], ib, &vb);
     return bt_max(bt_max(fabs(d1) * u->w[0], fabs(d2) * u->w[1]), fabs(dt) * u->wt);
+}
+
+/// Gauss–Seidel update of a manifold: its normals together, then its friction.
+static inline double bt_update_unit(bt_unit *u, bt_vel *v, const bt_inv *inv)
+{
+    const bt_vel va = v[u->a], vb = v[u->b];
+    double l1, l2;
+    bt_solve_normals(u, &va, &vb, &l1, &l2);
+    return bt_take_normals(u, l1, l2, va, vb, v, inv);
 }
 
 /// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential).

@@ -58,24 +58,19 @@ static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const doubl
         for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, i, b[i] + u->w12 * l[1 - i]);
 }
 
-/// bt_update_unit with bounds.
+/// bt_update_unit with bounds. The solution without them is the one with them where it keeps below their flat parts: nearly everywhere.
 static inline double bt_update_limited(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
-    bt_vel va = v[u->a], vb = v[u->b];
-    const bt_inv ia = inv[u->a], ib = inv[u->b];
-    double l[2] = {0, 0}, b[2];
-    for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, &va, &vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
-    if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
-    else bt_limit_two(k, u, b, l);
-    const double d1 = l[0] - u->ln[0], d2 = l[1] - u->ln[1];
-    if (d1 == 0 && d2 == 0 && l[0] + l[1] == 0 && u->lt == 0) return 0;
-    bt_apply(u, d1 + d2, d1 * u->ran[0] + d2 * u->ran[1], d1 * u->rbn[0] + d2 * u->rbn[1], 0, ia, ib, &va, &vb);
-    const double t = bt_clamp(u->lt - bt_tangent_velocity(u, &va, &vb) * u->mt, u->mu * (l[0] + l[1])), dt = t - u->lt;
-    bt_apply(u, 0, 0, 0, dt, ia, ib, &va, &vb);
-    u->ln[0] = l[0], u->ln[1] = l[1], u->lt = t;
-    bt_store(&v[u->a], ia, &va);
-    bt_store(&v[u->b], ib, &vb);
-    return bt_max(bt_max(fabs(d1) * u->w[0], fabs(d2) * u->w[1]), fabs(dt) * u->wt);
+    const bt_vel va = v[u->a], vb = v[u->b];
+    double l[2];
+    bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
+    if (l[0] > k->flat[0] || l[1] > k->flat[1]) {
+        double b[2];
+        for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, &va, &vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
+        if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
+        else bt_limit_two(k, u, b, l);
+    }
+    return bt_take_normals(u, l[0], l[1], va, vb, v, inv);
 }
 
 /// bt_unit_residual with bounds: a row is judged by what it would be with all others held.

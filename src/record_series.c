@@ -61,7 +61,7 @@ const bt_series_field bt_series_fields[] = {
     ROW(moving, LAST, "1", "floes faster than 1 % of the reference speed"),
     ROW(crushing, MEAN, "1", "contact points that crush: their normal force is at the limit pressure x thickness x length"),
     ROW(crushed_work, SUM, "J", "work taken by contact points that crush"),
-    ROW(crushed_depth, MAX, "m", "deepest crush of a pair of bodies in contact"),
+    ROW(crushed_depth, MAX, "m", "deepest crush of a pair of bodies in contact, or at rest beside each other"),
     ROW(window_x, LAST, "m", "low end of the moving window, not wrapped; NaN where the domain stands still"),
     ROW(window_renewed, SUM, "1", "floes taken out behind the moving window and put in ahead as they were at time zero"),
     ROW(window_waiting, LAST, "1", "floes behind the moving window whose place ahead is not free, or not yet reached"),
