@@ -7,6 +7,9 @@ PYTHON ?= /usr/bin/python3
 PREFIX ?= /usr/local
 J      ?= $(shell nproc 2>/dev/null || echo 2)
 
+ifeq ($(CONFIG),fuzz)
+CC     := clang-14
+endif
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
 MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
@@ -22,9 +25,10 @@ endif
 OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -march=x86-64-v3 -DBT_VALIDATE
-OPT_asan    := -O1 -g3 -fsanitize=address,undefined -fno-sanitize-recover=undefined
-ifeq ($(filter $(CONFIG),release debug validate asan),)
-$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate or asan)
+OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+OPT_fuzz    := -O1 -g -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+ifeq ($(filter $(CONFIG),release debug validate asan fuzz),)
+$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan or fuzz)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
 LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lm
@@ -37,6 +41,10 @@ LIB_OBJ := $(LIB_SRC:%.c=$(BUILD)/%.o)
 BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
 TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
+# Hostile input: harnesses for libFuzzer, and the kept inputs as a test.
+HARNESS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)) setup
+HARNESS_OBJ := $(patsubst %.c,$(BUILD)/%.o,tests/fuzz/fuzz.c $(wildcard tests/fuzz/fuzz_*.c))
+TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
@@ -80,6 +88,20 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
 	@mkdir -p $(@D)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
+
+$(BUILD)/tests/fuzz/%.o: tests/fuzz/%.c $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  CC   $<'
+	@$(CC) $(CFLAGS) -Itests -c $< -o $@
+
+$(BUILD)/tests/fuzz/test_corpus: tests/fuzz/test_corpus.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@echo '  TEST $@'
+	@$(CC) $(CFLAGS) -Itests $(filter %.c %.o,$^) $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
+
+# build/fuzz/fuzz_NAME (CONFIG=fuzz)
+$(HARNESS:%=$(BUILD)/fuzz_%): $(BUILD)/fuzz_%: tests/fuzz/entry.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@echo '  FUZZ $@'
+	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
 
 tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
 
@@ -160,4 +182,4 @@ install: all ## install the program into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(LIB_OBJ:.o=.d) $(HARNESS_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
