@@ -7,7 +7,7 @@ PYTHON ?= /usr/bin/python3
 PREFIX ?= /usr/local
 J      ?= $(shell nproc 2>/dev/null || echo 2)
 
-ifeq ($(CONFIG),fuzz)
+ifneq ($(filter $(CONFIG),fuzz tsan),)
 CC     := clang-14
 endif
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
@@ -26,9 +26,12 @@ OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -march=x86-64-v3 -DBT_VALIDATE
 OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
-OPT_fuzz    := -O1 -g -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
-ifeq ($(filter $(CONFIG),release debug validate asan fuzz),)
-$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan or fuzz)
+OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+# Every loop that may run in parallel does: BT_VALIDATE. gcc's libgomp is not known to a thread sanitizer, hence clang.
+OPT_tsan    := -O1 -g -fsanitize=thread -DBT_VALIDATE -Wno-pass-failed
+OPT_coverage := -O0 -g --coverage -fprofile-abs-path -fprofile-update=atomic
+ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
+$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
 LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lm
@@ -48,7 +51,7 @@ TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint asan partition-study FORCE
+.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -125,6 +128,16 @@ deps: ## install the Debian packages that are missing
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
 	$$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
 
+# For make lint, and for the other checks of developers; make test needs none of them.
+DEPS_LINT := cppcheck shellcheck pyflakes3
+DEPS_DEV  := $(DEPS_LINT) clang-14 clang-tidy-14 llvm-14 libclang-rt-14-dev libomp-14-dev valgrind gcovr
+
+deps-lint: ## install what make lint can use
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_LINT)'
+
+deps-dev: ## install what tidy, tsan, valgrind, coverage and fuzz need
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_DEV)'
+
 # pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
 AGAIN := $(MAKE) --no-print-directory -j$(J)
 
@@ -166,12 +179,33 @@ fullscale: deps ## resistance of an 80 m berg at 20 to 95 % ice beside the estim
 	@$(AGAIN) CONFIG=release all
 	$(PYTHON) cases/fullscale/study.py concentration
 
-lint: all ## names of external symbols, licence lines, syntax
+lint: all ## names of external symbols, licence lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh
 
-asan: ## the unit and physics tests under AddressSanitizer and UBSan
+tidy: all ## clang-tidy over the program (minutes)
+	@tests/tidy.sh
+
+asan: ## tests of units and physics, kept hostile input, and runs on threads and ranks under AddressSanitizer and UBSan
 	@$(AGAIN) CONFIG=asan all tests
-	@for t in $(TEST_SRC:%.c=build/asan/%); do echo $$t; ASAN_OPTIONS=allocator_may_return_null=1 OMP_WAIT_POLICY=passive $$t >build/asan/log 2>&1 || { cat build/asan/log; exit 1; }; done
+	@tests/sanitize.sh asan $(TEST_BIN:build/$(CONFIG)/%=build/asan/%)
+
+tsan: ## tows on threads and ranks, and the tests that use threads, under ThreadSanitizer (clang, libomp with archer)
+	@$(AGAIN) CONFIG=tsan all build/tsan/tests/unit/test_contacts
+	@tests/sanitize.sh tsan build/tsan/tests/unit/test_contacts
+
+valgrind: ## short runs under memcheck
+	@$(AGAIN) CONFIG=debug all
+	@tests/sanitize.sh valgrind
+
+coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/table.txt
+	@$(AGAIN) CONFIG=coverage all tests
+	@tests/coverage.sh $(TEST_BIN:build/$(CONFIG)/%=build/coverage/%)
+
+# make fuzz TARGET=case TIME=600
+TIME ?= 60
+fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, study, table, outlines or field, TIME in seconds
+	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
+	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 
 validate: deps ## the program with assertions, checks of the division, and teams of threads for every loop: build/validate/bergtow
 	@$(AGAIN) CONFIG=validate all

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <unistd.h>
 
 #include "bergtow/record.h"
@@ -53,11 +54,13 @@ void bt_case_check_cost(const bt_check *k)
 
 double bt_cost_machine(void)
 {
-    double bytes = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE), group;
+    double bytes = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     static const char *const files[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}; // cgroup v2 ("max": none), v1
     for (int i = 0; i < 2; i++) {
+        char text[64];
         FILE *f = fopen(files[i], "r");
-        if (f && fscanf(f, "%lf", &group) == 1 && group > 0) bytes = bt_min(bytes, group);
+        const double group = f && fgets(text, sizeof text, f) ? strtod(text, NULL) : 0;
+        if (group > 0) bytes = bt_min(bytes, group);
         if (f) fclose(f);
     }
     return bytes;
