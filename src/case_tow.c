@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The tow of a case: defaults that follow from other keys, checks, and where its path leads.
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "bergtow/path.h"
