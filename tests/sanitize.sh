@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # sanitize.sh asan|tsan|valgrind PROGRAM...: the test programs given, then short runs of bergtow that go through setting up, towing, writing and
 # reading back, on threads and ranks, each watched. A finding, a wrong exit code or a different state hash ends it with an error.
+# shellcheck disable=SC2086 # commands of several words
 set -u
 kind=$1
 shift
