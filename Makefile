@@ -203,7 +203,7 @@ coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/t
 
 # make fuzz TARGET=case TIME=600
 TIME ?= 60
-fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, study, table, outlines or field, TIME in seconds
+fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, values, study, table, outlines or field, TIME in seconds
 	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
 	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 
