@@ -36,6 +36,6 @@ if [ "$what" = keep ]; then
     rm -rf "$merged"
     du -sb "$kept"
 else
-    $build/fuzz_"$name" -max_total_time="$what" -timeout=20 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
         -print_final_stats=1 "$found" "$kept" </dev/null
 fi
