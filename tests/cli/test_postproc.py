@@ -384,8 +384,11 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
 
 
 def test_titles_of_narrow_panels_stand_apart(tmp_path):
-    run_folder = make_run(tmp_path / "run", frame="geographic", path=[(float(i), 0.0) for i in range(5)])
-    with Run(run_folder) as run:
+    folder = make_run(tmp_path / "run", path=[(1000.0 + i, 0.0) for i in range(5)])
+    with h5py.File(folder / "result.h5", "r+") as f:
+        del f["case"]
+        f["case"] = CASE.format(frame="geographic", ends="open", mode="speed").replace("length: 40 m", "length: 4 km").replace("90 deg", "0 deg")
+    with Run(folder) as run:
         run.summary["title"] = "A tow with a title that is a good deal longer than the figure is wide at full size"
         figure = plot_field.draw(run, window="body")
         figure.canvas.draw()
