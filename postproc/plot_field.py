@@ -65,7 +65,7 @@ def layout(n, view, turned, lines):
         return size, rects, (left + w + 0.22, foot + (length - tall) / 2, 0.16, tall), "vertical"
     h = min(6.6, 3.9 * high / wide)
     w = h * wide / high
-    width = max(left + n * w + (n - 1) * 0.25 + 0.3, 7.0)
+    width = max(left + n * w + (n - 1) * 0.45 + 0.3, 7.0)
     foot += 0.78
     head += 0.2 * (lines - 1)
     size = (width, head + h + foot)

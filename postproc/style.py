@@ -95,7 +95,7 @@ def conditions(run):
             words.append(f"{run.value('ice.thickness'):g} m thick")
     mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
     if run.towed is not None and mode != "none" and np.isfinite(speed):
-        words.append(f"towed at {speed:g} m/s" + (" on a line" if mode == "line" else ""))
+        words.append(f"towed at {speed:.3g} m/s" + (" on a line" if mode == "line" else ""))
     if run.summary.get("stopped"):
         words.append("stopped early")
     return ", ".join(words)
