@@ -123,7 +123,12 @@ def view_body(run):
     along, across = (0, 1) if along_x else (1, 0)
     reach[along] = min(max(reach[along], 3.4 * reach[across]), (x1 - x0, y1 - y0)[along])
     shift = -0.15 * heading * reach
-    return (shift[0] - reach[0] / 2, shift[0] + reach[0] / 2, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2)
+    left, right = shift[0] - reach[0] / 2, shift[0] + reach[0] / 2
+    if run.case.get("domain.ends") == "moving":  # what lies beyond it is the ice of its other end
+        ahead = run.value("domain.ahead", (x1 - x0) / 2)
+        behind = x1 - x0 - ahead
+        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right, ahead if heading[0] >= 0 else behind)
+    return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
 class Scene:
@@ -138,6 +143,7 @@ class Scene:
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
         x0, x1, y0, y1 = run.box
         self._turn = run.geographic
+        self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2  # what lies within half a period of it is shown
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
@@ -213,7 +219,7 @@ class Scene:
         origin = np.zeros(2)
         if self.follow:
             origin, centre = position, position
-        outlines, index = run.polygon_array(frame, centre)
+        outlines, index = run.polygon_array(frame, position + self._middle if self.follow else None)
         self._floes.set_verts(self._flat(outlines - origin))
         self._floes.set_array(self.colouring.values(frame)[index])
         bodies = run.body_polygons(frame, centre)
@@ -255,7 +261,9 @@ class Scene:
         step = max(1, int(done.sum()) // 400)
         way = np.stack([run["body_x"][done], run["body_y"][done]], axis=1)[::-1][::step][::-1]
         if self.follow:
-            way = way + (origin - run.body_pose(frame)[run.towed, :2])  # by whole periods
+            period = np.array([p if p > 0 else np.inf for p in run.period])
+            last = way[-1] if len(way) else origin
+            way = way + np.where(np.isfinite(period), np.round((origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
         elif len(way):
             wrapped = run.wrap(way)
             jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
