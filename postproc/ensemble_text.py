@@ -57,7 +57,7 @@ def means(s, markdown):
             continue
         rows.append([c["label"], fields_cell(c), number(r["mean"] / factor), pair(r["t_95"], factor), pair(r["bootstrap_95"], factor), number(r["median"] / factor),
                      number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–", number(r["sd_between"] / factor), number(r["se_within"] / factor),
-                     f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", number(r["fields_needed"], 4), doubts(c)])
+                     f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth of the fields at each end (from 8 fields on). "
             "Sd of fields: between the means of runs; se in a run: of one run's mean, by its correlation time. "
             "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, S short window, X stopped early, O other warning.")
