@@ -97,13 +97,17 @@ def condition(e, c, members, options):
 
 
 def sensitivity(e, members):
-    """Rank correlations and Sobol indices of the members' means over what was varied."""
+    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was varied.
+
+    Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be predicted.
+    """
     rows = e.used
     varied = {k: v[rows] for k, v in e.parameters.items() if len(set(v[rows].tolist())) > 1}
     y = np.array([members[m]["mean"] for m in rows])
     if not varied or len(rows) < 8:
         return {"refused": "nothing is varied" if not varied else f"{len(rows)} members, needs 8"}
-    return {"members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y), "sobol": stat_sensitivity.sobol(varied, y)}
+    logs = stat_sensitivity.sobol(varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
+    return {"members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y), "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
 
 
 def statistics(e, options):

@@ -123,19 +123,26 @@ def sensitivity(s, markdown):
     x = s["sensitivity"]
     if "refused" in x:
         return f"No sensitivity: {x['refused']}."
-    indices = x["sobol"].get("indices", {})
-    names = sorted(set(x["ranks"]) | set(indices), key=lambda k: -max(indices.get(k, {}).get("total", 0.0), 0.0) - 1e-3 * abs(np.nan_to_num(x["ranks"].get(k, {}).get("prcc", 0.0))))
+    kinds = (("mean", x["sobol"]), ("logarithm", x["sobol_of_logarithm"]))
+    given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
+    names = set(x["ranks"]).union(*(i for _, i in given))
+    def weight(name):
+        return -max([i[name]["total"] for _, i in given if name in i], default=0.0), -abs(np.nan_to_num(x["ranks"].get(name, {}).get("prcc", 0.0)))
     rows = []
-    for name in names:
-        r, i = x["ranks"].get(name), indices.get(name)
-        rows.append([name, *([number(r["spearman"], 2), f"{number(r['prcc'], 2)} ({pair(r['prcc_95'])})"] if r else ["–", "–"]),
-                     *([f"{number(i['first'], 2)} ({pair(i['first_95'])})", f"{number(i['total'], 2)} ({pair(i['total_95'])})"] if i else ["–", "–"])])
-    note = f"{x['members']} members. Brackets: 95 %. "
-    sobol = x["sobol"]
-    note += (f"Sobol indices not given: {sobol['refused']}." if "refused" in sobol else
-             f"Sobol indices from a polynomial expansion of degree {sobol['degree']}, {sobol['terms']} terms: R² {sobol['r2']:.3f}, cross-validated Q² {sobol['q2']:.3f}. "
-             f"They share out what it explains; the rest, {100 * (1 - sobol['r2']):.0f} % of the variance, is scatter of the fields and what it misses.")
-    return table(["parameter", "Spearman", "PRCC", "Sobol, first order", "Sobol, total"], rows, markdown) + "\n\n" + note
+    for name in sorted(names, key=weight):
+        r = x["ranks"].get(name)
+        cells = [name, *([number(r["spearman"], 2), f"{number(r['prcc'], 2)} ({pair(r['prcc_95'])})"] if r else ["–", "–"])]
+        for _, indices in given:
+            i = indices.get(name)
+            cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first", "total")] if i else ["–", "–"]
+        rows.append(cells)
+    head = ["parameter", "Spearman", "PRCC", *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))]
+    notes = [f"{x['members']} members. Brackets: 95 %."]
+    for of, k in kinds:
+        notes.append(f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
+                     f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, {k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
+                     f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields and what it misses.")
+    return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
 
 def report(s, markdown=False):

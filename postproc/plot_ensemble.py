@@ -341,38 +341,45 @@ def draw_map(e, first, second):
     return figure
 
 
+def draw_indices(axes, names, indices):
+    """Bars of first-order and total Sobol indices."""
+    for k, name in enumerate(names):
+        for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"), ("total", -0.17, style.TOW, "total")) if name in indices else ():
+            axes.barh(k + shift, indices[name][what], height=0.3, color=colour, label=label if k == 0 else None)
+            axes.plot(indices[name][f"{what}_95"], [k + shift] * 2, color=style.INK, linewidth=1.2)
+    axes.set_xlabel("share of the explained variance")
+    axes.set_xlim(0, 1.02)
+    axes.legend(loc="lower right")
+
+
 def draw_sensitivity(e, x):
-    """Figure of Sobol indices (where they are given) beside partial rank correlations; None where there is neither."""
-    ranks, sobol = x.get("ranks", {}), x.get("sobol", {}).get("indices", {})
-    names = sorted(set(ranks) | set(sobol), key=lambda k: (sobol.get(k, {}).get("total", 0), abs(ranks.get(k, {}).get("prcc", 0))))
+    """Figure of Sobol indices, of the mean and of its logarithm where they are given, beside partial rank correlations; None where there is neither."""
+    ranks = x.get("ranks", {})
+    given = [(words, x[key]) for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "indices" in x.get(key, {})]
+    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)), key=lambda k: (max([s["indices"][k]["total"] for _, s in given if k in s["indices"]], default=0),
+                                                                                      abs(ranks.get(k, {}).get("prcc", 0))))
     if not names:
         return None
-    figure, axes = plt.subplots(1, 2, figsize=(11, 2.2 + 0.6 * len(names)), sharey=True)
-    height = figure.get_size_inches()[1]
-    figure.subplots_adjust(left=0.15, right=0.98, top=1 - 1.15 / height, bottom=0.85 / height, wspace=0.08)
-    at = np.arange(len(names))
+    n = len(given) + 1
+    figure, grid = plt.subplots(1, n, figsize=(3.2 + 4.2 * n, 2.2 + 0.6 * len(names)), sharey=True, squeeze=False)
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=1.7 / width, right=0.98, top=1 - 1.15 / height, bottom=0.85 / height, wspace=0.1)
+    for axes, (words, s) in zip(grid[0], given):
+        draw_indices(axes, names, s["indices"])
+        axes.set_title(f"Sobol, of the {words}: R² {s['r2']:.2f}, Q² {s['q2']:.2f}", fontsize=10.5)
+    axes = grid[0, -1]
     for k, name in enumerate(names):
-        if name in sobol:
-            for what, shift, colour in (("first", 0.17, style.ICE), ("total", -0.17, style.TOW)):
-                value, (low, high) = sobol[name][what], sobol[name][f"{what}_95"]
-                axes[0].barh(k + shift, value, height=0.3, color=colour, label={"first": "first order", "total": "total"}[what] if k == 0 else None)
-                axes[0].plot([low, high], [k + shift] * 2, color=style.INK, linewidth=1.2)
         if name in ranks:
-            axes[1].barh(k, ranks[name]["prcc"], height=0.5, color=style.DRAG)
-            axes[1].plot(ranks[name]["prcc_95"], [k] * 2, color=style.INK, linewidth=1.2)
-    axes[0].set_yticks(at, [short_key(k) for k in names])
-    s = x["sobol"]
-    axes[0].set_xlabel("share of the explained variance" if sobol else "not given: see `ensemble.py`")
-    axes[0].set_title("Sobol indices" + (f", R² {s['r2']:.2f}, cross-validated {s['q2']:.2f}" if sobol else ""), fontsize=10.5)
-    axes[0].set_xlim(0, 1.02)
-    if sobol:
-        axes[0].legend(loc="lower right")
-    axes[1].axvline(0, color=style.FAINT, linewidth=0.8)
-    axes[1].set_xlim(-1, 1)
-    axes[1].set_title("partial rank correlation (PRCC)", fontsize=10.5)
-    for ax in axes:
+            axes.barh(k, ranks[name]["prcc"], height=0.5, color=style.DRAG)
+            axes.plot(ranks[name]["prcc_95"], [k] * 2, color=style.INK, linewidth=1.2)
+    axes.axvline(0, color=style.FAINT, linewidth=0.8)
+    axes.set_xlim(-1, 1)
+    axes.set_title("partial rank correlation (PRCC)", fontsize=10.5)
+    grid[0, 0].set_yticks(np.arange(len(names)), [short_key(k) for k in names])
+    for ax in grid[0]:
         ax.grid(True, axis="x")
-    figure.text(0.025, 0.08 / height, "black: 95 %", fontsize=9, color=style.FAINT)
+    missing = [f"no Sobol indices of the {words}: {x[key]['refused']}" for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "refused" in x.get(key, {})]
+    figure.text(0.3 / width, 0.08 / height, "; ".join(["black: 95 %", *missing]), fontsize=9, color=style.FAINT)
     headline(figure, e, "what the resistance depends on")
     return figure
 
