@@ -21,7 +21,7 @@ def numbers(m):
     """Nested numbers of summary.json."""
     x, start = m["series"], m["start"]
     steady = x[np.arange(1, len(x) + 1) >= start]
-    estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "simulated_over_estimate": steady.mean() / f, "valid": name != "marchenko_compaction"} for name, f in m["estimates"].items()}
+    estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"} for name, f in m["estimates"].items()}
     return {"mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "stalled_windows": 0, "concentration": 0.5,
             "window": {"start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0, "correlation_time_s": 1.0},
             "impacts": {"from_s": 0.0, "hours": m["hours"]}, "estimates": estimates} | m.get("summary", {})
@@ -66,6 +66,8 @@ def write(folder, members, title="made up", sampling="grid"):
         f["members/status"] = np.array([m["status"] for m in members])
         for key, texts in (("name", [name for *_, name in rows]), ("state_hash", ["0"] * n), ("reason", [m["reason"] for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
+        for group in ("parameters", "summary"):
+            f.create_group(group)
         for key in members[0]["parameters"]:
             values = [m["parameters"][key] for m in members]
             data = f.create_dataset(f"parameters/{key}", data=values, dtype=TEXT if isinstance(values[0], str) else float)
@@ -79,7 +81,7 @@ def write(folder, members, title="made up", sampling="grid"):
                 time[i, :len(m["series"])], ice[i, :len(m["series"])] = np.arange(1, len(m["series"]) + 1), m["series"]
         for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", ice)):
             f.create_dataset(f"series/{key}", data=values).attrs["units"] = "s" if key == "time" else "N"
-        f["study"], f["study_resolved"] = "{}", f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n"
+        f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n")
         f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(all(m["status"] != WAITING for m in members))
         f.attrs["n_finished"], f.attrs["n_failed"] = sum(done), sum(m["status"] == FAILED for m in members)
     for (m, _, name), ok in zip(rows, done):
