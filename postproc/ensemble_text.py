@@ -25,7 +25,9 @@ def number(value, digits=3):
 
 def pair(values, factor=1.0):
     low, high = values
-    return "–" if not np.isfinite([low, high]).all() else f"{number(low / factor)} to {number(high / factor)}"
+    if np.isnan([low, high]).any():
+        return "–"
+    return " to ".join("no bound" if np.isinf(v) else number(v / factor) for v in (low, high))
 
 
 def doubts(c):
@@ -110,12 +112,12 @@ def extremes(s, markdown):
                 rows.append([c["label"], label, *first, "–", "–", *["–"] * len(hours)])
                 continue
             at = {level["hours"]: level for level in f["levels"]}
-            rows.append([c["label"], label, *first, f"{number(f['shape'], 2)} ({pair(f['shape_95'])})", number(f["p_value"], 2),
+            rows.append([c["label"], label, *first, f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})", number(f["p_value"], 2),
                          *(f"{number(at[T]['level'] / factor)}{'*' if at[T]['beyond_data'] else ''} ({pair(at[T]['level_95'], factor)})" if T in at else "–" for T in hours)])
     refused = {f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}" for c in some for kind in ("over_threshold", "block_maxima") if "refused" in c["extremes"][kind]}
     conversions = sorted({c["extremes"]["conversion"] for c in some})
     text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. GPD: peaks over a threshold; GEV: block maxima. "
-            "Brackets: 95 %. * beyond the hours simulated.")
+            "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest peak seen.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([text, *(f"No fit for {r}." for r in sorted(refused))])
 
 

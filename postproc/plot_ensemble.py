@@ -184,7 +184,7 @@ def draw_sweep(e, key):
     panels = groups(e, key)
     panels = [(words, some) for words, some in panels if len(some) > 1] or panels
     shown = panels[:MOST_PANELS]
-    columns = min(3, len(shown))
+    columns = 2 if len(shown) == 4 else min(3, len(shown))
     rows = -(-len(shown) // columns)
     values = np.array([c.values[key] for _, some in shown for c in some])
     log_x = key == "tow.speed" and values.min() > 0
@@ -227,7 +227,8 @@ def draw_sweep(e, key):
             axes.tick_params(labelbottom=True)
     pairs = fields_legend(jammed(e)) + [(handle, label) for label, handle in extra.items()]
     note = " ".join(([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else [])
-                    + (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else []))
+                    + (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else [])
+                    + (["A bar down to the lower edge includes zero."] if log_y and any(stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
     height = figure.get_size_inches()[1]
     lines = -(-len(pairs) // 3)
     figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0], right=0.98, top=1 - 0.95 / height, bottom=(0.95 + 0.24 * lines) / height, wspace=0.08, hspace=0.28)
@@ -273,7 +274,7 @@ def draw_exceedance(e, options):
     step = max(1, -(-len(some) // MOST_LINES))
     figure, axes = plt.subplots(figsize=(10.5, 6.4))
     figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
-    conversion, top = None, 0.0
+    conversion, top, least = None, 0.0, np.inf
     for colour, c in zip(CYCLE, some[::step]):
         hits = [h for h in map(e.impacts, c.finished) if h]
         fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
@@ -281,7 +282,7 @@ def draw_exceedance(e, options):
         some_above = peaks > 0
         if not some_above.any():
             continue
-        conversion, top = hits[0][4], max(top, peaks[0])
+        conversion, top, least = hits[0][4], max(top, peaks[0]), min(least, peaks[some_above][-1])
         axes.loglog(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4, label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
         tail = extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
@@ -292,14 +293,14 @@ def draw_exceedance(e, options):
     if conversion is None:
         plt.close(figure)
         return None
-    axes.set_xlim(1e-4 * top, 3 * top)
+    axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
     axes.set_xlabel(f"peak of a collision (N), {conversion}")
     axes.set_ylabel("exceeded (per hour of tow)")
     axes.grid(True)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
     if step > 1:
-        notes.append(f"every {step}th of {len(some)} conditions is shown")
+        notes.append(f"one in {step} of {len(some)} conditions is shown")
     figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
     headline(figure, e, "how often a peak is exceeded")
     return figure
@@ -328,7 +329,7 @@ def draw_map(e, first, second):
         image = ax.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=norm)
         for (i, j), v in np.ndenumerate(values):
             shade = image.norm(v) if np.isfinite(v) else 0
-            ax.text(j, i, texts(v) if np.isfinite(v) else "–", ha="center", va="center", fontsize=9.5, color=style.PAPER if shade > 0.6 else style.INK)
+            ax.text(j, i, texts(v) if np.isfinite(v) else "–", ha="center", va="center", fontsize=9.5, color=style.PAPER if shade > 0.5 else style.INK)
         ax.set_xticks(range(len(xs)), [f"{v:.3g}" for v in xs])
         ax.set_yticks(range(len(ys)), [f"{v:.3g}" for v in ys])
         ax.tick_params(length=0)

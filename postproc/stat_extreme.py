@@ -8,22 +8,23 @@ A level z of return time T hours of tow is exceeded once in T hours on the avera
                      shape k: z = u + s ((L T)^k - 1)/k, L T > 1            [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
 Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
 
-Intervals: whole fields are drawn anew with their peaks (dependence within a field stays as it is), fitted again, and the 2.5 and 97.5 %
-quantiles taken. The threshold stays. With fewer than LEAST_FIELDS fields clusters are drawn from the fit instead, which leaves the scatter
-between fields out. Either is a lower bound of what is not known: the model of the tail itself is assumed.
+Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py). With fewer fields than
+that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the tail itself, and the threshold, are assumed.
+Below a shape of -1/2 maximum likelihood is irregular
+[Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels; this is told.
 """
 import numpy as np
 from scipy import optimize, stats
 
 import stat_fit
+import stat_profile
 
 LEAST_EXCESSES = 30
 LEAST_BLOCKS = 20
-LEAST_FIELDS = 5
 SHARE = 0.1          # of the peaks above the threshold, or more, until there are LEAST_EXCESSES clusters
+IRREGULAR = -0.5     # shape below which the likelihood is irregular
 EMPTY = 0.05         # share of blocks without a peak above which there is no GEV
-RESAMPLES = 199
-SEED = 20173
+RESAMPLES = 199       # of the p-values
 
 
 def gpd(excess):
@@ -42,7 +43,7 @@ def gpd(excess):
         small = np.abs(t) < 1e-8
         shape = np.where(small, 1.0, shape_of(np.where(small, 1.0, t)))
         value = np.where(small, 1.0, np.log(shape / np.where(small, 1.0, t)) + shape + 1)  # t = 0: exponential of mean 1
-        return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), np.inf, value)
+        return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), 1e6, value)  # finite: the search takes differences
     low = -1 / y.max()
     t = np.concatenate([low * (1 - np.geomspace(1e-6, 1, 120)), np.geomspace(1e-6, 50, 120)])
     t.sort()
@@ -79,23 +80,6 @@ def block_maxima(time, peak, start, hours, blocks):
     return out
 
 
-def level_of_gev(location, scale, shape, block_hours, return_hours):
-    return float(stats.genextreme(-shape, loc=location, scale=scale).ppf(np.exp(-block_hours / return_hours)))
-
-
-def level_of_gpd(threshold, scale, shape, rate, return_hours):
-    """NaN where the threshold itself is exceeded less often than once in the return time."""
-    times = rate * return_hours
-    if times <= 1:
-        return np.nan
-    return threshold + (scale * np.log(times) if abs(shape) < 1e-8 else scale * np.expm1(shape * np.log(times)) / shape)
-
-
-def _range(values):
-    values = np.asarray(values, dtype=float)
-    return [tuple(np.quantile(column[np.isfinite(column)], [0.025, 0.975])) if np.isfinite(column).sum() > 20 else (np.nan, np.nan) for column in values.T]
-
-
 def _excesses(fields, threshold, gap):
     return [clusters(f["time"], f["peak"], threshold, gap) - threshold for f in fields]
 
@@ -122,31 +106,85 @@ def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLE
     excess, raw = np.concatenate(each), int(np.sum(pooled > threshold))
     if len(excess) < LEAST_EXCESSES:
         return {"refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more fields, or choose a lower --threshold"}
-    rng, n = np.random.default_rng(SEED), len(fields)
     scale, shape = gpd(excess)
-    rate = len(excess) / hours
-    def levels(y, hours):
-        s, k = gpd(y)
-        return [k] + [level_of_gpd(threshold, s, k, len(y) / hours, T) for T in return_hours]
-    drawn = []
-    for _ in range(resamples):
-        if n >= LEAST_FIELDS:
-            pick = rng.integers(0, n, n)
-            y, h = np.concatenate([each[i] for i in pick]), sum(fields[i]["hours"] for i in pick)
-        else:
-            y, h = stats.genpareto(shape, scale=scale).rvs(max(rng.poisson(len(excess)), 1), random_state=rng), hours
-        if len(y) >= 5 and np.ptp(y) > 0:
-            drawn.append(levels(y, h))
-    ranges = _range(drawn) if drawn else [(np.nan, np.nan)] * (1 + len(return_hours))
-    statistic = stat_fit.anderson_darling(excess, stats.genpareto(shape, scale=scale).cdf)
+    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape, return_hours)
     def refit(y):
         s, k = gpd(y)
         return stats.genpareto(k, scale=s)
-    return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap, "extremal_index": len(excess) / raw, "rate_per_hour": rate,
-            "scale": scale, "shape": shape, "shape_95": ranges[0], "anderson_darling": statistic,
-            "p_value": stat_fit.p_value(statistic, stats.genpareto(shape, scale=scale), len(excess), refit, resamples),
-            "interval": "fields drawn anew" if n >= LEAST_FIELDS else "drawn from the fit: scatter between fields left out",
-            "levels": [{"hours": T, "level": levels(excess, hours)[1 + i], "level_95": ranges[1 + i], "beyond_data": bool(T > hours)} for i, T in enumerate(return_hours)]}
+    frozen = stats.genpareto(shape, scale=scale)
+    statistic = stat_fit.anderson_darling(excess, frozen.cdf)
+    return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap, "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours,
+            "scale": scale, "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
+            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit, resamples), "interval": interval_note(len(fields)),
+            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)} for T, (z, ends) in zip(return_hours, levels)]}
+
+
+def interval_note(fields):
+    return ("profile likelihood, widened by the scatter between fields" if fields >= stat_profile.LEAST_FIELDS
+            else "profile likelihood; scatter between fields left out: too few of them")
+
+
+def gpd_minus_log_likelihood(log_scale, shape, y):
+    """Of excesses y [n]; log_scale and shape numbers."""
+    if not stat_fit.LEAST_SHAPE < shape < 10:
+        return np.inf
+    z = y * np.exp(-log_scale)
+    if abs(shape) < 1e-7:
+        return len(y) * log_scale + z.sum()
+    inside = 1 + shape * z
+    if len(y) and inside.min() <= 0:
+        return np.inf
+    return len(y) * log_scale + (1 + 1 / shape) * np.log(inside).sum()
+
+
+def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
+    """([(level, (low, high)) of each return time], (low, high) of the shape). each: excesses by field.
+
+    The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the dispersion.
+    """
+    excess, unit, n = np.concatenate(each), scale, len(each)
+    y, total, hours = [x / unit for x in each], np.concatenate(each) / unit, np.asarray(hours, dtype=float)
+    rate = len(excess) / hours.sum()
+    best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted one), shape, ln rate
+    def by_field(theta):
+        return np.array([gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h for x, h in zip(y, hours)])
+    def level(theta, T):
+        return np.exp(theta[0]) * growth(theta[1], np.exp(theta[2]) * T)
+    def alone(theta):
+        return np.sum(by_field(np.append(theta, best[2])))
+    levels = []
+    for T in return_hours:
+        if rate * T <= 1:
+            levels.append((np.nan, (np.nan, np.nan)))
+            continue
+        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best) * rate_share(alone, by_field, lambda theta: level(theta, T), best)
+        z = level(best, T)
+        def profile(q, rest):
+            g = growth(rest[0], rate * T)
+            return gpd_minus_log_likelihood(np.log(q / g), rest[0], total) if q > 0 and g > 0 else np.inf
+        low, high = stat_profile.interval(profile, z, [shape], stat_profile.drop(n, c), 0.1 * z)
+        levels.append((threshold + unit * z, (threshold + unit * max(low, 0.0), threshold + unit * high)))
+    c = stat_profile.dispersion(lambda theta: by_field(np.append(theta, best[2])), lambda theta: theta[1], best[:2])
+    ends = stat_profile.interval(lambda q, rest: gpd_minus_log_likelihood(rest[0], q, total), shape, [0.0], stat_profile.drop(n, c), 0.05)
+    return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
+
+
+def growth(shape, times):
+    """((L T)^k - 1)/k."""
+    return np.log(times) if abs(shape) < 1e-8 else np.expm1(shape * np.log(times)) / shape
+
+
+def rate_share(alone, by_field, level, best):
+    """Variance of the level with the error of the rate over that without it, by the likelihood."""
+    def variance(f, g, theta):
+        information = stat_profile.gradient(lambda t: stat_profile.gradient(f, t), theta)
+        try:
+            return float(g @ np.linalg.solve(0.5 * (information + information.T), g))
+        except np.linalg.LinAlgError:
+            return np.nan
+    g = stat_profile.gradient(level, best)
+    share = variance(lambda t: np.sum(by_field(t)), g, best) / variance(alone, g[:2], best[:2])
+    return share if np.isfinite(share) and share >= 1 else 1.0
 
 
 def by_blocks(fields, return_hours, blocks=None, resamples=RESAMPLES):
@@ -163,24 +201,38 @@ def by_blocks(fields, return_hours, blocks=None, resamples=RESAMPLES):
         return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
     if empty.mean() > EMPTY:
         return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without a collision; lower --blocks, or run longer"}
-    rng, length = np.random.default_rng(SEED), float(lengths.mean())
-    location, scale, shape = stat_fit.gev(maxima[~empty])
-    def levels(x):
-        fitted = stat_fit.gev(x)
-        return [fitted[2]] + [level_of_gev(*fitted, length, T) for T in return_hours]
-    drawn = []
-    for _ in range(resamples):
-        x = np.concatenate([each[i] for i in rng.integers(0, n, n)]) if n >= LEAST_FIELDS else stats.genextreme(-shape, loc=location, scale=scale).rvs(len(maxima), random_state=rng)
-        x = x[np.isfinite(x)]
-        if len(np.unique(x)) >= 5:
-            drawn.append(levels(x))
-    ranges, best = _range(drawn) if drawn else [(np.nan, np.nan)] * (1 + len(return_hours)), levels(maxima[~empty])
-    fitted = stat_fit.fit("GEV", maxima[~empty], resamples)
-    total = sum(f["hours"] for f in fields)
-    return {"blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale, "shape": shape, "shape_95": ranges[0],
-            "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value,
-            "interval": "fields drawn anew" if n >= LEAST_FIELDS else "drawn from the fit: scatter between fields left out",
-            "levels": [{"hours": T, "level": best[1 + i], "level_95": ranges[1 + i], "beyond_data": bool(T > total)} for i, T in enumerate(return_hours)]}
+    length, total = float(lengths.mean()), sum(f["hours"] for f in fields)
+    there = [x[np.isfinite(x)] for x in each]
+    fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
+    if fitted.refused:
+        return {"refused": f"block maxima: {fitted.refused}"}
+    location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
+    levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in return_hours])
+    return {"blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale, "shape": shape, "shape_95": shape_range,
+            "irregular": bool(shape < IRREGULAR), "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
+            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)} for T, (z, ends) in zip(return_hours, levels)]}
+
+
+def gev_intervals(each, location, scale, shape, shares):
+    """([(level, (low, high)) exceeded once in 1/share blocks], (low, high) of the shape). each: block maxima by field."""
+    y, n = [(x - location) / scale for x in each], len(each)
+    total, best = np.concatenate(y), np.array([0.0, 0.0, shape])
+    def by_field(theta):
+        return np.array([stat_fit.gev_minus_log_likelihood(theta, x) if len(x) else 0.0 for x in y])
+    def height(k, share):
+        """(level - location)/scale: (share^-k - 1)/k, since -ln exp(-share) = share."""
+        return -np.log(share) if abs(k) < 1e-8 else np.expm1(-k * np.log(share)) / k
+    levels = []
+    for share in shares:
+        z = height(shape, share)
+        def profile(q, rest):
+            return stat_fit.gev_minus_log_likelihood((q - np.exp(rest[0]) * height(rest[1], share), rest[0], rest[1]), total) if rest[1] < 10 else np.inf
+        c = stat_profile.dispersion(by_field, lambda t: t[0] + np.exp(t[1]) * height(t[2], share), best)
+        low, high = stat_profile.interval(profile, z, [0.0, shape], stat_profile.drop(n, c), 0.2 * (1 + abs(z)))
+        levels.append((location + scale * z, (location + scale * low, location + scale * high)))
+    c = stat_profile.dispersion(by_field, lambda t: t[2], best)
+    ends = stat_profile.interval(lambda q, rest: stat_fit.gev_minus_log_likelihood((rest[0], rest[1], q), total), shape, [0.0, 0.0], stat_profile.drop(n, c), 0.05)
+    return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
 
 
 def exceedance(fields):

@@ -104,10 +104,23 @@ def test_peaks_of_the_fields_together(plain):
         assert tail["levels"][0]["level"] == pytest.approx(scale * np.log(900), rel=0.5) and tail["levels"][0]["beyond_data"] and "level_95" in tail["levels"][0]
 
 
+def unlike(a, b, at=""):
+    """Places at which two nested lists of numbers differ by more than 1e-4."""
+    if isinstance(a, (dict, list)):
+        keys = a if isinstance(a, dict) else range(len(a))
+        if len(a) != len(b):
+            yield at, len(a), len(b)
+        for k in keys:
+            yield from unlike(a[k], b[k], f"{at}/{k}")
+    elif a != (pytest.approx(b, rel=1e-4) if isinstance(b, float) else b):
+        yield at, a, b
+
+
 def test_markdown_and_stable_numbers(plain, tmp_path):
     folder, result, s = plain
     again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 19, "--hours", 1, 10, "--markdown")
-    assert json.loads((tmp_path / "statistics.json").read_text()) == s  # resampling is seeded
+    # resampling is seeded: what is left is rounding, which a search may carry on to its own tolerance
+    assert list(unlike(s, json.loads((tmp_path / "statistics.json").read_text()))) == []
     lines = again.stdout.splitlines()
     tables = [line for line in lines if line.startswith("|")]
     assert "## made up" in lines and "### Mean ice resistance" in lines and tables[0].count("|") == tables[2].count("|") and "NaN" not in again.stdout and "nan" not in again.stdout

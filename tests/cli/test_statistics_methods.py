@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import stat_extreme  # noqa: E402
 import stat_fit  # noqa: E402
 import stat_mean  # noqa: E402
+import stat_profile  # noqa: E402
 import stat_sensitivity  # noqa: E402
 
 TRIALS = 2000
@@ -165,7 +166,7 @@ def poisson_fields(rng, n, hours=1.0, rate=400.0, scale=50.0, shape=0.0, factor=
 def test_return_levels_of_exponential_peaks():
     fields = poisson_fields(np.random.default_rng(3), 12)
     T = [1.0, 10.0, 100.0]
-    over, blocks = stat_extreme.over_threshold(fields, T, gap=0.0, resamples=99), stat_extreme.by_blocks(fields, T, blocks=4, resamples=99)
+    over, blocks = stat_extreme.over_threshold(fields, T, gap=0.0, resamples=39), stat_extreme.by_blocks(fields, T, blocks=4, resamples=39)
     for found in (over, blocks):
         for level, hours in zip(found["levels"], T):
             true = 50 * np.log(400 * hours)  # exceeded 400 exp(-z/50) times a hour
@@ -179,8 +180,34 @@ def test_return_levels_of_exponential_peaks():
 def test_a_field_that_is_unlike_the_others_widens_the_interval():
     rng = np.random.default_rng(4)
     alike, unlike = poisson_fields(rng, 10, rate=100), poisson_fields(rng, 10, rate=100, factor=[1] * 8 + [4, 4])
-    a, b = (stat_extreme.over_threshold(f, [10.0], 0.0, threshold=100.0, resamples=99)["levels"][0] for f in (alike, unlike))
+    a, b = (stat_extreme.over_threshold(f, [10.0], 0.0, threshold=100.0, resamples=1)["levels"][0] for f in (alike, unlike))
     assert (b["level_95"][1] - b["level_95"][0]) / b["level"] > 1.5 * (a["level_95"][1] - a["level_95"][0]) / a["level"]
+
+
+def test_intervals_of_return_levels_hold_the_level():
+    rng, true, hits = np.random.default_rng(13), 50 * np.log(100 * 10.0), []
+    for _ in range(40):
+        [(_, (low, high))], _ = stat_extreme.gpd_intervals(*tail(poisson_fields(rng, 12, rate=100), 100.0), [10.0])
+        hits.append(low <= true <= high)
+    assert sum(hits) >= stats.binom.ppf(1e-3, 40, 0.95)  # percentiles of a bootstrap over fields hold it in three quarters (stat_profile.py)
+
+
+def tail(fields, threshold):
+    """Arguments of gpd_intervals for peaks over a threshold."""
+    each = [f["peak"][f["peak"] > threshold] - threshold for f in fields]
+    return each, [f["hours"] for f in fields], threshold, *stat_extreme.gpd(np.concatenate(each))
+
+
+def test_profile_likelihood_of_a_normal_mean():
+    # with known variance: mean +- sqrt(2 drop / n), and copies of each value in a field widen by the root of their number
+    x = np.random.default_rng(14).normal(7, 1, 40)
+    low, high = stat_profile.interval(lambda q, _: 0.5 * np.sum((x - q) ** 2), x.mean(), [0.0], 2.0, 0.1)
+    assert (low, high) == pytest.approx((x.mean() - np.sqrt(4 / 40), x.mean() + np.sqrt(4 / 40)), abs=1e-3)
+    fields = np.repeat(x, 9).reshape(40, 9)
+    c = stat_profile.dispersion(lambda t: 0.5 * np.sum((fields - t[0]) ** 2, axis=1), lambda t: t[0], [x.mean()])
+    assert c == pytest.approx(9 * np.var(x, ddof=1), rel=1e-3)
+    assert stat_profile.drop(8) == pytest.approx(stats.t.ppf(0.975, 7) ** 2 / 2) and stat_profile.drop(3) == pytest.approx(1.96 ** 2 / 2, rel=1e-4)
+    assert stat_profile.interval(lambda q, _: 1 - np.exp(-q * q), 0.0, [0.0], 2.0, 0.1) == (-np.inf, np.inf)
 
 
 def test_clustered_peaks_count_once():
@@ -199,7 +226,8 @@ def test_what_no_tail_is_fitted_to():
     assert "without a collision" in stat_extreme.by_blocks(few, [1.0], blocks=30)["refused"]
     assert "raise --blocks" in stat_extreme.by_blocks(few, [1.0], blocks=2)["refused"]
     assert "different lengths" in stat_extreme.by_blocks(few + poisson_fields(rng, 1, hours=2.0), [1.0])["refused"]
-    assert np.isnan(stat_extreme.level_of_gpd(10, 1, 0, 0.5, 1.0))  # exceeded less often than asked for
+    seldom = stat_extreme.over_threshold(poisson_fields(rng, 6, rate=100), [0.001], 0.0, threshold=100.0, resamples=1)
+    assert np.isnan(seldom["levels"][0]["level"])  # the threshold itself is exceeded less often than that
 
 
 # ---- sensitivity
