@@ -48,7 +48,7 @@ def plain(tmp_path_factory):
             return {"status": made_up.FAILED, "reason": "base.yml: too short"} if r == 0 else {"status": made_up.WAITING} if r == 1 else {}
         return {"window_warning": "no steady state was found", "warnings": ["no steady state was found", "floes left"]} if (c, r) == (2, 0) else {}
     folder = grid(tmp_path_factory.mktemp("plain") / "all", change=change)
-    result = script("ensemble.py", folder, "--resamples", 19, "--hours", 1, 10)
+    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10)
     assert result.returncode == 0, result.stderr
     return folder, result, json.loads((folder / "statistics.json").read_text())
 
@@ -118,7 +118,7 @@ def unlike(a, b, at=""):
 
 def test_markdown_and_stable_numbers(plain, tmp_path):
     folder, result, s = plain
-    again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 19, "--hours", 1, 10, "--markdown")
+    again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown")
     # resampling is seeded: what is left is rounding, which a search may carry on to its own tolerance
     assert list(unlike(s, json.loads((tmp_path / "statistics.json").read_text()))) == []
     lines = again.stdout.splitlines()
@@ -270,6 +270,11 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
         lines, values = plot_chains.segments(picture, c)
         body, _, total = plot_chains.pairs(c)
         assert total.sum() == pytest.approx(c.force.sum()) and len(values) == np.sum(body < picture.n_floes) and len(set(map(tuple, body))) == len(body)
+    # two points of one pair, 1 and 3 N, and one without force
+    by_hand = plot_chains.Contacts(0.0, np.array([[0, 1], [0, 1], [1, 2]]), np.zeros((3, 2)), np.array([[[0, 0], [8, 0]], [[4, 0], [0, 8]], [[1, 1], [1, 1]]], dtype=float),
+                                   np.array([1.0, 3.0, 0.0]), np.zeros((3, 3)))
+    body, lever, total = plot_chains.pairs(by_hand)
+    assert body.tolist() == [[0, 1]] and lever.tolist() == [[[3, 0], [2, 6]]] and total.tolist() == [4]
     done(script("plot_chains.py", tmp_path / "out", tmp_path / "c.h5"), tmp_path / "out/chains.png")
     with pytest.raises(RunError, match="no such file"):
         plot_chains.read(tmp_path / "none.h5")

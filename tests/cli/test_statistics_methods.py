@@ -145,7 +145,7 @@ def test_clusters_and_blocks_by_hand():
     time, peak = np.array([1.0, 2, 3, 10, 11, 30, 31]), np.array([5.0, 9, 1, 7, 8, 6, 2])
     assert list(stat_extreme.clusters(time, peak, 4, 2)) == [9, 8, 6]
     assert list(stat_extreme.clusters(time, peak, 4, 0.5)) == [5, 9, 7, 8, 6]
-    assert list(stat_extreme.clusters(time, peak, 4, 8)) == [9, 6]  # 2 to 10 s is within the gap
+    assert list(stat_extreme.clusters(time, peak, 4, 6.9)) == [9, 8, 6] and list(stat_extreme.clusters(time, peak, 4, 8)) == [9, 6]  # 2 to 10 s is within the gap
     assert len(stat_extreme.clusters(time, peak, 9, 2)) == 0        # above, not at
     found = stat_extreme.block_maxima(time, peak, 0, 40 / 3600, 4)
     assert list(found[[0, 1, 3]]) == [9, 8, 6] and np.isnan(found[2])
@@ -196,6 +196,21 @@ def tail(fields, threshold):
     """Arguments of gpd_intervals for peaks over a threshold."""
     each = [f["peak"][f["peak"] > threshold] - threshold for f in fields]
     return each, [f["hours"] for f in fields], threshold, *stat_extreme.gpd(np.concatenate(each))
+
+
+@pytest.mark.parametrize("T", [3.0, 100.0])
+def test_profile_intervals_are_those_of_the_likelihood_region(T, monkeypatch):
+    monkeypatch.setattr(stat_extreme, "rate_share", lambda *_: 1.0)
+    each, hours, threshold, scale, shape = tail(poisson_fields(np.random.default_rng(15), 4, rate=100), 100.0)  # four fields: the likelihood alone
+    y, rate = np.concatenate(each), sum(map(len, each)) / 4
+    [(level, ends)], shape_ends = stat_extreme.gpd_intervals(each, hours, threshold, scale, shape, [T])
+    a, k = np.meshgrid(scale * np.linspace(0.4, 2.2, 500), np.linspace(-0.6, 1.2, 501))
+    with np.errstate(all="ignore"):
+        minus = sum(np.log(a) + (1 + 1 / k) * np.log(1 + k * v / a) for v in y)
+        z = threshold + a * ((rate * T) ** k - 1) / k
+    inside = minus <= np.sum(-stats.genpareto(shape, scale=scale).logpdf(y)) + stats.chi2.ppf(0.95, 1) / 2
+    assert level == pytest.approx(threshold + scale * ((rate * T) ** shape - 1) / shape)
+    assert ends == pytest.approx((z[inside].min(), z[inside].max()), rel=0.02) and shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.02)
 
 
 def test_profile_likelihood_of_a_normal_mean():
