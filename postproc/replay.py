@@ -182,10 +182,24 @@ class Replay:
                         "power": float(getattr(c.norm, "gamma", 1.0)), "above": c.extend == "max", "table": table.tolist()})
         return out
 
+    def _samples(self, frames):
+        """Index of the sample of the series at each frame; -1 before the first."""
+        return np.searchsorted(self.run["time"], self.run.frame_times[frames] * (1 + 1e-9), side="right") - 1
+
+    def _unwrap(self, pose, frames):
+        """Poses [T, 3] of the towed body, wrapped in the file, to where series body_x and body_y have it; in place."""
+        run, sample = self.run, self._samples(frames)
+        for axis, name in enumerate(("body_x", "body_y")):
+            if run.period[axis] and name in run:
+                at = np.where(sample < 0, pose[:, axis], run[name][np.maximum(sample, 0)])
+                pose[:, axis] += run.period[axis] * np.round((at - pose[:, axis]) / run.period[axis])
+
     def _bodies(self, frames):
         """Bodies that are no floes, their poses, and what belongs to the towed one."""
         run = self.run
         poses = np.array([run.body_pose(f) for f in frames])
+        if run.towed is not None:
+            self._unwrap(poses[:, run.towed], frames)
         self.blobs["body_pose"] = pack(poses, self.compress)
         out = {"bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()} for b in run.bodies],
                "towed": run.towed, "follow": False, "view": None, "heading": None, "line": None, "vessel": run.case.get("tow.mode") == "thrust",
@@ -203,7 +217,7 @@ class Replay:
             kept = thinned(len(run["time"]), TRACK)
             out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(), "y": run["body_y"][kept].round(5).tolist()}
         if "window_x" in run and np.isfinite(run["window_x"]).any():
-            sample = np.searchsorted(run["time"], run.frame_times[frames] * (1 + 1e-9), side="right") - 1
+            sample = self._samples(frames)
             out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()
             out["follow"] = True
         return out

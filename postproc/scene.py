@@ -288,6 +288,7 @@ class Scene:
         """The tow line from the hull to its towing end, a square; two branches meet there; none that has broken."""
         points = tow_line(self.run, frame, position)
         if points is not None:
+            self._line.set_markevery([min(1, len(points) - 1)])  # the end alone where all branches have broken
             self._line.set_data(*self._flat(points).T)
 
     def _show_arrow(self, position, outline):

@@ -146,11 +146,16 @@ function look(x0, x1, y0, y1, margin) {
     state.scale = margin * Math.min(canvas.width / Math.abs(u1 - u0), canvas.height / Math.abs(v1 - v0));
 }
 
-// The whole domain, or the neighbourhood of the body that the view follows.
+// The whole domain, or the neighbourhood of the body that the view follows, as far as a moving window reaches.
 function fit() {
-    if (state.follow && head.view) return look(...head.view, 1);
-    const C = centre(state.p), [x0, x1, y0, y1] = head.box;
-    look(C[0] - (x1 - x0) / 2, C[0] + (x1 - x0) / 2, C[1] - (y1 - y0) / 2, C[1] + (y1 - y0) / 2, 0.96);
+    const C = centre(state.p), [x0, x1, y0, y1] = head.box, half = (x1 - x0) / 2;
+    if (!state.follow || !head.view) return look(C[0] - half, C[0] + half, C[1] - (y1 - y0) / 2, C[1] + (y1 - y0) / 2, 0.96);
+    const view = head.view.slice(), ahead = C[0] - bodyPose(head.towed, state.p)[0];
+    if (moving) {
+        view[0] = Math.max(view[0], ahead - half);
+        view[1] = Math.min(view[1], ahead + half);
+    }
+    look(...view, 0.98);
 }
 
 function setFollow(on) {

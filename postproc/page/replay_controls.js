@@ -4,7 +4,7 @@
 // ---- force curve
 
 const curve = head.curve;
-const margin = {left: 64, right: 14, top: 12, bottom: 34};
+const margin = {left: 64, right: 14, top: 18, bottom: 34};
 
 // Round numbers that cut [low, high] into about n pieces.
 function ticks(low, high, n) {
@@ -13,12 +13,12 @@ function ticks(low, high, n) {
     return out;
 }
 
-// Limits of the force axis, as in the picture: where the running mean and the mean are; samples above are named, not drawn.
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named, not drawn.
 function forceRange() {
-    const smooth = Math.max(...curve.lines.map((l) => Math.max(...l.smooth.filter((v) => v !== null), 0)));
-    const highest = Math.max(...curve.lines.map((l) => Math.max(...l.high.filter((v) => v !== null), 0)));
-    const lowest = Math.min(...curve.lines.map((l) => Math.min(...l.low.filter((v) => v !== null), 0)));
-    const top = Math.min(Math.max(2.5 * smooth, 1.5 * (curve.mean || 0)), highest) || highest || 1;
+    const largest = (values, from) => values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0), steady = curve.window ? curve.window[0] : curve.start;
+    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start))), lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
+    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0), ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
+    const top = Math.min(wish, highest) || highest || 1;
     return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: highest > 1.05 * top ? highest : null};
 }
 
@@ -107,6 +107,12 @@ function drawChart() {
         g.setLineDash([]);
     }
     g.restore();
+    if (range.beyond !== null) {
+        g.fillStyle = colour("--faint");
+        g.textAlign = "right";
+        g.textBaseline = "top";
+        g.fillText(`single samples up to ${quantity(range.beyond, curve.lines[0].unit)}`, s.right, s.top - 11 * ratio);
+    }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
         g.beginPath();
