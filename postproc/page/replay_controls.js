@@ -19,7 +19,8 @@ function forceRange() {
     const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start))), lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
     const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0), ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
     const top = Math.min(wish, highest) || highest || 1;
-    return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: highest > 1.05 * top ? highest : null};
+    const single = largest(curve.lines[0].high, curve.start);
+    return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: single > 1.05 * top ? single : null};
 }
 
 const range = curve ? forceRange() : null;
@@ -57,14 +58,18 @@ function axes(g, s, ink, faint, ratio) {
     g.restore();
 }
 
-function band(g, s, line) {
-    g.fillStyle = line.colour;
-    g.globalAlpha = 0.25;
+// Each piece from its least to its largest sample.
+function band(g, s, line, ratio) {
+    g.strokeStyle = line.colour;
+    g.lineWidth = 0.8 * ratio;
+    g.globalAlpha = 0.4;
     g.beginPath();
-    const some = curve.time.map((t, k) => k).filter((k) => line.low[k] !== null);
-    for (const k of some) g.lineTo(s.x(curve.time[k]), s.y(line.high[k]) - 0.5);
-    for (const k of some.reverse()) g.lineTo(s.x(curve.time[k]), s.y(line.low[k]) + 0.5);
-    g.fill();
+    curve.time.forEach((t, k) => {
+        if (line.low[k] === null) return;
+        g.lineTo(s.x(t), s.y(line.high[k]));
+        g.lineTo(s.x(t), s.y(line.low[k]));
+    });
+    g.stroke();
     g.globalAlpha = 1;
 }
 
@@ -94,7 +99,7 @@ function drawChart() {
     g.beginPath();
     g.rect(s.left, s.top, s.right - s.left, s.bottom - s.top);
     g.clip();
-    band(g, s, curve.lines[0]);
+    band(g, s, curve.lines[0], ratio);
     for (const line of curve.lines) mean(g, s, line, ratio);
     if (curve.window && curve.mean !== null) {
         g.strokeStyle = colour("--ink");
@@ -111,7 +116,7 @@ function drawChart() {
         g.fillStyle = colour("--faint");
         g.textAlign = "right";
         g.textBaseline = "top";
-        g.fillText(`single samples up to ${quantity(range.beyond, curve.lines[0].unit)}`, s.right, s.top - 11 * ratio);
+        g.fillText(`${curve.lines[0].label}: single samples up to ${quantity(range.beyond, curve.lines[0].unit)}`, s.right, s.top - 11 * ratio);
     }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
@@ -347,6 +352,7 @@ load().then(() => {
     shape();
     rates();
     controls();
+    pointers();
     legend();
     resize();
     fit();
