@@ -335,16 +335,20 @@ function shape() {
     canvas.style.aspectRatio = `${w} / ${Math.min(Math.max(h * 1.08, 0.28 * w), 1.1 * w)}`;
 }
 
+const css = (at) => at.map((v) => v * canvas.clientWidth / canvas.width);
+
 // What the page's own controls do, for scripts (and the tests): frame numbers from 0, SI units.
 window.bergtow = {
     get ready() { return data !== null; }, get frames() { return T; }, get floes() { return N; }, get playhead() { return state.p; }, get time() { return timeAt(state.p); },
-    get playing() { return state.playing; }, get colour() { return head.colouring[state.colour].kind; }, get follow() { return state.follow; }, get scale() { return state.scale; },
+    get playing() { return state.playing; }, get colour() { return head.colouring[state.colour].kind; }, get follow() { return state.follow; },
     seek, play: () => play(true), pause: () => play(false), fit: () => { fit(); draw(); }, id: idOf,
     pose: (i) => floePose(i, playhead()), value: (kind, i) => value(kind, nearest(), i), body: (b) => bodyPose(b, playhead()),
     screen: (i) => {  // where floe i is drawn, CSS pixels from the canvas's corner
-        const p = playhead(), C = centre(p), pose = floePose(i, p), at = toScreen(C[0] + image(pose[0] - C[0], head.period[0]), C[1] + image(pose[1] - C[1], head.period[1]), origin(p));
-        return at.map((v) => v * canvas.clientWidth / canvas.width);
+        const p = playhead(), C = centre(p), pose = floePose(i, p);
+        return css(toScreen(C[0] + image(pose[0] - C[0], head.period[0]), C[1] + image(pose[1] - C[1], head.period[1]), origin(p)));
     },
+    towed: () => { const p = playhead(); return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p))); },  // the same of the towed body
+    get metre() { return css([state.scale, 0])[0]; },  // CSS pixels
 };
 
 load().then(() => {
