@@ -97,7 +97,7 @@ DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin li
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages (on a bare system 360 MB to fetch, some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages (on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \

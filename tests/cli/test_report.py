@@ -362,7 +362,9 @@ def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, w
 
 def test_usage():
     for arguments in (["x", "-o", "page.png"], ["x", "--size", "0"], ["x", "--size", "nan"], []):
-        assert script(*arguments).returncode == 2
+        with pytest.raises(SystemExit) as left:
+            report.main(arguments)
+        assert left.value.code == 2
 
 
 GIVEN = """# Title.
