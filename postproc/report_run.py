@@ -53,11 +53,13 @@ def with_error(mean, se):
 
 
 def picture(name, title, draw):
-    """A figure as {"name", "title", "data" (PNG, base64)}; {"name", "title", "why"} where the run has nothing to draw."""
+    """A figure as {"name", "title", "data" (PNG, base64)}; {"name", "title", "why"} where there is nothing to draw; None where it says so itself."""
     try:
         figure = draw()
     except RunError as error:
         return {"name": name, "title": title, "why": f"{error.reason}; {error.remedy}"}
+    if figure is None:
+        return None
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=PICTURE_DPI)
     plt.close(figure)
