@@ -116,7 +116,7 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
 
 RUN ?=
-report: deps ## RUN=DIR: numbers, pictures and a replay of a run as one HTML page, DIR/report.html
+report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
 	@[ -n "$(RUN)" ] || { echo "which run? make report RUN=out/demo"; exit 2; }
 	$(PYTHON) postproc/report.py $(RUN)
 
