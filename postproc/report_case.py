@@ -41,7 +41,7 @@ def annotated(text):
         if path[:1] == ["floes"]:
             return
         rest = text[node.end_mark.index:].split("\n", 1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
-        comment = re.match(r"[\s,}\]]*\s#\s*(.*)", rest)
+        comment = re.match(r"\s+#\s*(.*)", rest)
         value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(text[node.start_mark.index:node.end_mark.index].split())
         out[".".join(path)] = (value, comment[1].strip() if comment else "")
 
@@ -76,7 +76,7 @@ def of_default(meaning):
     source = re.search(r"\[([^\]]*[A-Za-z][^\]]*)\]\s*$", meaning)
     if kind in ("assumed", "memory"):
         return kind, f"default, {KINDS[kind]}" + (f" ({source[1]})" if source else "")
-    return ("source", f"default: {source[1]}") if source else ("default", "default")
+    return ("source", f"default: {source[1]}") if source else ("default", "")
 
 
 def values(run):

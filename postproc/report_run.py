@@ -19,7 +19,7 @@ import numpy as np
 #: keys that the page shows in the open; all others are in the folded table
 KEY_VALUES = {
     "Ice": ["ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.density", "ice.friction", "ice.restitution",
-            "ice.crushing.pressure", "ice.field", "ice.outlines", "ice.seed", "lead.mode", "lead.width"],
+            "ice.crushing.pressure", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
     "Towed body": ["body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass", "body.friction", "body.drag.water_form"],
     "Tow": ["tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter", "tow.line_length", "tow.line_stiffness",
             "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
