@@ -407,6 +407,7 @@ tow:
 
 
 class Told:
+    path = Path("nowhere/run")
     case_text, resolved_text, attributes = GIVEN, RESOLVED, {"command_line": "bergtow run a.yml --set tow.speed=0.2 --set=ice.sides=6 -o 'x y'"}
 
 
@@ -419,6 +420,18 @@ def test_where_each_value_comes_from():
     assert "no source stated" in values["ice.friction"].origin and "Sukhorukov" not in values["ice.friction"].origin
     assert values["ice.density"].origin == "default: Hunke & Comeau 2011" and values["ice.shake"].origin == "default, assumed" and values["tow.speed"].value == "0.2 m/s"
     assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
+
+
+def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
+    (tmp_path / "study.yml").write_text("base: b.yml\nset:\n  ice.size: 2 m  # assumed: larger\n  run.dt: 0.2 s\nparameters: {ice.friction: [0.1, 0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\n")
+
+    class Member(Told):
+        path = tmp_path / "members" / "c001-r001"
+
+    values = {v.key: v for v in report_case.values(Member)}
+    assert {k for k, v in values.items() if v.origin.startswith("set by the study")} == {"ice.size", "run.dt", "ice.friction", "ice.thickness"}
+    assert values["ice.size"].kind == "assumed" and values["ice.size"].origin == "set by the study: assumed: larger" and values["run.dt"].kind == "study"
+    assert values["ice.length"].kind == "memory"
 
 
 def test_every_key_is_labelled(tow):
