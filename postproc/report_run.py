@@ -27,6 +27,7 @@ KEY_VALUES = {
                                "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"],
     "Numerical": ["run.dt", "run.duration", "output.window_start", "solver.tolerance", "solver.max_sweeps", "impact.conversion", "impact.duration", "impact.pressure"],
 }
+UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
 #: keys of the tow that mean nothing in some modes
 ONLY = {"tow.line": ("line", "thrust"), "tow.vessel": ("thrust",), "tow.speed": ("speed", "line", "thrust"), "tow.ramp": ("speed", "line", "thrust")}
 
@@ -208,7 +209,7 @@ def key_values(run, values):
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
-        out[heading] = [by_key[k] for k in keys if k in by_key and by_key[k].value not in ("", "none")
+        out[heading] = [by_key[k] for k in keys if k in by_key and by_key[k].value not in ("", "none", UNSET.get(k))
                         and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())]
     return out
 
