@@ -148,7 +148,9 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
 	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
+	$(PYTHON) postproc/report.py $(DEMO)
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
 
 RUN ?=
 report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
