@@ -265,7 +265,7 @@ double bt_world_overlap(bt_world *w)
     const bt_tiles *t = w->tiles;
     double deepest = 0;
     // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel reduction(max : deepest) if (t->n > FEW_TILES)
+#pragma omp parallel reduction(max : deepest) if (BT_MANY(t->n, FEW_TILES))
     {
         bt_pair_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)
