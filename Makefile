@@ -51,7 +51,7 @@ TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
+.PHONY: all help deps demo report test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -117,12 +117,12 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
-        python3-yaml python3-pytest ffmpeg
+        python3-yaml python3-jinja2 python3-pytest ffmpeg chromium chromium-driver python3-selenium
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages (on a bare system 360 MB to fetch, some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages (on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
@@ -148,7 +148,14 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
 	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
+	$(PYTHON) postproc/report.py $(DEMO)
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
+
+RUN ?=
+report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
+	@[ -n "$(RUN)" ] || { echo "which run? make report RUN=out/demo"; exit 2; }
+	$(PYTHON) postproc/report.py $(RUN)
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
 test: deps ## every test: units, known answers, same bits, command line

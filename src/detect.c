@@ -181,7 +181,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     for (size_t i = 0; i < s->pack.n; i++) {
         const bt_manifold *m = &s->pack.man[i];
         t->n_points += m->n_points;
-        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, -m->p[j].gap);
+        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
     }
     bt_pack_units(w, k, &s->pack);
     if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
