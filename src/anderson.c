@@ -59,6 +59,7 @@ typedef struct {
 
 static history history_of(const bt_tile *tile)
 {
+    if (!tile->unit_history) return (history){0}; // a tile that never had a unit
     const size_t n = 3 * (size_t)tile->cap_unit_history;
     history h = {.f = tile->unit_history, .g = tile->unit_history + n};
     float *columns = (float *)(tile->unit_history + 2 * n);
