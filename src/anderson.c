@@ -59,7 +59,6 @@ typedef struct {
 
 static history history_of(const bt_tile *tile)
 {
-    if (!tile->unit_history) return (history){0}; // a tile that never had a unit
     const size_t n = 3 * (size_t)tile->cap_unit_history;
     history h = {.f = tile->unit_history, .g = tile->unit_history + n};
     float *columns = (float *)(tile->unit_history + 2 * n);
@@ -112,6 +111,7 @@ static double weighted_square(const double *restrict weight, const double *restr
 
 void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double *weight, bt_totals *t)
 {
+    if (tile->n_units == 0) return; // it may have no history, and has nothing to add
     const history h = history_of(tile);
     const size_t n = 3 * (size_t)tile->n_units;
     float *restrict df = h.df[a->column], *restrict dg = h.dg[a->column];
@@ -228,6 +228,7 @@ bt_anderson_verdict bt_anderson_decide(bt_anderson *a, const bt_totals *t)
 
 void bt_anderson_move_units(const bt_anderson *a, bt_anderson_verdict v, bt_tile *tile)
 {
+    if (tile->n_units == 0) return;
     const history h = history_of(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         double move[3] = {0, 0, 0};
