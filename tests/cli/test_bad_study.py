@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: MIT
+"""Study files that are refused: each fault with its line, its key and what to do."""
+import pytest
+from harness import CASE, TOW, call, write_case
+
+STUDIES = {
+    "list for a word": ("title: [a]\n", "study.yml:2: title: needs a single value"),
+    "no number": ("repeats: many\n", "study.yml:2: repeats: many: give a whole number from 1 to 100000"),
+    "section in set": ("set: {ice: 1}\n", "ice: is a section; write its keys with a dot"),
+    "unknown key in set": ("set: {ice.sise: 1}\n", "ice.sise: unknown key; did you mean ice.size?"),
+    "unlike any key": ("set: {banana: 1}\n", "banana: unknown key; see bergtow --list-keys"),
+    "threads": ("set: {run.threads: 2}\n", "run.threads: is chosen for all members by --threads"),
+    "seed": ("parameters: {ice.seed: [1, 2]}\n", "ice.seed: the fields of a study take their seeds from `seed`"),
+    "points": ("set: {tow.waypoints: [[1, 2]]}\n", "tow.waypoints: a study takes single values"),
+    "value of a key": ("set: {ice.size: 3 kN}\n", "ice.size: kN is the unit of a force"),
+    "set of no map": ("set: 3\n", "set: needs keys with values"),
+    "empty list": ("parameters: {ice.size: []}\n", "ice.size: the list is empty"),
+    "twice in a list": ("parameters: {ice.size: [1, 1]}\n", "ice.size: 1 stands twice in the list"),
+    "range of a choice": ("parameters: {ice.shape: {from: 1, to: 2}}\n", "ice.shape: has no range; give a list"),
+    "end that is no number": ("parameters: {ice.size: {from: [1], to: 2}}\n", "ice.size.from: needs a single value"),
+    "scale": ("parameters: {ice.size: {from: 1, to: 2, scale: cubic}}\n", "ice.size.scale: cubic: give linear or log"),
+    "word of a range": ("parameters: {ice.size: {from: 1, too: 2}}\n", "ice.size.too: unknown key; did you mean to"),
+    "backwards": ("parameters: {ice.size: {from: 2, to: 1}}\n", "ice.size: needs from and to, from below to"),
+    "logarithm of zero": ("parameters: {ice.friction: {from: 0, to: 1, scale: log}}\n", "a logarithmic range begins above zero"),
+    "varied and set": ("set: {ice.size: 1}\nparameters: {ice.size: [1, 2]}\n", "ice.size: is varied and stands in `set` too"),
+    "single parameter": ("parameters: {ice.size: 1}\n", "ice.size: needs a list [a, b] or a range"),
+    "parameters of no map": ("parameters: 1\n", "parameters: needs keys with lists or ranges"),
+    "no variants": ("variants: {}\n", "variants: needs names with keys"),
+    "with of nothing": ("with: 1\n", "with: needs values with keys"),
+    "with of no value": ("parameters: {ice.size: [1, 2]}\nwith: {ice.size=3: {tow.speed: 1}}\n", "with: ice.size=3: is no value of a parameter"),
+    "sampling": ("sampling: dice\n", "sampling: dice: give grid or latin-hypercube"),
+    "hypercube of nothing": ("sampling: latin-hypercube\nsamples: 3\n", "there is nothing to sample"),
+    "hypercube without number": ("sampling: latin-hypercube\nparameters: {ice.size: [1, 2]}\n", "samples: missing"),
+    "unknown word": ("repeat: 3\n", "study.yml:2: repeat: unknown key of a study; did you mean repeats"),
+}
+
+
+@pytest.mark.parametrize("kind", STUDIES)
+def test_refused_study(tmp_path, kind):
+    text, fragment = STUDIES[kind]
+    write_case(tmp_path, TOW)
+    (tmp_path / "study.yml").write_text("base: case.yml\n" + text)
+    result = call("ensemble", "study.yml", "-o", "out", cwd=tmp_path)
+    assert result.returncode == CASE, result.stderr
+    assert any("study.yml" in line and fragment in line for line in result.stderr.splitlines()), result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_study_without_base(tmp_path):
+    (tmp_path / "study.yml").write_text("repeats: 2\n")
+    result = call("ensemble", "study.yml", cwd=tmp_path)
+    assert result.returncode == CASE and "study.yml: base: missing; name the case that is varied" in result.stderr
+    (tmp_path / "study.yml").write_text("[1]\n")
+    assert "is not a study; it needs at least base: CASE.yml" in call("ensemble", "study.yml", cwd=tmp_path).stderr
