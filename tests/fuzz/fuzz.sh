@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; a second word "keep" in place of the seconds puts the smallest set of inputs that
-# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB. Found inputs stay in build/fuzz/found/NAME; one that breaks
+# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB and 150 files. Found inputs stay in build/fuzz/found/NAME; one that breaks
 # something is in build/fuzz/broken/: mend the program and keep the input.
 set -eu
 name=$1 what=${2:-60}
@@ -27,10 +27,11 @@ esac
 if [ "$what" = keep ]; then
     merged=$(mktemp -d)
     $build/fuzz_"$name" -merge=1 -max_len=2000 "$merged" "$kept" "$found" >$build/merge.log 2>&1
-    total=0
+    total=0 count=0
     find "$merged" -type f -printf '%s %p\n' | sort -n | while read -r size path; do
         total=$((total + size))
-        [ $total -lt 20000 ] || break
+        count=$((count + 1))
+        if [ $total -ge 20000 ] || [ $count -gt 150 ]; then break; fi
         cp "$path" "$kept"/
     done
     rm -rf "$merged"
