@@ -6,7 +6,7 @@ What turned this test red when it was written: an overlap of −0 on one rank an
 """
 import json
 
-from harness import changed, run
+from harness import run
 from test_outlines_ranks import with_bays
 from test_ranks import assert_same, many
 
