@@ -233,6 +233,8 @@ const bt_key bt_case_keys[] = {
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+    INT("output.checkpoint_steps", output.checkpoint_steps, "0", "[0, 1e12]", "steps between checkpoints, 0 = none by steps"),
+    REAL("output.checkpoint_wall", output.checkpoint_wall, TIME, "600 s", "[0, 1e9]", "wall time between checkpoints, 0 = none by time; one is always written at the end and at a stop"),
     BOOL("output.panels", output.panels, "false", "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
 
     REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
