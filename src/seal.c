@@ -68,8 +68,9 @@ bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err)
 }
 
 /// Why a block is not the one it should be, in words.
-static bt_status refuse(const char *path, const char *kind, const char *block, off_t size, bt_errors *err)
+static bt_status refuse(const char *path, const char *kind, char *block, off_t size, bt_errors *err)
 {
+    block[BT_SEAL_BYTES - 1] = 0;
     char found[40] = "";
     long long bytes = -1;
     const bool ours = !memcmp(block, MAGIC, sizeof MAGIC - 1) && sscanf(block + sizeof MAGIC - 1, "kind: %39[^\n]\nbytes: %lld", found, &bytes) >= 1;
@@ -82,31 +83,37 @@ static bt_status refuse(const char *path, const char *kind, const char *block, o
     return BT_ERR_CASE;
 }
 
+/// A file that never had a seal: it begins as HDF5, or it is no HDF5 file with this room in front. What was sealed does not pass by a damaged first line.
+static bool is_bare(int fd, off_t size, const char *block)
+{
+    char behind[sizeof hdf5_magic] = "";
+    if (!memcmp(block, hdf5_magic, sizeof hdf5_magic)) return true;
+    if (!memcmp(block, MAGIC, sizeof MAGIC - 1)) return false;
+    const bool long_enough = size >= BT_SEAL_BYTES + (off_t)sizeof behind;
+    return !long_enough || (read_at(fd, behind, sizeof behind, BT_SEAL_BYTES) && memcmp(behind, hdf5_magic, sizeof behind) != 0);
+}
+
 bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_errors *err)
 {
     char block[BT_SEAL_BYTES] = "", wanted[BT_SEAL_BYTES];
     struct stat st;
     if (bare) *bare = false;
     const int fd = open(path, O_RDONLY | O_CLOEXEC);
-    int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : S_ISDIR(st.st_mode) ? EISDIR : 0;
     bt_status status = BT_OK;
-    if (!reason && st.st_size < BT_SEAL_BYTES) {
-        if (bare) *bare = st.st_size >= 8 && read_at(fd, block, 8, 0) && !memcmp(block, hdf5_magic, 8);
-        if (!bare || !*bare) {
+    int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : S_ISDIR(st.st_mode) ? EISDIR : 0;
+    if (!reason && !read_at(fd, block, st.st_size < BT_SEAL_BYTES ? (size_t)st.st_size : sizeof block, 0)) reason = errno;
+    if (!reason && bare) *bare = is_bare(fd, st.st_size, block);
+    if (!reason && !(bare && *bare)) {
+        if (st.st_size < BT_SEAL_BYTES) {
             bt_errors_add(err, "%s: is cut off, or no file of this program: it has %lld bytes; take another copy of it", path, (long long)st.st_size);
             status = BT_ERR_CASE;
+        } else if (memcmp(block, MAGIC, sizeof MAGIC - 1)) {
+            status = refuse(path, kind, block, st.st_size, err);
+        } else if (!make(fd, st.st_size, kind, wanted)) {
+            reason = errno;
+        } else if (memcmp(block, wanted, sizeof block)) {
+            status = refuse(path, kind, block, st.st_size, err);
         }
-    } else if (!reason && !read_at(fd, block, sizeof block, 0)) {
-        reason = errno;
-    } else if (!reason && bare && !memcmp(block, hdf5_magic, sizeof hdf5_magic)) {
-        *bare = true;
-    } else if (!reason && memcmp(block, MAGIC, sizeof MAGIC - 1)) {
-        status = refuse(path, kind, block, st.st_size, err);
-    } else if (!reason && !make(fd, st.st_size, kind, wanted)) {
-        reason = errno;
-    } else if (!reason && memcmp(block, wanted, sizeof block)) {
-        block[BT_SEAL_BYTES - 1] = 0;
-        status = refuse(path, kind, block, st.st_size, err);
     }
     if (fd >= 0) close(fd);
     return reason ? bt_file_fail(path, "read the file", reason, err) : status;

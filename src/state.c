@@ -302,6 +302,7 @@ static bool same_constants(const bt_params *now, const bt_params *then)
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
 {
     const bt_params made = w->par;
+    if (!s->path) s->path = "checkpoint";
     bt_snapshot_take_rows(s, "world", world_rows, N_OF(world_rows), w);
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);

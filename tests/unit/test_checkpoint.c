@@ -243,6 +243,10 @@ static void goes_on_from_every_step(const struct scenario *s)
     if ((seen & s->shows) != s->shows) fail_msg("%s: shows %x, wanted %x", s->name, (unsigned)seen, (unsigned)s->shows);
     for (int n = 0; n < s->steps; n++) {
         bt_world *again = take_up(&t, &state[n]);
+        bt_snapshot as_read = {0};
+        save(&t, again, &as_read);
+        check_same(s, s->from + n, s->from + n, &state[n], &as_read);
+        bt_snapshot_free(&as_read);
         for (int k = n + 1; k <= n + LATER && k <= s->steps; k++) {
             bt_snapshot now = {0};
             bt_sample o;
