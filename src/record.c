@@ -11,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fileio.h"
 #include "provenance.h"
@@ -306,6 +307,9 @@ void bt_record_abandon(bt_record *r)
 {
     bt_h5_give_up(&r->h5, BT_ERR_IO);
     close_file(r);
+    char *part = bt_file_join(r->dir, BT_RESULT_PART);
+    if (r->comm->rank == 0) unlink(part);
+    free(part);
     record_free(r);
 }
 

@@ -80,17 +80,6 @@ static bt_status agree(run *r, bt_status status)
     return bits & 1 ? bt_comm_agree(r->comm, status) : BT_OK;
 }
 
-static bt_status check_finite(const run *r, bt_errors *err)
-{
-    bt_idx bad = bt_observe_not_finite(r->w);
-    if (bad < 0) return BT_OK;
-    bt_errors_add(err,
-                  "step %" PRId64 ": body %" PRId64 " has a pose or velocity that is not a number; take a smaller run.dt, "
-                  "and check masses, stiffness and speeds of the case",
-                  r->w->step, r->w->bodies.gid[bad]);
-    return BT_ERR_NUMERIC;
-}
-
 /// Collective. Floes whose centroid has left the domain where it is not periodic.
 static int64_t count_outside(const run *r)
 {
@@ -176,7 +165,8 @@ static bt_status loop(run *r, bt_errors *err)
         bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
         if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
         if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
-        if (status == BT_OK && !isfinite(s.kinetic_energy)) status = check_finite(r, err);
+        const bt_status sound = isfinite(s.kinetic_energy) ? bt_guard_check(&r->guard, w, err) : bt_guard_finite(w, err);
+        if (status == BT_OK) status = sound;
         status = agree(r, status);
         if (status == BT_OK) status = frame_if_due(r, s.time, err);
         const bool last = w->step == r->end_step || bt_halt_stops(r->asked); // then one is written anyway
@@ -184,7 +174,8 @@ static bt_status loop(run *r, bt_errors *err)
         bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
         r->totals.phases.output += bt_clock() - t0;
     }
-    if (status == BT_OK) status = bt_comm_agree(r->comm, check_finite(r, err));
+    if (status == BT_OK) status = bt_comm_agree(r->comm, bt_guard_finite(w, err));
+    r->failed = status == BT_ERR_NUMERIC && w->step > r->first_step;
     return status;
 }
 
@@ -233,9 +224,10 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     bt_status status = open_record(r, kept, err);
     if (status != BT_OK) return status;
     const int64_t whole = bt_case_steps(r->c), asked = r->first_step + r->o->max_steps;
-    r->end_step = r->o->max_steps > 0 && asked < whole ? asked : whole;
+    r->end_step = r->until >= 0 ? r->until : r->o->max_steps > 0 && asked < whole ? asked : whole;
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
+    bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size, r->reference_speed);
     bt_halt_begin(&r->halt);
     if (!kept) {
         r->frames = r->frames_due = 1;
@@ -243,8 +235,14 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     }
     if (status == BT_OK) status = loop(r, err);
     bt_progress_end(&r->progress);
-    if (status == BT_OK) status = finish(r, err);
-    else bt_record_close(r->record, NULL, err);
+    if (status == BT_OK && r->until >= 0) {
+        status = bt_halt_stops(r->asked) ? BT_ERR_SIGNAL : bt_running_checkpoint(r, BT_FAILURE_FILE, err);
+        bt_record_abandon(r->record);
+    } else if (status == BT_OK) {
+        status = finish(r, err);
+    } else {
+        bt_record_close(r->record, NULL, err);
+    }
     bt_halt_end(&r->halt);
     return status;
 }
@@ -294,13 +292,24 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
     *f = (bt_field){0};
 }
 
-/// Collective. kept: go on from there, or NULL. start: bt_clock when the call began.
-static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept, double start, bt_errors *err)
+/// How a case is run.
+typedef struct {
+    bt_snapshot *kept;   ///< go on from there, or NULL
+    double start;        ///< bt_clock when the call began
+    int64_t until;       ///< only up to this step, for failure.h5; −1 = as the options say
+    int64_t failed;      ///< out: the step that was not sound, −1 = none
+} manner;
+
+/// Collective.
+static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_options *o, manner *m, bt_errors *err)
 {
+    bt_snapshot *kept = m->kept;
     const int threads = choose_threads(comm, c, o);
     start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
-    r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .first = comm->rank == 0, .started = start};
+    r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .first = comm->rank == 0, .started = m->start};
+    r.until = m->until;
+    m->failed = -1;
     bt_field f;
     bt_field_init(&f);
     bt_lead_stats lead = {0};
@@ -317,6 +326,7 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
         }
         r.first_step = r.w->step;
         if (status == BT_OK) status = run_world(&r, kept, err);
+        if (r.failed) m->failed = r.w->step;
     }
     bt_field_free(&f);
     bt_field_free(&r.field);
@@ -337,6 +347,41 @@ static bt_status take_folder(const bt_comm *comm, const char *dir, int *lock, bt
     return bt_comm_agree(comm, status);
 }
 
+/// Collective. A step was not sound: the state before it, made again from the last checkpoint (or the one of o->from, or the start), goes to failure.h5.
+static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, bt_errors *err)
+{
+    bt_run_options quiet = *o;
+    quiet.quiet = true;
+    quiet.dump_step = -1;
+    bt_snapshot s = {0};
+    char *path = NULL, *said = NULL;
+    bt_errors unheard = {0};
+    int from = 0;
+    if (comm->rank == 0 && o->from) from = bt_snapshot_read(&s, o->from, &unheard) == BT_OK;
+    else if (comm->rank == 0 && bt_checkpoint_there(o->dir)) from = bt_checkpoint_read(&s, o->dir, &path, &said, &unheard) == BT_OK;
+    bt_comm_bcast(comm, &from, sizeof from);
+    if (from) bt_snapshot_share(comm, &s);
+    s.err = &unheard;
+    manner m = {.kept = from ? &s : NULL, .start = bt_clock(), .until = step - 1};
+    const bt_status status = run_case(comm, c, &quiet, &m, &unheard);
+    if (status == BT_OK)
+        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir, BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
+    else for (size_t k = 0; k < unheard.n; k++) bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
+    bt_errors_free(&unheard);
+    bt_snapshot_free(&s);
+    free(path);
+    free(said);
+}
+
+/// Collective. A run, and what is kept of it when it fails.
+static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept, double start, bt_errors *err)
+{
+    manner m = {.kept = kept, .start = start, .until = -1};
+    const bt_status status = run_case(comm, c, o, &m, err);
+    if (m.failed >= 0) keep_failure(comm, c, o, m.failed, err);
+    return status;
+}
+
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
 {
     if (comm->size > 1 && o->dump_step >= 0) {
@@ -346,21 +391,21 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
     const double start = bt_clock();
     int lock;
     bt_status status = take_folder(comm, o->dir, &lock, err);
-    if (status == BT_OK) status = run_case(comm, c, o, NULL, start, err);
+    if (status == BT_OK) status = run_guarded(comm, c, o, NULL, start, err);
     bt_lock_drop(o->dir, lock);
     return status;
 }
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
-/// A run that was killed before its first checkpoint: from its case, at time zero. *c: that case.
+/// Collective. A run that was killed before its first checkpoint: from its case, at time zero.
 static bt_status start_again(const bt_comm *comm, const bt_run_options *o, double start, bt_errors *err)
 {
     char *path = bt_file_join(o->dir, "case.resolved.yml");
     bt_case c;
     bt_status status = bt_comm_agree(comm, bt_case_read(&c, path, NULL, 0, err));
     if (status == BT_OK && comm->rank == 0 && !o->quiet) printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
-    if (status == BT_OK) status = run_case(comm, &c, o, NULL, start, err);
+    if (status == BT_OK) status = run_guarded(comm, &c, o, NULL, start, err);
     bt_case_free(&c);
     free(path);
     return status;
@@ -383,7 +428,7 @@ static bt_status go_on(const bt_comm *comm, bt_snapshot *s, const bt_run_options
     const int64_t step = bt_snapshot_int(s, "world/step");
     const bool finished = status == BT_OK && step >= bt_case_steps(&c);
     if (finished && comm->rank == 0 && !o->quiet) printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, step);
-    if (status == BT_OK && !finished) status = run_case(comm, &c, o, s, start, err);
+    if (status == BT_OK && !finished) status = run_guarded(comm, &c, o, s, start, err);
     bt_case_free(&c);
     return status;
 }

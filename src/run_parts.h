@@ -9,6 +9,7 @@
 #include "bergtow/run.h"
 #include "bergtow/setup.h"
 #include "bergtow/world.h"
+#include "guard.h"
 #include "halt.h"
 #include "progress.h"
 #include "snapshot.h"
@@ -23,6 +24,9 @@ typedef struct bt_running {
     bt_record *record;
     bt_progress progress;
     bt_halt halt;
+    bt_guard guard;
+    int64_t until;           ///< the run is only made again up to this step, −1 = it is not
+    bool failed;             ///< a step has not been sound: w->step is its number
     uint64_t asked;          ///< what some rank has been asked for after the last step (halt.h)
     int64_t first_step, end_step; ///< of this call
     int64_t frames_due;      ///< frames by the interval, so far

@@ -50,6 +50,7 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
         bt_state_save_lead(&r->totals.lead, s);
         bt_state_save_stall(&r->totals.stall, s);
         bt_snapshot_add_int(s, "run/frames_due", r->frames_due);
+        bt_snapshot_add_int(s, "run/unconverged_in_a_row", r->guard.in_a_row);
         bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
         bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->halt.started);
         if (status == BT_OK) status = bt_record_save(r->record, r->frames, s, err);
@@ -99,6 +100,7 @@ bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err)
     bt_state_load_stall(&r->totals.stall, s);
     r->frames_due = bt_snapshot_int(s, "run/frames_due");
     r->frames = bt_snapshot_int(s, "record/frames");
+    r->guard.in_a_row = bt_snapshot_int(s, "run/unconverged_in_a_row");
     bt_snapshot_take(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
     r->totals.wall_time = bt_snapshot_real(s, "clock/wall_time");
     return bt_state_load(r->w, r->comm, s, err);

@@ -191,6 +191,12 @@ typedef struct bt_case {
         int64_t position_sweeps; ///< limit of the position projection
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
+    struct {                     ///< what ends a run, see src/guard.h; 0 or false = not looked at
+        double overlap;          ///< / mean floe size
+        double energy;           ///< / that at the reference speed
+        int64_t unconverged;     ///< steps in a row
+        bool escape;             ///< a floe beyond a wall
+    } guard;
     struct {
         bt_impact_conversion conversion; ///< of the impulse of a collision into a force
         double duration;         ///< T_c of a collision, s

@@ -174,7 +174,7 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, b
 /// that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no summary.
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
-/// Collective. Close and free a record that is of no use; dir is left as it is.
+/// Collective. Close and free a record that is of no use, and remove result.part.h5.
 void bt_record_abandon(bt_record *r);
 
 /// Print the end-of-run table (summary and phases) on stdout. On rank 0. Call it before the record is closed.
