@@ -9,18 +9,26 @@
 #include <unistd.h>
 
 #include "fileio.h"
+#include "seal.h"
 #include "snapshot.h"
 
 bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
 {
-    char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE), *part = NULL;
+    char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE), *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = NULL;
     if (asprintf(&part, "%s.tmp", path) < 0) abort();
     bt_status status = bt_snapshot_write(s, part, err);
-    if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) status = bt_file_rename(path, before, err);
+    if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
+        // One that has been damaged meanwhile must not take the place of a sound one.
+        bt_errors unheard = {0};
+        const bool sound = bt_seal_check(path, BT_SEAL_CHECKPOINT, NULL, &unheard) == BT_OK;
+        status = bt_file_rename(path, sound ? before : damaged, err);
+        bt_errors_free(&unheard);
+    }
     if (status == BT_OK) status = bt_file_rename(part, path, err);
     if (status != BT_OK) unlink(part);
     free(path);
     free(before);
+    free(damaged);
     free(part);
     return status;
 }

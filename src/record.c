@@ -100,7 +100,7 @@ bt_status bt_record_write_text(const bt_record *r, const char *name, const char 
 static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
 {
     bt_status status = bt_file_make_dir(r->dir, err);
-    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", "checkpoint.h5.tmp", BT_RESULT_FILE, "frames.xdmf", "checkpoint.h5", "checkpoint.previous.h5", "failure.h5", "stop"};
+    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", "checkpoint.h5.tmp", BT_RESULT_FILE, "frames.xdmf", "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5", "stop"};
     for (size_t k = 0; k < (fresh ? sizeof stale / sizeof *stale : 3) && status == BT_OK; k++) {
         char *path = bt_file_join(r->dir, stale[k]);
         status = bt_file_remove(path, err);

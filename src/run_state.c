@@ -33,8 +33,8 @@ static void save_case(const bt_case *c, bt_snapshot *s)
 {
     char *text = bt_case_resolved(c);
     bt_snapshot_add_text(s, "case/resolved", text);
-    bt_snapshot_add_text(s, "case/as_given", c->text ? c->text : "");
-    bt_snapshot_add_text(s, "case/path", c->path ? c->path : "");
+    bt_snapshot_add_text(s, "about/case_as_given", c->text ? c->text : "");
+    bt_snapshot_add_text(s, "about/case_path", c->path ? c->path : "");
     bt_snapshot_add(s, "case/current", BT_ITEM_F64, c->water.table.n, 3, c->water.table.row);
     bt_snapshot_add(s, "case/wind", BT_ITEM_F64, c->air.table.n, 3, c->air.table.row);
     free(text);
@@ -78,8 +78,8 @@ bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err)
     bt_table current = {0}, wind = {0};
     current.row = bt_snapshot_copy(s, "case/current", BT_ITEM_F64, 3, &current.n);
     wind.row = bt_snapshot_copy(s, "case/wind", BT_ITEM_F64, 3, &wind.n);
-    const char *text = bt_snapshot_text(s, "case/resolved"), *given = bt_snapshot_text(s, "case/as_given");
-    bt_status status = s->faulty ? BT_ERR_CASE : bt_case_read_kept(c, bt_snapshot_text(s, "case/path"), text, &current, &wind, err);
+    const char *text = bt_snapshot_text(s, "case/resolved"), *given = bt_snapshot_text(s, "about/case_as_given");
+    bt_status status = s->faulty ? BT_ERR_CASE : bt_case_read_kept(c, bt_snapshot_text(s, "about/case_path"), text, &current, &wind, err);
     bt_table_free(&current);
     bt_table_free(&wind);
     if (status != BT_OK) return status;

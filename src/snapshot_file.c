@@ -23,14 +23,15 @@ static hid_t memory_type(bt_item_type type)
     }
 }
 
-/// Make the group of a name the first time it comes; items of a group stand together.
-static void enter(bt_h5 *h, const char *name, char last[64])
+/// Make the group of item k where it is the first of it.
+static void enter(bt_h5 *h, const bt_snapshot *s, int k)
 {
+    const size_t length = strcspn(s->item[k].name, "/") + 1;
+    for (int j = 0; j < k; j++)
+        if (!strncmp(s->item[j].name, s->item[k].name, length)) return;
     char group[64];
-    snprintf(group, sizeof group, "/%.*s", (int)strcspn(name, "/"), name);
-    if (!strcmp(group, last)) return;
+    snprintf(group, sizeof group, "/%.*s", (int)length - 1, s->item[k].name);
     bt_h5_group(h, group);
-    memcpy(last, group, sizeof group);
 }
 
 bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err)
@@ -38,10 +39,10 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *e
     bt_h5 h;
     bt_status status = bt_h5_create_with_room(&h, path, err);
     if (status != BT_OK) return status;
-    char last[64] = "", name[160];
+    char name[160];
     for (int k = 0; k < s->n; k++) {
         const bt_item *i = &s->item[k];
-        enter(&h, i->name, last);
+        enter(&h, s, k);
         snprintf(name, sizeof name, "/%s", i->name);
         if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&h, name, i->data);
         else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
