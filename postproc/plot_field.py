@@ -7,6 +7,9 @@ from scene import COLOURS, Colouring, Scene, needs_window, view_body, view_whole
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+LETTER, TICK = 0.083, 0.48  # room that a letter of a panel's title and a number on its axis take, inches
 
 
 def frames_to_show(run, times):
@@ -20,8 +23,30 @@ def frames_to_show(run, times):
     return [shown[i] for i in range(3) if i == 0 or shown[i][1] > shown[i - 1][1]]
 
 
-def layout(n, view, turned):
-    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation).
+def body_place(run, frame):
+    """(x, y) of the towed body, m: of the series, since frames are wrapped into a periodic domain."""
+    if {"body_x", "body_y"} <= set(run.series_names) and len(run["time"]):
+        at = run.frame_times[frame]
+        sample = int(np.searchsorted(run["time"], at * (1 - 1e-9)))
+        if at > 0 and sample < len(run["time"]):
+            return run["body_x"][sample], run["body_y"][sample]
+    return run.body_pose(frame)[run.towed, :2]
+
+
+def panel_words(run, label, frame, follow):
+    """What stands over a panel: label, time, and where the body is in a view that goes with it."""
+    words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
+    if label:
+        words.insert(0, label)
+    lines = [", ".join(words)]
+    if follow:
+        x, y = body_place(run, frame)
+        lines.append(f"body at ({x:.0f}, {y:.0f}) m")
+    return lines
+
+
+def layout(n, view, turned, lines):
+    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation); lines: of a title between narrow panels.
 
     Wide views stand one below the other, others side by side; sizes follow from the view, so nothing is left blank.
     """
@@ -40,8 +65,9 @@ def layout(n, view, turned):
         return size, rects, (left + w + 0.22, foot + (length - tall) / 2, 0.16, tall), "vertical"
     h = min(6.6, 3.9 * high / wide)
     w = h * wide / high
-    width = max(left + n * w + (n - 1) * 0.25 + 0.3, 7.0)
+    width = max(left + n * w + (n - 1) * 0.45 + 0.3, 7.0)
     foot += 0.78
+    head += 0.2 * (lines - 1)
     size = (width, head + h + foot)
     spare = (width - left - 0.3 - n * w) / max(n - 1, 1)
     rects = [(left + i * (w + min(spare, 1.0)), foot, w, h) for i in range(n)]
@@ -57,7 +83,8 @@ def draw(run, kind="speed", times=(), window="auto"):
     if follow and run.towed is None:
         raise RunError(run.result, "has no towed body", "use --window whole")
     view = view_body(run) if follow else view_whole(run)
-    size, rects, cax, orientation = layout(len(shown), view, run.geographic)
+    titles = [panel_words(run, label, frame, follow) for label, frame in shown]
+    size, rects, cax, orientation = layout(len(shown), view, run.geographic, max(map(len, titles)))
     figure = plt.figure(figsize=size)
     colouring = Colouring(run, kind, [frame for _, frame in shown])
 
@@ -65,17 +92,14 @@ def draw(run, kind="speed", times=(), window="auto"):
         return rect[0] / size[0], rect[1] / size[1], rect[2] / size[0], rect[3] / size[1]
 
     stacked = orientation == "vertical"
-    for i, ((label, frame), rect) in enumerate(zip(shown, rects)):
+    for i, ((_, frame), rect) in enumerate(zip(shown, rects)):
         axes = figure.add_axes(inches(rect))
         scene = Scene(axes, run, colouring, view, follow)
         scene.show(frame)
-        words = [f"t = {style.short(run.frame_times[frame])} s" if run.frame_times[frame] else "t = 0"]
-        if label:
-            words.insert(0, label)
-        if follow:
-            x, y = run.body_pose(frame)[run.towed, :2]
-            words.append(f"body at x = {x:.1f} m, y = {y:.1f} m")
-        axes.set_title(", ".join(words))
+        one_line = ", ".join(titles[i])
+        axes.set_title(one_line if LETTER * len(one_line) < rect[2] else "\n".join(titles[i]))
+        if not stacked:
+            axes.xaxis.set_major_locator(MaxNLocator(max(2, min(5, int(rect[2] / TICK))), steps=(1, 2, 5, 10)))
         if stacked and i < len(shown) - 1:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)

@@ -123,7 +123,33 @@ def view_body(run):
     along, across = (0, 1) if along_x else (1, 0)
     reach[along] = min(max(reach[along], 3.4 * reach[across]), (x1 - x0, y1 - y0)[along])
     shift = -0.15 * heading * reach
-    return (shift[0] - reach[0] / 2, shift[0] + reach[0] / 2, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2)
+    left, right = shift[0] - reach[0] / 2, shift[0] + reach[0] / 2
+    if run.case.get("domain.ends") == "moving":  # what lies beyond it is the ice of its other end
+        ahead = run.value("domain.ahead", (x1 - x0) / 2)
+        behind = x1 - x0 - ahead
+        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right, ahead if heading[0] >= 0 else behind)
+    return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
+
+
+def tow_line(run, frame, position):
+    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where all have broken.
+
+    None without a line.
+    """
+    at = run.frame_times[frame]
+    if run.case.get("tow.mode") not in ("line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+        return None
+    sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
+    if sample >= len(run["time"]):
+        return None
+    ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
+    end, points = position + ahead, []
+    broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
+    for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
+        if broken.get(branch + 1, np.inf) > at:
+            hull = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
+            points += [hull[0]] if points else [hull[0], end]
+    return np.array(points or [end])
 
 
 class Scene:
@@ -138,6 +164,7 @@ class Scene:
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
         x0, x1, y0, y1 = run.box
         self._turn = run.geographic
+        self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2  # what lies within half a period of it is shown
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
@@ -213,7 +240,7 @@ class Scene:
         origin = np.zeros(2)
         if self.follow:
             origin, centre = position, position
-        outlines, index = run.polygon_array(frame, centre)
+        outlines, index = run.polygon_array(frame, position + self._middle if self.follow else None)
         self._floes.set_verts(self._flat(outlines - origin))
         self._floes.set_array(self.colouring.values(frame)[index])
         bodies = run.body_polygons(frame, centre)
@@ -255,7 +282,9 @@ class Scene:
         step = max(1, int(done.sum()) // 400)
         way = np.stack([run["body_x"][done], run["body_y"][done]], axis=1)[::-1][::step][::-1]
         if self.follow:
-            way = way + (origin - run.body_pose(frame)[run.towed, :2])  # by whole periods
+            period = np.array([p if p > 0 else np.inf for p in run.period])
+            last = way[-1] if len(way) else origin
+            way = way + np.where(np.isfinite(period), np.round((origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
         elif len(way):
             wrapped = run.wrap(way)
             jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
@@ -265,20 +294,10 @@ class Scene:
 
     def _show_line(self, frame, position):
         """The tow line from the hull to its towing end, a square; two branches meet there; none that has broken."""
-        run, at = self.run, self.run.frame_times[frame]
-        if run.case.get("tow.mode") not in ("line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
-            return
-        sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
-        if sample >= len(run["time"]):
-            return
-        ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
-        end, points = position + ahead, []
-        broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
-        for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
-            if broken.get(branch + 1, np.inf) > at:
-                hull = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
-                points += [hull[0]] if points else [hull[0], end]
-        self._line.set_data(*self._flat(np.array(points or [end])).T)
+        points = tow_line(self.run, frame, position)
+        if points is not None:
+            self._line.set_markevery([min(1, len(points) - 1)])  # the end alone where all branches have broken
+            self._line.set_data(*self._flat(points).T)
 
     def _show_arrow(self, position, outline):
         """An arrow ahead of the body, along the tow."""

@@ -95,7 +95,7 @@ def conditions(run):
             words.append(f"{run.value('ice.thickness'):g} m thick")
     mode, speed = run.case.get("tow.mode", ""), run.value("tow.speed")
     if run.towed is not None and mode != "none" and np.isfinite(speed):
-        words.append(f"towed at {speed:g} m/s" + (" on a line" if mode == "line" else ""))
+        words.append(f"towed at {speed:.3g} m/s" + (" on a line" if mode == "line" else ""))
     if run.summary.get("stopped"):
         words.append("stopped early")
     return ", ".join(words)
@@ -113,6 +113,8 @@ def title(run):
 
 def headline(figure, run, subject, left=0.02):
     """Title and conditions at the head of a figure, at fixed distances from its top."""
-    height = figure.get_size_inches()[1]
-    figure.text(left, 1 - 0.14 / height, f"{title(run)}: {subject}", va="top", fontsize=13.5, fontweight="bold")
+    width, height = figure.get_size_inches()
+    words = f"{title(run)}: {subject}"
+    size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))  # a letter is on average less than 0.6 of the font size wide: nothing is cut off
+    figure.text(left, 1 - 0.14 / height, words, va="top", fontsize=size, fontweight="bold")
     figure.text(left, 1 - 0.42 / height, conditions(run), va="top", fontsize=10.5, color=FAINT)

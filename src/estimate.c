@@ -66,7 +66,7 @@ static bt_estimate rafting(const bt_estimate_input *in)
 static bt_estimate momentum(const bt_estimate_input *in)
 {
     const double a = in->concentration, phi = in->phi_j;
-    if (a >= phi) return just(NAN, false, "A >= phi: the ice cannot be swept closer together");
+    if (a > phi - BT_EST_SWEPT) return just(NAN, false, "A >= phi: the ice cannot be swept closer together");
     return just(in->ice_density * in->thickness * in->width * in->along * in->along * a * phi / (phi - a), true,
                 "A < phi: a channel as wide as the body; ice that flows round it resists less");
 }

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "fileio.h"
@@ -65,6 +66,9 @@ static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_er
     cache.flash_incr_mode = H5C_flash_incr__off;
     cache.decr_mode = H5C_decr__off;
     set = set && H5Pset_mdc_config(access, &cache) >= 0;
+    // A link under this name is replaced, as a rename would, and not followed.
+    struct stat st;
+    if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) unlink(path);
     const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
     set = set && H5Pset_userblock(creation, room_in_front) >= 0;
     if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, creation, access);

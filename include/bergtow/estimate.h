@@ -32,6 +32,7 @@ typedef enum {
 #define BT_EST_DENSE 0.9       ///< A from which ice may capture a berg
 #define BT_EST_STRENGTH 20.0   ///< exponent of the strength [Hibler 1979]
 #define BT_EST_COMPACT 0.65    ///< A below which ice has room to give way and is neither pressed together nor rafted, assumed
+#define BT_EST_SWEPT 1e-9      ///< φ − A up to which the ice counts as swept together: a field made for 0.9 may have 0.9 − 1e-16
 #define BT_EST_DILUTE_MOST 0.25 ///< A above which floes hit each other before the body has passed, assumed
 
 /// What the estimates depend on, at the scale of the case.

@@ -364,6 +364,42 @@ def test_field_panels_show_first_middle_and_last_frame(tmp_path):
             assert len(bodies) == 1 and np.allclose(bodies[0].get_xy()[:4], HULL + [x, 0.0], rtol=0, atol=1e-12)
 
 
+def test_a_moving_window_is_shown_about_the_body(tmp_path):
+    """60 m northward through a window of 40 m whose frames hold wrapped places: title, track and view say where the body is."""
+    path = [(15.0 * i, 0.0) for i in range(5)]
+    folder = make_run(tmp_path / "run", frame="geographic", ends="moving", path=path)
+    with h5py.File(folder / "result.h5", "r+") as f:
+        f["frames/body_pose"][:, 0, 0] = (np.array(path)[:, 0] + 20) % 40 - 20
+        del f["case"]
+        f["case"] = CASE.format(frame="geographic", ends="moving\n  ahead: 25 m", mode="speed").replace("90 deg", "0 deg")
+    with Run(folder) as run:
+        figure = plot_field.draw(run, window="body")
+        axes = figure.axes[:3]
+        assert [a.get_title(loc="left").split("(")[1] for a in axes] == ["0, 0) m", "30, 0) m", "60, 0) m"]
+        for a in axes:
+            low, high = a.get_ylim()
+            assert low >= -15 and high <= 25, "beyond the window lies the ice of its other end"
+        track = [line for line in axes[2].lines if line.get_marker() != "s"][0].get_xydata()
+        assert np.abs(track[-1]).max() < 1 and track[:, 1].max() < 1, "the track ends at the body and lies behind it"
+
+
+def test_titles_of_narrow_panels_stand_apart(tmp_path):
+    folder = make_run(tmp_path / "run", path=[(1000.0 + i, 0.0) for i in range(5)])
+    with h5py.File(folder / "result.h5", "r+") as f:
+        del f["case"]
+        f["case"] = CASE.format(frame="geographic", ends="open", mode="speed").replace("length: 40 m", "length: 4 km").replace("90 deg", "0 deg")
+    with Run(folder) as run:
+        run.summary["title"] = "A tow with a title that is a good deal longer than the figure is wide at full size"
+        figure = plot_field.draw(run, window="body")
+        figure.canvas.draw()
+        axes = figure.axes[:3]
+        ends = [a._left_title.get_window_extent() for a in axes]
+        assert all(a.x1 < b.x0 for a, b in zip(ends, ends[1:])) and ends[-1].x1 <= figure.bbox.width
+        assert max(t.get_window_extent().x1 for t in figure.texts) <= figure.bbox.width
+        ticks = [[t.get_window_extent() for t in a.get_xticklabels() if t.get_text()] for a in axes]
+        assert all(p.x1 < q.x0 for t in ticks for p, q in zip(t, t[1:]))
+
+
 def test_tow_line_goes_from_the_hull_to_the_carriage(tmp_path):
     for mode, expected in (("line", [[[10.0, 5.0], [15.0, 3.0]]]), ("speed", [])):
         with Run(make_run(tmp_path / mode, path=((8.0, 5.0),) * 3, mode=mode)) as run:
