@@ -296,11 +296,25 @@ static void keep_field(run *r, bt_field *f, const bt_lead_stats *lead, int threa
     *f = (bt_field){0};
 }
 
+/// Collective. The folder is this call's alone. *lock: on rank 0.
+static bt_status take_folder(const bt_comm *comm, const char *dir, int *lock, bt_errors *err)
+{
+    bt_status status = BT_OK;
+    *lock = -1;
+    if (comm->rank == 0) {
+        status = bt_file_make_dir(dir, err);
+        if (status == BT_OK && (*lock = bt_lock_take(dir, err)) < 0) status = BT_ERR_IO;
+    }
+    return bt_comm_agree(comm, status);
+}
+
 /// How a case is run.
 typedef struct {
     bt_snapshot *kept;   ///< go on from there, or NULL
     double start;        ///< bt_clock when the call began
     int64_t until;       ///< only up to this step, for failure.h5; −1 = as the options say
+    bool held;           ///< the folder is held already
+    int lock;            ///< by this, on rank 0
     int64_t failed;      ///< out: the step that was not sound, −1 = none
 } manner;
 
@@ -329,6 +343,9 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
             bt_tiles_begin(r.w);
         }
         r.first_step = r.w->step;
+        // Only now: a case that is refused leaves nothing behind.
+        if (status == BT_OK && !m->held) status = take_folder(comm, o->dir, &m->lock, err);
+        m->held = true;
         if (status == BT_OK) status = run_world(&r, kept, err);
         if (r.failed) m->failed = r.w->step;
     }
@@ -337,18 +354,6 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     bt_roster_free(&r.roster);
     bt_world_free(r.w);
     return status;
-}
-
-/// Collective. The folder is this call's alone. *lock: on rank 0.
-static bt_status take_folder(const bt_comm *comm, const char *dir, int *lock, bt_errors *err)
-{
-    bt_status status = BT_OK;
-    *lock = -1;
-    if (comm->rank == 0) {
-        status = bt_file_make_dir(dir, err);
-        if (status == BT_OK && (*lock = bt_lock_take(dir, err)) < 0) status = BT_ERR_IO;
-    }
-    return bt_comm_agree(comm, status);
 }
 
 /// Collective. A step was not sound: the state before it, made again from the last checkpoint (or the one of o->from, or the start), goes to failure.h5.
@@ -366,7 +371,7 @@ static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
     bt_comm_bcast(comm, &from, sizeof from);
     if (from) bt_snapshot_share(comm, &s);
     s.err = &unheard;
-    manner m = {.kept = from ? &s : NULL, .start = bt_clock(), .until = step - 1};
+    manner m = {.kept = from ? &s : NULL, .start = bt_clock(), .until = step - 1, .held = true};
     const bt_status status = run_case(comm, c, &quiet, &m, &unheard);
     if (status == BT_OK)
         bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir, BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
@@ -377,12 +382,13 @@ static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
     free(said);
 }
 
-/// Collective. A run, and what is kept of it when it fails.
-static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept, double start, bt_errors *err)
+/// Collective. A run, and what is kept of it when it fails. held: the caller has locked the folder.
+static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept, bool held, double start, bt_errors *err)
 {
-    manner m = {.kept = kept, .start = start, .until = -1};
+    manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     const bt_status status = run_case(comm, c, o, &m, err);
     if (m.failed >= 0) keep_failure(comm, c, o, m.failed, err);
+    bt_lock_drop(o->dir, m.lock);
     return status;
 }
 
@@ -392,12 +398,7 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
         bt_errors_add(err, "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the step is the same)", comm->size);
         return BT_ERR_USAGE;
     }
-    const double start = bt_clock();
-    int lock;
-    bt_status status = take_folder(comm, o->dir, &lock, err);
-    if (status == BT_OK) status = run_guarded(comm, c, o, NULL, start, err);
-    bt_lock_drop(o->dir, lock);
-    return status;
+    return run_guarded(comm, c, o, NULL, false, bt_clock(), err);
 }
 
 // --- going on --------------------------------------------------------------------------------------------------------
@@ -409,7 +410,7 @@ static bt_status start_again(const bt_comm *comm, const bt_run_options *o, doubl
     bt_case c;
     bt_status status = bt_comm_agree(comm, bt_case_read(&c, path, NULL, 0, err));
     if (status == BT_OK && comm->rank == 0 && !o->quiet) printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
-    if (status == BT_OK) status = run_guarded(comm, &c, o, NULL, start, err);
+    if (status == BT_OK) status = run_guarded(comm, &c, o, NULL, true, start, err);
     bt_case_free(&c);
     free(path);
     return status;
@@ -432,7 +433,7 @@ static bt_status go_on(const bt_comm *comm, bt_snapshot *s, const bt_run_options
     const int64_t step = bt_snapshot_int(s, "world/step");
     const bool finished = status == BT_OK && step >= bt_case_steps(&c);
     if (finished && comm->rank == 0 && !o->quiet) printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, step);
-    if (status == BT_OK && !finished) status = run_guarded(comm, &c, o, s, start, err);
+    if (status == BT_OK && !finished) status = run_guarded(comm, &c, o, s, true, start, err);
     bt_case_free(&c);
     return status;
 }

@@ -9,7 +9,7 @@ import random
 import pytest
 
 from harness import SIGNAL, Run, changed
-from resuming import CASE, assert_same_result, check_readable, done, killed_after, started, uninterrupted
+from resuming import assert_same_result, check_readable, done, killed_after, started, uninterrupted
 from test_window import LINE as WINDOW
 
 
