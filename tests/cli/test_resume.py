@@ -122,7 +122,7 @@ def test_a_finished_run_says_so(whole):
 def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     path = write_case(tmp_path, LONG)
     p = begun(tmp_path, "out")
-    time.sleep(0.2)
+    p.send_signal(signal.SIGSTOP) # it holds the folder, and does not end meanwhile
     again = call("resume", "out", cwd=tmp_path)
     assert again.returncode == IO and f"another run is at work in this folder (process {p.pid} on" in again.stderr
     again = call("run", path, "-o", "out", "--force", cwd=tmp_path)
