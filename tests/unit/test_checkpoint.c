@@ -3,7 +3,8 @@
 //
 // Each case runs once and keeps its state and its sample after every step. Then a new world is made from the state after each step n, does
 // LATER steps, and must have the same state (all of it, not only poses) and the same sample after each of them. What turns this red (tried): a member that
-// the tables leave out: `stirred`, labels of the floes, the tow line's impulse, home.copy, open collisions, features of contacts.
+// the tables leave out: labels of the floes, whether they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow
+// line's impulse, what is broken, the vessel's way, home.copy, open collisions.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -363,8 +364,8 @@ static void refused(const char *path, size_t at)
     bt_errors_free(&err);
 }
 
-/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the seal (tried) most flips in numbers pass, and
-/// some in the metadata end the program.
+/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the comparison with the seal (tried) the first
+/// flip passes.
 static void damage_is_refused(void **state)
 {
     (void)state;
