@@ -195,7 +195,6 @@ static void total_up(run *r)
     r->totals.state_hash = bt_world_hash(r->w);
     r->totals.window = r->w->window;
     note_division(r);
-    r->totals.wall_time += bt_clock() - r->halt.started;
 }
 
 /// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order. The result takes its place before the checkpoint, which
@@ -205,6 +204,7 @@ static bt_status finish(run *r, bt_errors *err)
     char stopped[96] = "";
     bt_snapshot s = {0};
     bt_status status = bt_running_save(r, &s, err); // before what is still open is closed
+    r->totals.wall_time += bt_clock() - r->began;
     total_up(r);
     if (bt_halt_stops(r->asked) && r->w->step < r->end_step) {
         bt_halt_describe(&r->halt, r->asked, r->w->step, stopped);
@@ -233,6 +233,7 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     bt_progress_start(&r->progress, r->w->step);
     bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size, r->reference_speed);
     bt_halt_begin(&r->halt);
+    r->began = bt_clock();
     if (!kept) {
         r->frames = r->frames_due = 1;
         status = record_frame(r, err);
@@ -375,6 +376,7 @@ static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
     const bt_status status = run_case(comm, c, &quiet, &m, &unheard);
     if (status == BT_OK)
         bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir, BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
+    else if (status == BT_ERR_SIGNAL) bt_errors_add(err, "the state before that step was not made again: stopped meanwhile");
     else for (size_t k = 0; k < unheard.n; k++) bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
     bt_errors_free(&unheard);
     bt_snapshot_free(&s);

@@ -29,6 +29,7 @@ typedef struct bt_running {
     bool failed;             ///< a step has not been sound: w->step is its number
     uint64_t asked;          ///< what some rank has been asked for after the last step (halt.h)
     int64_t first_step, end_step; ///< of this call
+    double began;            ///< bt_clock when its steps began
     int64_t frames_due;      ///< frames by the interval, so far
     int64_t frames;          ///< frames taken, but for one that the end of --steps has added
     double reference_speed;

@@ -52,7 +52,7 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
         bt_snapshot_add_int(s, "run/frames_due", r->frames_due);
         bt_snapshot_add_int(s, "run/unconverged_in_a_row", r->guard.in_a_row);
         bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
-        bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->halt.started);
+        bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->began);
         if (status == BT_OK) status = bt_record_save(r->record, r->frames, s, err);
     }
     return bt_comm_agree(r->comm, status);

@@ -3,7 +3,8 @@
 //
 // The promise. A run that is stopped, or killed, at any moment and taken up again ends with the state, the series, the frames, the events, the
 // collisions and the summary of the run that was never stopped, on any number of ranks and threads. Only wall times, and the counts of
-// what the division among ranks has cost, are those of the pieces.
+// what the division among ranks has cost, are those of the pieces. A run that is killed before its first checkpoint starts again from
+// case.resolved.yml, which is then also its case as given.
 //
 // The file. DIR/checkpoint.h5 is a sealed HDF5 file (src/seal.h) of named arrays (src/snapshot.h); rank 0 gathers and writes it. It is written
 // as checkpoint.h5.tmp, brought to the disk, the one before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is
