@@ -42,7 +42,7 @@ typedef struct {
     bt_errors *err;
 } ensemble;
 
-// A run has handlers of its own, which end it after a step; these are for the time between runs.
+// A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
 static volatile sig_atomic_t told;
 static void on_signal(int number) { told = number; }
 static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
@@ -93,13 +93,15 @@ static bool take_lock(int fd, bool wait)
     return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
 }
 
-/// Starts of a member that had no end: one byte each.
+/// Starts of a member that had no end, one byte each, since it last came on: one that has written a checkpoint since is no hopeless one.
 static int count_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts");
-    struct stat st;
-    const int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
+    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
+    struct stat st, last;
+    int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
+    if (n > 0 && stat(checkpoint, &last) == 0 && last.st_mtime > st.st_mtime) n = 0;
     free(path);
+    free(checkpoint);
     return n;
 }
 
@@ -301,6 +303,7 @@ static bt_status run_member(ensemble *e, entry *x)
         status = BT_ERR_NUMERIC;
     }
     if (first) {
+        if (x->attempts == 0) forget_attempts(x->folder);
         if (x->attempts < BT_MAX_ATTEMPTS) note_attempt(x->folder);
         journal(e, "start", &x->m, 0, 0);
     }
@@ -309,7 +312,7 @@ static bt_status run_member(ensemble *e, entry *x)
         bt_case c;
         status = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &why);
         status = bt_comm_agree(e->group, status);
-        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .command_line = e->o->command_line};
+        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
     }

@@ -34,6 +34,7 @@ void bt_halt_begin(bt_halt *h)
 
 void bt_halt_end(bt_halt *h)
 {
+    if (h->told && stop_signal) *h->told = stop_signal;
     for (int k = 0; k < BT_N_CAUGHT; k++) sigaction(caught[k].number, &h->before[k], NULL);
 }
 
@@ -41,6 +42,7 @@ uint64_t bt_halt_look(bt_halt *h, int64_t step)
 {
     uint64_t bits = 0;
     if (stop_signal) bits |= UINT64_C(1) << stop_signal;
+    else if (h->told && *h->told) bits |= UINT64_C(1) << *h->told;
     if (save_signal) {
         save_signal = 0;
         bits |= save;

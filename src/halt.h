@@ -23,6 +23,7 @@ typedef struct bt_halt {
     double wall, max_wall;  ///< s between checkpoints, until the stop; 0 = none
     double started;         ///< bt_clock when the call began
     const char *dir;
+    volatile sig_atomic_t *told; ///< of the caller (bergtow/run.h), or NULL
     bool first;             ///< this is rank 0
     // state
     double last, looked;    ///< bt_clock: of the last checkpoint, of the last look for the stop file

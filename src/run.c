@@ -326,7 +326,7 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     const int threads = choose_threads(comm, c, o);
     start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
-    r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .first = comm->rank == 0, .started = m->start};
+    r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .told = o->told, .first = comm->rank == 0, .started = m->start};
     r.until = m->until;
     m->failed = -1;
     bt_field f;

@@ -3,6 +3,8 @@
 #ifndef BERGTOW_RUN_H
 #define BERGTOW_RUN_H
 
+#include <signal.h>
+
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
@@ -16,6 +18,7 @@ typedef struct bt_run_options {
     int64_t dump_step;        ///< write the contact problem of this step, −1 = none
     const char *dump_path;    ///< to this FCLIB file
     const char *command_line; ///< for the provenance
+    volatile sig_atomic_t *told; ///< a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for; or NULL
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 
