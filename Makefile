@@ -29,7 +29,7 @@ OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow -fno-san
 OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
 # Every loop that may run in parallel does: BT_VALIDATE. gcc's libgomp is not known to a thread sanitizer, hence clang.
 OPT_tsan    := -O1 -g -fsanitize=thread -DBT_VALIDATE -Wno-pass-failed
-OPT_coverage := -O0 -g --coverage -fprofile-abs-path -fprofile-update=atomic
+OPT_coverage := -O1 -g --coverage -fprofile-abs-path -fprofile-update=atomic
 ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
@@ -148,7 +148,9 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
 	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
+	$(PYTHON) postproc/report.py $(DEMO)
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
 
 RUN ?=
 report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
@@ -208,7 +210,7 @@ coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/t
 
 # make fuzz TARGET=case TIME=600
 TIME ?= 60
-fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, study, table, outlines or field, TIME in seconds
+fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, values, study, table, outlines or field, TIME in seconds
 	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
 	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 

@@ -22,7 +22,7 @@ from plot_force import running_mean, smoothing
 from scene import Colouring, body_size, needs_window, tow_heading, tow_line, view_body
 
 LIMIT = 40e6           #: bytes of the replay within the page, unless told otherwise
-RAW_LIMIT = 240e6      #: bytes unpacked, which a browser has to hold
+RAW_LIMIT = 120e6       #: bytes unpacked, which a browser has to hold, and four times as much this program
 LEAST_FRAMES = 40      #: fewer are not worth a replay: rather are floes left out
 BUCKETS = 1500         #: points of a force curve
 TRACK = 1000           #: points of the body's track

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import yaml
 
 #: kind: what the label says
-KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "default": "default"}
+KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default"}
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def annotated(text):
         if path[:1] == ["floes"]:
             return
         rest = text[node.end_mark.index:].split("\n", 1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
-        comment = re.match(r"[\s,}\]]*\s#\s*(.*)", rest)
+        comment = re.match(r"\s+#\s*(.*)", rest)
         value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(text[node.start_mark.index:node.end_mark.index].split())
         out[".".join(path)] = (value, comment[1].strip() if comment else "")
 
@@ -60,6 +60,22 @@ def set_by_hand(command_line):
             for word, after in zip(words, words[1:] + [""]) if word == "--set" or word.startswith("--set=")}
 
 
+def of_study(run):
+    """{key: what the study says beside it} of the keys that the study of a member sets or varies; {} for a run of its own."""
+    folder = run.path.resolve().parent
+    try:
+        text = (folder.parent / "study.yml").read_text(encoding="utf-8") if folder.name == "members" else ""
+        study = yaml.safe_load(text)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        return {}
+    if not isinstance(study, dict):
+        return {}
+    said, groups = annotated(text), {name: study[name] for name in ("set", "parameters") if isinstance(study.get(name), dict)}
+    variants = study.get("variants")
+    groups |= {f"variants.{name}": keys for name, keys in (variants if isinstance(variants, dict) else {}).items() if isinstance(keys, dict)}
+    return {"ice.seed": ""} | {str(key): said.get(f"{name}.{key}", ("", ""))[1] for name, keys in groups.items() for key in keys}
+
+
 def classify(words):
     """Kind of a comment on a value: assumed, memory, source or, for none, None."""
     low = words.lower()
@@ -76,15 +92,18 @@ def of_default(meaning):
     source = re.search(r"\[([^\]]*[A-Za-z][^\]]*)\]\s*$", meaning)
     if kind in ("assumed", "memory"):
         return kind, f"default, {KINDS[kind]}" + (f" ({source[1]})" if source else "")
-    return ("source", f"default: {source[1]}") if source else ("default", "default")
+    return ("source", f"default: {source[1]}") if source else ("default", "")
 
 
 def values(run):
     """[Value] of every key of the resolved case, in its order."""
-    given, by_hand, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), []
+    given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), of_study(run), []
     for key, (value, meaning) in annotated(run.resolved_text).items():
         if key in by_hand:
             kind, origin = "set", "set on the command line; no source stated"
+        elif key in study:
+            kind = classify(study[key]) or "study"
+            origin = "set by the study" + (f": {study[key]}" if study[key] else "; no source stated")
         elif key in given:
             kind = classify(given[key][1]) or "given"
             origin = given[key][1] or "given in the case file; no source stated"

@@ -4,11 +4,13 @@
 The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the same.
 """
 import argparse
+from dataclasses import replace
 from itertools import groupby
 
 import ensemble
 import ensemble_text
 import plot_ensemble
+import report_case
 import report_run
 import stat_fit
 from bergtow_read import Run, RunError
@@ -84,6 +86,19 @@ def members(e, s):
     return out
 
 
+def key_values(e):
+    """{heading: values} of the first member that can be read, with their origin; what differs between members is called varied."""
+    for m in np.flatnonzero(e.status == FINISHED):
+        try:
+            with Run(e.folder(m)) as run:
+                found = report_run.key_values(run, report_case.values(run))
+        except RunError:
+            continue
+        varied = {key for key, values in e.parameters.items() if len(set(values.tolist())) > 1} | {"ice.seed"}
+        return {heading: [replace(v, value="varied") if v.key in varied else v for v in some] for heading, some in found.items()}
+    return {}
+
+
 def provenance(e):
     """(rows of the first member, sentence on members of other builds or None)."""
     rows, builds = [], set()
@@ -118,4 +133,4 @@ def context(folder):
     title = report_run.breakable(e.title)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     return {"title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []), "figures": figures(s), "sections": found, "pictures": pictures(e, options),
-            "members": members(e, s), "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "study": e.study, "provenance": rows}
+            "members": members(e, s), "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "key_values": key_values(e), "kinds": report_case.KINDS, "study": e.study, "provenance": rows}

@@ -19,7 +19,7 @@ import numpy as np
 #: keys that the page shows in the open; all others are in the folded table
 KEY_VALUES = {
     "Ice": ["ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.density", "ice.friction", "ice.restitution",
-            "ice.crushing.pressure", "ice.field", "ice.outlines", "ice.seed", "lead.mode", "lead.width"],
+            "ice.crushing.pressure", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
     "Towed body": ["body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass", "body.friction", "body.drag.water_form"],
     "Tow": ["tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter", "tow.line_length", "tow.line_stiffness",
             "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
@@ -27,6 +27,7 @@ KEY_VALUES = {
                                "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"],
     "Numerical": ["run.dt", "run.duration", "output.window_start", "solver.tolerance", "solver.max_sweeps", "impact.conversion", "impact.duration", "impact.pressure"],
 }
+UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
 #: keys of the tow that mean nothing in some modes
 ONLY = {"tow.line": ("line", "thrust"), "tow.vessel": ("thrust",), "tow.speed": ("speed", "line", "thrust"), "tow.ramp": ("speed", "line", "thrust")}
 
@@ -45,11 +46,18 @@ def with_error(mean, se):
         return "–", "–"
     if not np.isfinite(se) or se <= 0:
         return force(mean), "–"
+    if se < 1e-6 * abs(mean):
+        return force(mean), "no scatter"
     factor, unit = style.scale([mean], "N")
     error = style.short(se / factor, 2)
     digits = len(error.partition(".")[2])
     low, high = ((mean + k * 1.96 * se) / factor for k in (-1, 1))
     return f"{mean / factor:.{digits}f} ± {error} {unit}", f"{low:.{digits}f} to {high:.{digits}f} {unit}"
+
+
+def share(value):
+    """A relative residual in words."""
+    return f"{value:.1e}" if np.isfinite(value) else "–"
 
 
 def picture(name, title, draw):
@@ -159,11 +167,11 @@ def quality(run):
         rows += [("steady window", f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples", rule),
                  ("independent samples in it", style.short(n("window.n_independent")), f"correlation time {style.short(n('window.correlation_time_s'))} s")]
     if run.towed is not None:
-        rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)", f"{n('budget.closure_relative'):.1e}", "relative to the largest of them"),
-                 ("balance of the ice", f"{n('budget.ice_momentum_closure_relative'):.1e}", "mean resistance from the momentum of all other bodies, relative")]
-    rows += [("momentum residual", f"{n('momentum_residual'):.1e}", "largest of all steps, relative to what a step exchanges"),
+        rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)", share(n("budget.closure_relative")), "relative to the largest of them"),
+                 ("balance of the ice", share(n("budget.ice_momentum_closure_relative")), "mean resistance from the momentum of all other bodies, relative")]
+    rows += [("momentum residual", share(n("momentum_residual")), "largest of all steps, relative to what a step exchanges"),
              ("steps not converged", f"{n('unconverged_steps'):.0f} of {n('n_steps'):.0f}", f"largest residual {n('max_residual_m_s'):.2g} m/s, tolerance {n('tolerance_m_s'):.2g} m/s"),
-             ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm", f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size"),
+             ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm", f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size" if np.isfinite(n("max_overlap_relative")) else ""),
              ("contact work", f"{style.short(n('contact_work_j'))} J", f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
     if n("crushing_steps", 0):
         rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J", f"in {n('crushing_steps'):.0f} steps, deepest {style.short(n('max_crushed_depth_m'))} m"))
@@ -189,13 +197,19 @@ def provenance(run):
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
 
 
+def stamp(run):
+    """One line that tells this run from every other."""
+    a = run.attributes
+    return f"bergtow {a.get('version', '')} (revision {a.get('revision', 'unknown')}), started {a.get('start_time', 'at an unknown time')}, state hash {run.summary.get('state_hash', 'unknown')}"
+
+
 def key_values(run, values):
     """{heading: [Value]}: the values that tell one run from another."""
     by_key, mode, out = {v.key: v for v in values}, run.case.get("tow.mode", ""), {}
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
-        out[heading] = [by_key[k] for k in keys if k in by_key and by_key[k].value not in ("", "none")
+        out[heading] = [by_key[k] for k in keys if k in by_key and by_key[k].value not in ("", "none", UNSET.get(k))
                         and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())]
     return out
 
@@ -211,7 +225,7 @@ def context(run, limit=LIMIT, compress=True):
     warnings = run.summary.get("warnings")
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
-    return {"title": breakable(run.summary.get("title") or run.path.resolve().name), "conditions": style.conditions(run),
+    return {"title": breakable(run.summary.get("title") or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
             "warnings": [str(w) for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"], "figures": figures(run), "forces": forces(run),
             "estimates": estimates(run), "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run), "events": happened,
             "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values), "values": values, "kinds": report_case.KINDS,

@@ -177,7 +177,10 @@ def growth(shape, times):
 def rate_share(alone, by_field, level, best):
     """Variance of the level with the error of the rate over that without it, by the likelihood."""
     def variance(f, g, theta):
-        information = stat_profile.gradient(lambda t: stat_profile.gradient(f, t), theta)
+        with np.errstate(invalid="ignore"):
+            information = stat_profile.gradient(lambda t: stat_profile.gradient(f, t), theta)
+        if not np.isfinite(information).all():
+            return np.nan
         try:
             return float(g @ np.linalg.solve(0.5 * (information + information.T), g))
         except np.linalg.LinAlgError:

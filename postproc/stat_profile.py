@@ -14,6 +14,7 @@ from scipy import optimize, stats
 LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: c = 1, and the quantile of the normal distribution
 STEPS = 60        # doublings of the distance before an interval counts as open
 BISECTIONS = 14
+SIMPLEX = 0.1     # size of the first simplex: logarithms of scales and shapes are of the order of one
 
 
 def gradient(f, theta, step=1e-4):
@@ -29,12 +30,13 @@ def gradient(f, theta, step=1e-4):
 def dispersion(minus_log_likelihoods, quantity, theta):
     """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
     theta = np.asarray(theta, dtype=float)
-    scores = gradient(minus_log_likelihoods, theta)
+    with np.errstate(invalid="ignore"):  # at the edge of what is possible there is no gradient: not finite, and found out below
+        scores = gradient(minus_log_likelihoods, theta)
+        information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)
+        g = gradient(quantity, theta)
     fields = scores.shape[1]
-    if fields < LEAST_FIELDS:
+    if fields < LEAST_FIELDS or not np.isfinite(information).all():
         return 1.0
-    information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)
-    g = gradient(quantity, theta)
     try:
         a = np.linalg.solve(0.5 * (information + information.T), g)
     except np.linalg.LinAlgError:
@@ -56,8 +58,10 @@ def interval(minus_log_likelihood, best, rest, fall, first):
     """
     least = minus_log_likelihood(best, rest)
     def rise(q, start):
-        # impossible values are very unlikely ones: the search takes differences
-        found = optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400})
+        # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values are very unlikely ones: the search takes differences.
+        simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
+        found = optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
+                                  options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400, "initial_simplex": simplex})
         return found.fun - least - fall, found.x
     ends = []
     for sign in (-1, 1):

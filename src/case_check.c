@@ -385,18 +385,11 @@ static void check_floe(const check *k, int index)
     if (f->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", c->path ? c->path : "case", f->line, index);
     else snprintf(where, sizeof where, "%.180s: floes[%d]", c->path ? c->path : "case", index);
     bool polygon = f->shape == BT_BODY_POLYGON;
-    if (polygon && !f->n_vertices) {
-        bt_errors_add(k->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
-        return;
-    }
-    if (!polygon && f->n_vertices) {
-        bt_errors_add(k->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices", where);
-        return;
-    }
-    if (!polygon && !(f->length > 0)) {
-        bt_errors_add(k->err, "%s: has no length; give it, as in 1 m", where);
-        return;
-    }
+    const size_t before = k->err->n;
+    if (polygon && !f->n_vertices) bt_errors_add(k->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
+    if (!polygon && f->n_vertices) bt_errors_add(k->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices", where);
+    else if (!polygon && !(f->length > 0)) bt_errors_add(k->err, "%s: has no length; give it, as in 1 m", where);
+    if (k->err->n > before) return;
     double v[2 * BT_MAX_VERTICES];
     const char *why = NULL;
     int n = outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, &why);
@@ -406,9 +399,11 @@ static void check_floe(const check *k, int index)
     }
     if (!sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return;
     box b = bounds_of(n, v, f->x, f->y, f->yaw);
+    const bool long_x = bt_bound_wraps(c->domain.ends) && b.x_max - b.x_min >= c->domain.length, long_y = c->domain.sides == BT_BOUND_PERIODIC && b.y_max - b.y_min >= c->domain.width;
+    if (long_x || long_y) bt_errors_add(k->err, "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain", where, long_x ? 'x' : 'y');
     // A fixed body may stand in a wall, as a pier does.
     if (f->fixed) b = (box){f->x, f->x, f->y, f->y};
-    char axis = outside(c, b, f->x, f->y);
+    const char axis = outside(c, b, f->x, f->y);
     if (axis) bt_errors_add(k->err, "%s: is outside the domain in %c, %g to %g m; move it inside", where, axis, axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
 }
 

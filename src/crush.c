@@ -187,9 +187,10 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
 
 double bt_crush_overlap(const bt_tile *t)
 {
+    // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it alone.
     double deepest = 0;
     for (bt_idx j = 0; j < t->n_units; j++)
-        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, -t->units[j].gap[i]);
+        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->units[j].gap[i]);
     return deepest;
 }
 

@@ -181,7 +181,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     for (size_t i = 0; i < s->pack.n; i++) {
         const bt_manifold *m = &s->pack.man[i];
         t->n_points += m->n_points;
-        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, -m->p[j].gap);
+        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
     }
     bt_pack_units(w, k, &s->pack);
     if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
@@ -265,7 +265,7 @@ double bt_world_overlap(bt_world *w)
     const bt_tiles *t = w->tiles;
     double deepest = 0;
     // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel reduction(max : deepest) if (t->n > FEW_TILES)
+#pragma omp parallel reduction(max : deepest) if (BT_MANY(t->n, FEW_TILES))
     {
         bt_pair_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)

@@ -6,6 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const double MOST_GROWTH = 20; // of a body by the clearance: beyond that it is a line
+
 static void place(int n, double *v, double x, double y, double yaw)
 {
     double c = cos(yaw), s = sin(yaw);
@@ -27,13 +29,15 @@ static double area_inside(const bt_yard *y, int n, const double *v)
     return n >= 3 ? bt_shape_moments(n, b).area : 0;
 }
 
-// Add a body and its periodic images that reach into the region; the ice loses what they cover.
-static void add_obstacle(bt_yard *y, int n, const double *v)
+// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so slender that room for the
+// clearance cannot be made by scaling: it would keep floes away all along its line, and its images would be without number.
+static bool add_obstacle(bt_yard *y, int n, const double *v)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     bt_moments m = bt_shape_moments(n, v);
     // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
     double grow = 1 + y->clearance / bt_max(m.inradius, 1e-9 * m.radius);
+    if (grow > MOST_GROWTH) return false;
     double r = m.radius * grow;
     // A body far outside a periodic domain is brought back first, so that images next to it suffice.
     double wx = m.cx, wy = m.cy;
@@ -58,6 +62,7 @@ static void add_obstacle(bt_yard *y, int n, const double *v)
                 o->v[2 * k + 1] = cy + grow * (v[2 * k + 1] - m.cy);
             }
         }
+    return true;
 }
 
 static bool spans(double a0, double a1, double d0, double length)
@@ -65,7 +70,7 @@ static bool spans(double a0, double a1, double d0, double length)
     return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
 }
 
-static void add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
     int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
@@ -74,8 +79,9 @@ static void add_body(bt_yard *y, const bt_case *c, int n, const double *own, dou
             double v[2 * BT_MAX_VERTICES];
             memcpy(v, own, 2 * (size_t)n * sizeof *v);
             place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
-            add_obstacle(y, n, v);
+            if (!add_obstacle(y, n, v)) return false;
         }
+    return true;
 }
 
 bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err)
@@ -92,11 +98,16 @@ bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors
 
     double v[2 * BT_MAX_VERTICES];
     int nv = bt_case_waterline(c, v);
-    if (nv >= 3) add_body(y, c, nv, v, c->body.x, c->body.y, c->body.yaw);
-    for (bt_idx i = 0; i < c->n_floes; i++) {
+    bool wide = nv < 3 || add_body(y, c, nv, v, c->body.x, c->body.y, c->body.yaw);
+    for (bt_idx i = 0; i < c->n_floes && wide; i++) {
         const bt_floe_def *d = &c->floes[i];
         nv = bt_case_floe_outline(d, v);
-        if (nv >= 3) add_body(y, c, nv, v, d->x, d->y, d->yaw);
+        wide = nv < 3 || add_body(y, c, nv, v, d->x, d->y, d->yaw);
+    }
+    if (!wide) {
+        bt_errors_add(err, "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m between it and the ice; take a wider one, or smaller floes (ice.size)",
+                      c->path ? c->path : "case", clearance);
+        return BT_ERR_CASE;
     }
     if (!(y->ice_area > 0)) {
         bt_errors_add(err, "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",

@@ -321,7 +321,7 @@ bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, i
     double *area = bt_alloc((size_t)n, sizeof *area), *next = bt_alloc(2 * (size_t)n, sizeof *next);
     for (int round = 0; round < ROUNDS; round++) {
         sort_into_bins(&g);
-#pragma omp parallel for schedule(dynamic, 256) if (n > 2000)
+#pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
         for (bt_idx i = 0; i < n; i++) {
             double v[2 * 2 * WORK];
             int m = ice_cell(&g, i, v);
@@ -341,7 +341,7 @@ bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, i
         }
     }
     sort_into_bins(&g);
-#pragma omp parallel for schedule(dynamic, 256) if (n > 2000)
+#pragma omp parallel for schedule(dynamic, 256) if (BT_MANY(n, 2000))
     for (bt_idx i = 0; i < n; i++) {
         double v[2 * 2 * WORK];
         int m = ice_cell(&g, i, v);

@@ -19,7 +19,7 @@ others=$(nm --defined-only -g $lib | awk 'NF == 3 && $3 !~ /^bt_/ {print $3}' | 
 # Names without blanks; what is new and not yet in git is looked at, too.
 files() { git ls-files --cached --others --exclude-standard "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
 
-for f in $(files '*.c' '*.h' '*.py' '*.sh' Makefile .ci/run .clang-tidy); do
+for f in $(files '*.c' '*.h' '*.py' '*.sh' '*.js' '*.css' '*.html' Makefile .ci/run .clang-tidy); do
     head -3 "$f" | grep -q 'SPDX-License-Identifier: MIT' || complain "$f: no SPDX line among the first three"
 done
 for f in $(files '*.h'); do

@@ -368,7 +368,7 @@ function drawArrow(g, pose, o) {
     g.stroke();
 }
 
-// A bar of a round length.
+// A bar of a round length; on a map, where north is.
 function drawScale(g) {
     const ratio = window.devicePixelRatio || 1, wish = 110 * ratio / state.scale, power = Math.pow(10, Math.floor(Math.log10(wish)));
     const length = [5, 2, 1].map((k) => k * power).find((v) => v <= wish), px = length * state.scale, x = 14 * ratio, y = canvas.height - 14 * ratio;
@@ -384,7 +384,16 @@ function drawScale(g) {
     g.stroke();
     g.font = `${11 * ratio}px sans-serif`;
     g.textAlign = "center";
+    g.textBaseline = "alphabetic";
     g.fillText(length >= 1000 ? `${length / 1000} km` : `${+length.toPrecision(3)} m`, x + px / 2, y - 7 * ratio);
+    if (!head.geographic) return;
+    g.fillStyle = "rgba(255,255,255,0.85)";
+    g.fillRect(8 * ratio, 8 * ratio, 22 * ratio, 36 * ratio);
+    g.fillStyle = "#1d2733";
+    g.fillText("N", 19 * ratio, 40 * ratio);
+    g.beginPath();
+    for (const [u, v] of [[19, 11], [24, 26], [19, 23], [14, 26]]) g.lineTo(u * ratio, v * ratio);
+    g.fill();
 }
 
 function drawField() {

@@ -141,7 +141,7 @@ function reading(time) {
     if (!curve) return "";
     let k = curve.time.findIndex((t) => t >= time);
     if (k < 0) k = curve.time.length - 1;
-    return curve.lines.map((l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`).join(", ");
+    return `at ${+time.toPrecision(5)} s, running means: ` + curve.lines.map((l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`).join(", ");
 }
 
 // ---- words

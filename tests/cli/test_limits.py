@@ -70,6 +70,12 @@ def test_hostile_yaml(tmp_path, kind):
     refusal(tmp_path, "bad.yml", "bad.yml", fragment)
 
 
+def test_text_of_an_input_does_not_steer_the_terminal(tmp_path):
+    (tmp_path / "bad.yml").write_text('run: {dt: 0.1, duration: 1}\n"ice\\e[31m": 1\nbody: {shape: "x\\r\\x07"}\n')
+    result = refusal(tmp_path, "bad.yml", "ice?[31m: unknown key")
+    assert all(c.isprintable() for line in result.stderr.split("\n") for c in line)
+
+
 # ---- files that a case names ----
 
 TABLES = {

@@ -66,6 +66,7 @@ def test_means_and_intervals_of_known_fields(plain):
         assert r["fields_needed"] == stat_mean.fields_needed(mean, np.std(fields, ddof=1), 0.05) and r["largest_share"] == pytest.approx(1.35 / 8)
         # AR(1) of 0.5: standard deviation 0.1 of a field's mean, tau 1.5 samples
         assert r["se_within"] == pytest.approx(0.1 * mean * np.sqrt(3 / LENGTH), rel=0.3)
+        assert FIELDS * LENGTH / 5 < c["samples"]["independent"] < FIELDS * LENGTH / 2  # every third or fourth
         assert c["estimates"]["lichey_hellmer"] == {"force": 80, "valid": True, "ratio": pytest.approx(mean / 80)} and not c["estimates"]["marchenko_compaction"]["valid"]
         assert c["estimates"]["open_water_drag"]["ratio"] is None
 

@@ -213,6 +213,21 @@ def test_profile_intervals_are_those_of_the_likelihood_region(T, monkeypatch):
     assert ends == pytest.approx((z[inside].min(), z[inside].max()), rel=0.02) and shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.02)
 
 
+def test_profile_intervals_of_block_maxima_are_those_of_the_likelihood_region():
+    x, shares = 200 + 30 * stats.genextreme(-0.2).rvs(40, random_state=16), (0.05, 0.002)
+    location, scale, shape = stat_fit.gev(x)
+    levels, shape_ends = stat_extreme.gev_intervals([x[i::4] for i in range(4)], location, scale, shape, shares)
+    a, b, k = np.meshgrid(location + scale * np.linspace(-0.8, 0.8, 70), scale * np.linspace(0.5, 2.0, 70), shape + np.linspace(-0.5, 0.7, 80), indexing="ij")
+    with np.errstate(all="ignore"):
+        minus = sum(np.log(b) + (1 + 1 / k) * np.log(1 + k * (v - a) / b) + (1 + k * (v - a) / b) ** (-1 / k) for v in x)
+    frozen = stats.genextreme(-shape, loc=location, scale=scale)
+    inside = minus <= -np.sum(frozen.logpdf(x)) + stats.chi2.ppf(0.95, 1) / 2
+    for (level, ends), share in zip(levels, shares):
+        z = a[inside] + b[inside] * (share ** -k[inside] - 1) / k[inside]
+        assert level == pytest.approx(frozen.ppf(np.exp(-share))) and ends == pytest.approx((z.min(), z.max()), rel=0.05)
+    assert shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.03)
+
+
 def test_profile_likelihood_of_a_normal_mean():
     # with known variance: mean +- sqrt(2 drop / n), and copies of each value in a field widen by the root of their number
     x = np.random.default_rng(14).normal(7, 1, 40)

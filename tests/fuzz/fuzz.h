@@ -12,10 +12,14 @@
 
 void bt_fuzz_case(const uint8_t *data, size_t n);     ///< case file: read, resolve, read again
 void bt_fuzz_setup(const uint8_t *data, size_t n);    ///< case file: field, world, three steps
+void bt_fuzz_values(const uint8_t *data, size_t n);   ///< keys set to values within their ranges: field, world, three steps
 void bt_fuzz_study(const uint8_t *data, size_t n);    ///< study file and its members
 void bt_fuzz_table(const uint8_t *data, size_t n);    ///< CSV table
 void bt_fuzz_outlines(const uint8_t *data, size_t n); ///< GeoJSON; the first byte chooses how it is read
 void bt_fuzz_field(const uint8_t *data, size_t n);    ///< numbers of an HDF5 field file
+
+/// A case file with overrides: field, world, three steps, everything finite.
+void bt_fuzz_begin_run(const uint8_t *text, size_t n, const char *const *set, int n_set);
 
 /// An input as a file without a place on disk: its path, and a descriptor to close.
 typedef struct {

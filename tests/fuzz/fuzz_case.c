@@ -7,6 +7,7 @@
 #include "bergtow/case.h"
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
+#include "bergtow/lead.h"
 #include "bergtow/setup.h"
 #include "bergtow/tiles.h"
 #include "bergtow/world.h"
@@ -69,21 +70,30 @@ static void run_a_little(const bt_case *c, const bt_field *f, bt_errors *err)
     bt_world_free(w);
 }
 
-void bt_fuzz_setup(const uint8_t *data, size_t n)
+void bt_fuzz_setup(const uint8_t *data, size_t n) { bt_fuzz_begin_run(data, n, NULL, 0); }
+
+void bt_fuzz_begin_run(const uint8_t *data, size_t n, const char *const *set, int n_set)
 {
     bt_fuzz_file file = bt_fuzz_open(data, n);
     bt_case c;
     bt_errors err = {0};
-    bt_status status = bt_case_read(&c, file.path, NULL, 0, &err);
+    bt_status status = bt_case_read(&c, file.path, set, n_set, &err);
     bt_fuzz_told(status, &err);
-    if (status == BT_OK && !names_files(&c) && bt_case_expected_floes(&c) < 60 && c.n_floes < 20 && c.ice.shake < 100) {
+    if (status == BT_OK && !names_files(&c) && bt_case_expected_floes(&c) < 60 && c.n_floes < 20) {
+        // Few sweeps and little shaking, so that many inputs are tried.
+        c.ice.shake = bt_min(c.ice.shake, 0.5);
         if (c.solver.max_sweeps > 20) c.solver.max_sweeps = 20;
         if (c.solver.position_sweeps > 20) c.solver.position_sweeps = 20;
         bt_field f;
         bt_field_init(&f);
         status = bt_field_generate(&c, &f, &err);
         bt_fuzz_told(status, &err);
-        if (status == BT_OK) run_a_little(&c, &f, &err);
+        bt_lead_stats lead;
+        if (status == BT_OK) {
+            status = bt_lead_open(&c, &f, &lead, &err);
+            bt_fuzz_told(status, &err);
+        }
+        if (status == BT_OK && f.n < 1000) run_a_little(&c, &f, &err);
         bt_field_free(&f);
     }
     bt_case_free(&c);

@@ -39,6 +39,7 @@ static void replay(const char *name, void (*harness)(const uint8_t *, size_t), i
 
 static void case_files(void **state) { (void)state; replay("case", bt_fuzz_case, 1); }
 static void worlds_of_cases(void **state) { (void)state; replay("setup", bt_fuzz_setup, 1); }
+static void keys_within_their_ranges(void **state) { (void)state; replay("values", bt_fuzz_values, 1); }
 static void study_files(void **state) { (void)state; replay("study", bt_fuzz_study, 1); }
 static void tables(void **state) { (void)state; replay("table", bt_fuzz_table, 1); }
 static void outline_files(void **state) { (void)state; replay("outlines", bt_fuzz_outlines, 1); }
@@ -48,6 +49,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(case_files),    cmocka_unit_test(worlds_of_cases), cmocka_unit_test(study_files),
+        cmocka_unit_test(keys_within_their_ranges),
         cmocka_unit_test(tables),        cmocka_unit_test(outline_files),   cmocka_unit_test(field_files),
     };
     return cmocka_run_group_tests_name("corpus", tests, NULL, NULL);
