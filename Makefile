@@ -34,7 +34,7 @@ ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lm
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -115,7 +115,7 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
+DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev libxxhash-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
         python3-yaml python3-jinja2 python3-pytest ffmpeg chromium chromium-driver python3-selenium
 

@@ -225,16 +225,18 @@ static void read_override(reader *r, const char *set)
     bt_tree_free(points);
 }
 
-bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err)
+/// Defaults, and the file name for messages.
+static void begin_case(bt_case *c, const char *path)
 {
     bt_case_defaults(c);
-    size_t before = err->n, size;
-    size_t n_path = strlen(path);
-    c->path = bt_alloc(n_path + 1, 1);
-    memcpy(c->path, path, n_path);
-    bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
-    if (status != BT_OK) return status;
+    c->path = strdup(path);
+}
 
+/// The text of c into its values.
+static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, int n, bt_errors *err)
+{
+    const size_t before = err->n;
+    const char *path = c->path;
     bt_node *root = bt_tree_parse(c->text, size, path, err);
     if (root && root->kind == BT_NODE_MAP && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
     else if (root && root->kind != BT_NODE_MAP) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
@@ -250,12 +252,37 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     read_given(&r);
     read_floes(&r);
     size_t in_file = err->n;
-    status = bt_case_check(c, r.from, err);
+    bt_status status = bt_case_check(c, r.from, err);
     if (in_file > before) status = BT_ERR_CASE;
     free(r.from);
     free(r.given);
     bt_tree_free(root);
     return status;
+}
+
+bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err)
+{
+    size_t size;
+    begin_case(c, path);
+    const bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
+    return status == BT_OK ? read_text(c, size, overrides, n, err) : status;
+}
+
+static void keep_table(bt_table *t, const bt_table *from)
+{
+    if (from->n == 0) return;
+    t->n = from->n;
+    t->row = bt_alloc((size_t)t->n, 3 * sizeof *t->row);
+    memcpy(t->row, from->row, (size_t)t->n * 3 * sizeof *t->row);
+}
+
+bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err)
+{
+    begin_case(c, path);
+    c->text = strdup(text);
+    keep_table(&c->water.table, current);
+    keep_table(&c->air.table, wind);
+    return read_text(c, strlen(text), NULL, 0, err);
 }
 
 void bt_case_free(bt_case *c)

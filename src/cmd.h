@@ -14,6 +14,8 @@ int bt_cmd_check(int argc, char **argv);
 int bt_cmd_field(int argc, char **argv);
 int bt_cmd_estimate(int argc, char **argv);
 int bt_cmd_ensemble(int argc, char **argv);
+int bt_cmd_resume(int argc, char **argv);
+int bt_cmd_diff(int argc, char **argv);
 
 /// The case file and the overrides that every command takes.
 typedef struct bt_cmd_case {
@@ -30,6 +32,9 @@ extern const struct argp bt_cmd_case_argp;
 
 /// A whole number in [lo, hi] from an option's text; anything else ends the program with code 2.
 int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi);
+
+/// A time of more than 0 from an option's text, s: "2 h", "90 min", "600"; anything else ends the program with code 2.
+double bt_cmd_duration(const struct argp_state *state, const char *option, const char *text);
 
 /// out/NAME for path/NAME.yml; the caller frees it.
 char *bt_cmd_default_folder(const char *path);

@@ -2,6 +2,7 @@
 // What the commands share: option parsing with suggestions, the case argument, the way out.
 #include "cmd.h"
 #include "suggest.h"
+#include "units.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -103,6 +104,15 @@ int64_t bt_cmd_number(const struct argp_state *state, const char *option, const 
     if (end == text || *end || errno || v < lo || v > hi)
         argp_error(state, "%s %s: give a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
     return v;
+}
+
+double bt_cmd_duration(const struct argp_state *state, const char *option, const char *text)
+{
+    double seconds = 0;
+    char why[BT_WHY] = "";
+    if (!bt_units_parse(text, BT_UNIT_TIME, &seconds, why)) argp_error(state, "%s %s: %s", option, text, why);
+    if (!(seconds > 0)) argp_error(state, "%s %s: give a time of more than 0, as in 2h, 90min or 600", option, text);
+    return seconds;
 }
 
 char *bt_cmd_default_folder(const char *path)

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 // bergtow run: a case to a result folder.
+#include "bergtow/checkpoint.h"
 #include "bergtow/run.h"
 #include "cmd.h"
+#include "fileio.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 typedef struct {
     bt_cmd_case file;
@@ -15,7 +15,7 @@ typedef struct {
     bool force;
 } options;
 
-enum { KEY_STEPS = 256, KEY_DUMP, KEY_FORCE };
+enum { KEY_STEPS = 256, KEY_WALL, KEY_DUMP, KEY_FORCE };
 
 // STEP:FILE.h5
 static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
@@ -42,6 +42,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
     case 'q': o->run.quiet = true; return 0;
     case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     case KEY_DUMP: parse_dump(state, arg, &o->run); return 0;
     case KEY_FORCE: o->force = true; return 0;
     default: return ARGP_ERR_UNKNOWN;
@@ -52,6 +53,7 @@ static const struct argp_option run_options[] = {
     {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
     {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or all cores; the result does not depend on it", 0},
     {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
+    {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
     {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
     {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
@@ -64,12 +66,11 @@ static const struct argp run_argp = {.options = run_options, .parser = parse, .a
 // A long run must not take the place of another by a slip of the hand.
 static bt_status check_folder(const char *dir, bool force, bt_errors *err)
 {
-    char *result = NULL;
-    if (asprintf(&result, "%s/result.h5", dir) < 0) abort();
-    bool taken = !access(result, F_OK);
-    if (taken && !force) bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
-    free(result);
-    return taken && !force ? BT_ERR_IO : BT_OK;
+    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_file_there(dir, "result.part.h5") || bt_checkpoint_there(dir);
+    if (force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return BT_OK;
+    if (finished || !begun) bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+    else bt_errors_add(err, "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, or --force to replace it", dir, dir);
+    return BT_ERR_IO;
 }
 
 int bt_cmd_run(int argc, char **argv)

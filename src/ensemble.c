@@ -14,6 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "bergtow/checkpoint.h"
 #include "bergtow/run.h"
 #include "cost.h"
 #include "fileio.h"
@@ -41,10 +42,10 @@ typedef struct {
     bt_errors *err;
 } ensemble;
 
-// A run has handlers of its own, which end it after a step; these are for the time between runs.
+// A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
 static volatile sig_atomic_t told;
 static void on_signal(int number) { told = number; }
-static const int caught[] = {SIGINT, SIGTERM, SIGUSR1};
+static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
 enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
 // --- files of a member -----------------------------------------------------------------------------------------------
@@ -92,13 +93,15 @@ static bool take_lock(int fd, bool wait)
     return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
 }
 
-/// Starts of a member that had no end: one byte each.
+/// Starts of a member that had no end, one byte each, since it last came on: one that has written a checkpoint since is no hopeless one.
 static int count_attempts(const char *folder)
 {
-    char *path = bt_file_join(folder, "attempts");
-    struct stat st;
-    const int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
+    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
+    struct stat st, last;
+    int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
+    if (n > 0 && stat(checkpoint, &last) == 0 && last.st_mtime > st.st_mtime) n = 0;
     free(path);
+    free(checkpoint);
     return n;
 }
 
@@ -276,6 +279,19 @@ static void say(const ensemble *e, const entry *x, bt_status status, double wall
     fflush(stdout);
 }
 
+/// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts anew.
+static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_run_options *o, bt_errors *why)
+{
+    int kept = group->rank == 0 && bt_checkpoint_there(o->dir);
+    bt_comm_bcast(group, &kept, sizeof kept);
+    if (kept) {
+        const bt_status status = bt_run_resume(group, o, why);
+        if (status != BT_ERR_CASE) return status;
+        bt_errors_free(why);
+    }
+    return bt_run(group, c, o, why);
+}
+
 static bt_status run_member(ensemble *e, entry *x)
 {
     const bool first = e->group->rank == 0;
@@ -287,6 +303,7 @@ static bt_status run_member(ensemble *e, entry *x)
         status = BT_ERR_NUMERIC;
     }
     if (first) {
+        if (x->attempts == 0) forget_attempts(x->folder);
         if (x->attempts < BT_MAX_ATTEMPTS) note_attempt(x->folder);
         journal(e, "start", &x->m, 0, 0);
     }
@@ -295,8 +312,8 @@ static bt_status run_member(ensemble *e, entry *x)
         bt_case c;
         status = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &why);
         status = bt_comm_agree(e->group, status);
-        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .command_line = e->o->command_line};
-        if (status == BT_OK) status = bt_run(e->group, &c, &o, &why);
+        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
+        if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
     }
     bt_comm_errors(e->group, &why);
@@ -307,6 +324,7 @@ static bt_status run_member(ensemble *e, entry *x)
             char *done = bt_file_join(x->folder, "finished");
             status = bt_file_write(done, "", &why);
             free(done);
+            if (status == BT_OK) bt_checkpoint_remove(x->folder);
         }
         if (status != BT_OK && status != BT_ERR_SIGNAL) {
             bt_errors unheard = {0};

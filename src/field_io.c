@@ -8,7 +8,9 @@
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes
 //     /case             the resolved case the field was made from
-// A reader trusts nothing: the file may be cut off, damaged, or made by hand.
+// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a seal (seal.h): of such a file
+// any damage is refused before HDF5, which crashes on some, reads a byte. A file without one, made by h5py say, is let through to the
+// checks of its values; what damage does to HDF5 itself it cannot be kept from.
 #include <errno.h>
 #include <hdf5.h>
 #include <math.h>
@@ -23,6 +25,7 @@
 #include "fileio.h"
 #include "h5util.h"
 #include "largest.h"
+#include "seal.h"
 
 // ---- write ----
 
@@ -39,7 +42,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
     char *part = bt_alloc(size, 1);
     snprintf(part, size, "%s.part", path);
     bt_h5 h;
-    bt_status status = bt_h5_create(&h, part, err);
+    bt_status status = bt_h5_create_with_room(&h, part, err);
     if (status == BT_OK) {
         hsize_t n = (hsize_t)f->n, nv = (hsize_t)f->offsets[f->n];
         bt_h5_group(&h, "/floes");
@@ -61,7 +64,8 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         free(text);
         bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h);
-        if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
+        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_FIELD, err);
+        if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
     free(part);
@@ -253,6 +257,9 @@ bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex
         return bt_file_fail(path, "read the ice field", reason, err);
     }
     fclose(probe);
+    bool bare;
+    const bt_status sealed = bt_seal_check(path, BT_SEAL_FIELD, &bare, err);
+    if (sealed != BT_OK) return sealed;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     if (H5Fis_hdf5(path) <= 0) {
         bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);

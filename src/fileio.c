@@ -3,9 +3,12 @@
 #include "fileio.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <linux/fs.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -142,4 +145,62 @@ bt_status bt_file_remove(const char *path, bt_errors *err)
 {
     if (unlink(path) == 0 || errno == ENOENT) return BT_OK;
     return bt_file_fail(path, "replace the file of an earlier run", errno, err);
+}
+
+/// Bytes from one open file to another; errno of a failure, or 0.
+static int copy_bytes(int from, int to)
+{
+    enum { PIECE = 1 << 20 };
+    if (ioctl(to, FICLONE, from) == 0) return 0;
+    char *buffer = bt_alloc(PIECE, 1);
+    int reason = 0;
+    for (ssize_t n; !reason && (n = read(from, buffer, PIECE)) != 0;) {
+        if (n < 0) {
+            reason = errno == EINTR ? 0 : errno;
+            continue;
+        }
+        for (ssize_t done = 0; done < n && !reason;) {
+            const ssize_t m = write(to, buffer + done, (size_t)(n - done));
+            if (m > 0) done += m;
+            else if (m == 0) reason = ENOSPC;
+            else if (errno != EINTR) reason = errno;
+        }
+    }
+    free(buffer);
+    return reason;
+}
+
+bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
+{
+    const int in = open(from, O_RDONLY | O_CLOEXEC);
+    if (in < 0) return bt_file_fail(from, "read the file", errno, err);
+    unlink(to); // a link of that name must not lead the copy elsewhere
+    const int out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    int reason = out < 0 ? errno : copy_bytes(in, out);
+    if (!reason && fsync(out) != 0) reason = errno;
+    if (out >= 0 && close(out) != 0 && !reason) reason = errno;
+    close(in);
+    if (reason && out >= 0) unlink(to);
+    return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
+}
+
+bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
+{
+    if (rename(from, to) != 0) return bt_file_fail(to, "write the file", errno, err);
+    const char *slash = strrchr(to, '/');
+    char *folder = !slash ? strdup(".") : slash == to ? strdup("/") : strndup(to, (size_t)(slash - to));
+    const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    free(folder);
+    if (fd < 0) return BT_OK; // a folder that may be written to but not read: the system will bring the name to the disk in its own time
+    const int reason = fsync(fd) != 0 && errno != EINVAL && errno != EROFS ? errno : 0; // some file systems have no such call
+    close(fd);
+    return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
+}
+
+bool bt_file_there(const char *dir, const char *name)
+{
+    char *path = bt_file_join(dir, name);
+    const bool there = access(path, F_OK) == 0;
+    free(path);
+    return there;
 }

@@ -19,6 +19,7 @@ static const struct {
     double exponent;
 } exceptions[] = {
     {"output.progress", 0},        // wall time
+    {"output.checkpoint_wall", 0},
     {"estimate.p_star", 0},        // at full scale; the length scale brings them to that of the case
     {"estimate.p_s", 0},
     {"estimate.length_scale", -1}, // full scale / case

@@ -20,7 +20,9 @@ typedef struct bt_h5 {
 
 /// Create (truncate) a file that other programs may read while it is being written.
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
-/// Collective. The same on rank 0, for a file into which the other ranks write too, see h5slab.h. Returns the same on all ranks.
+/// The same with room for a seal at its front (seal.h).
+bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err);
+/// Collective. The same on rank 0, with room for a seal, for a file into which the other ranks write too, see h5slab.h. Returns the same on all ranks.
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err);
 /// Several ranks write into the file.
 static inline bool bt_h5_shared(const bt_h5 *h) { return h->raw >= 0; }
@@ -28,6 +30,8 @@ static inline bool bt_h5_shared(const bt_h5 *h) { return h->raw >= 0; }
 void bt_h5_give_up(bt_h5 *h, bt_status status);
 /// Push everything to the file system.
 void bt_h5_flush(bt_h5 *h);
+/// Bring what this rank wrote by bt_h5_write_raw to the disk, where other nodes see it.
+void bt_h5_sync_raw(bt_h5 *h);
 /// Close; releases the path. Returns the status of the whole, this call included.
 bt_status bt_h5_close(bt_h5 *h);
 

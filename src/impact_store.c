@@ -188,6 +188,55 @@ void bt_impact_store_totals(bt_impact_store *s)
     free(count);
 }
 
+static const bt_state_row state_rows[] = {
+#define STATE(member) {#member, BT_ITEM_I64, 1, offsetof(bt_impact_store, member)}
+    STATE(written), STATE(n_merged), STATE(samples_written),
+#undef STATE
+};
+enum { N_STATE = sizeof state_rows / sizeof *state_rows };
+
+void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
+{
+    if (!s->h) return;
+    bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, s);
+    bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+}
+
+static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
+{
+    double *x = bt_alloc((size_t)n, sizeof *x);
+    s->cap_rows = n + CHUNK;
+    s->rows = bt_realloc(s->rows, (size_t)s->cap_rows, sizeof *s->rows);
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+        char path[64];
+        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+        bt_h5_read(old, path, H5T_NATIVE_DOUBLE, 0, n, x);
+        for (int64_t i = 0; i < n; i++) memcpy((char *)&s->rows[i] + columns[k].offset, &x[i], sizeof *x);
+    }
+    free(x);
+    s->n_rows = n;
+}
+
+void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old)
+{
+    if (!s->h) return;
+    bt_impact_store then = *s;
+    bt_snapshot_take_rows(from, "collisions", state_rows, N_STATE, &then);
+    bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+    if (from->faulty) return;
+    s->n_merged = then.n_merged;
+    load_rows(s, old, then.written);
+    const size_t n = (size_t)then.samples_written, width = (size_t)s->n_panels;
+    if (s->force >= 0 && n > 0) {
+        s->cap_samples = s->n_samples = then.samples_written;
+        s->forces = bt_realloc(s->forces, n * width, 2 * sizeof *s->forces);
+        s->normals = bt_realloc(s->normals, n * width, sizeof *s->normals);
+        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->forces);
+        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->normals);
+    }
+    if (old->status == BT_OK) bt_impact_store_write(s);
+}
+
 void bt_impact_store_close(bt_impact_store *s)
 {
     if (!s->h) return;

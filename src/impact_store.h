@@ -4,7 +4,9 @@
 #define BT_IMPACT_STORE_H
 
 #include "bergtow/impact.h"
+#include "h5read.h"
 #include "h5util.h"
+#include "snapshot.h"
 
 enum { BT_IMPACT_COLUMNS = 13 };
 
@@ -34,6 +36,10 @@ void bt_impact_store_end_sample(bt_impact_store *s);
 void bt_impact_store_write(bt_impact_store *s);
 /// Means and maxima by panel.
 void bt_impact_store_totals(bt_impact_store *s);
+/// Where it stands, after bt_impact_store_write.
+void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to);
+/// Go on from there: what had been written by then comes from `old`, the result file of that run.
+void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old);
 void bt_impact_store_close(bt_impact_store *s);
 
 #endif

@@ -22,6 +22,8 @@ static const struct {
     {"check", "validate a case and print the numbers that follow from it", bt_cmd_check, false},
     {"field", "make the ice field of a case only", bt_cmd_field, false},
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble, true},
+    {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
+    {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
 };
 enum { N_COMMANDS = sizeof commands / sizeof *commands };
@@ -41,7 +43,7 @@ static void print_help(FILE *out)
           "  --version    version, revision and compiler\n"
           "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
-          "6 stopped on a signal.\n", out);
+          "6 stopped on a signal or a limit, with a checkpoint.\n", out);
 }
 
 static int refuse_word(const char *kind, const char *word, const char *const *known)
@@ -113,6 +115,7 @@ static int bergtow(int argc, char **argv)
 int main(int argc, char **argv)
 {
     start_with_settings(argv);
+    signal(SIGUSR1, SIG_IGN); // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
     signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
     bt_comm_start(&argc, &argv);
     argp_err_exit_status = BT_ERR_USAGE;

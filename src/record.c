@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What a run leaves behind: result.h5 while it runs, case.resolved.yml before, summary.json and frames.xdmf after it.
 //
-// result.h5 is written under its own name, so that a running calculation can be watched: after each flush all series have
-// one length and the file is complete up to then (attribute "complete" of the root: 0 until the run has closed it). The
+// result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to then, so that a
+// calculation can be watched. Under its final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint
+// (record_resume.c), and at the end the file itself (attribute "complete" of the root: 0 until the run has closed it). The
 // small text files are written under a temporary name and renamed.
 #include "bergtow/record.h"
 
@@ -10,37 +11,15 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fileio.h"
-#include "frames.h"
-#include "h5util.h"
-#include "impact_store.h"
 #include "provenance.h"
-#include "summary.h"
+#include "record_parts.h"
+#include "seal.h"
 #include "xdmf.h"
 
-#define BUFFER 256        // entries of the series between flushes, and in a chunk
 #define FLUSH_SECONDS 5.0 // wall time between flushes
-
-struct bt_record {
-    bt_h5 h5;
-    char *dir;
-    const bt_case *c;
-    const bt_comm *comm;
-    bt_idx n_floes, towed; ///< of all ranks
-    bt_history history;
-    // series
-    hid_t *series;         ///< [bt_n_series_fields]
-    double *buffer;        ///< [bt_n_series_fields][BUFFER]
-    int64_t written, buffered;
-    bt_sample merged;      ///< of the steps of the present entry
-    int64_t n_merged;
-    double last_flush;     ///< bt_clock
-    hid_t events[4];       ///< time, kind, subject, value
-    int64_t n_events;      ///< written
-    bt_frames frames;
-    bt_impact_store impacts;
-};
 
 static void create_series(bt_record *r)
 {
@@ -52,7 +31,7 @@ static void create_series(bt_record *r)
     for (int k = 0; k < bt_n_series_fields; k++) {
         const bt_series_field *f = &bt_series_fields[k];
         char *name = bt_file_join("/series", f->name);
-        r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BUFFER, 1}, false);
+        r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
         bt_h5_attr_text(&r->h5, name, "units", f->units);
         bt_h5_attr_text(&r->h5, name, "description", f->description);
         bt_h5_attr_text(&r->h5, name, "merge", merge[f->keep]);
@@ -108,7 +87,7 @@ static bt_status close_file(bt_record *r)
     return bt_h5_close(&r->h5);
 }
 
-static bt_status write_text(const bt_record *r, const char *name, const char *text, bt_errors *err)
+bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err)
 {
     char *path = bt_file_join(r->dir, name);
     const bt_status status = bt_file_write(path, text, err);
@@ -117,20 +96,21 @@ static bt_status write_text(const bt_record *r, const char *name, const char *te
 }
 
 /// The folder, without what an earlier run left there, and the resolved case in it.
-static bt_status prepare_dir(const bt_record *r, const char *resolved, bt_errors *err)
+/// A fresh run leaves nothing of an earlier one; one that goes on only takes the summary away, which is of its end.
+static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
 {
     bt_status status = bt_file_make_dir(r->dir, err);
-    static const char *const stale[] = {"summary.json", "frames.xdmf"};
-    for (size_t k = 0; k < 2 && status == BT_OK; k++) {
+    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", "checkpoint.h5.tmp", BT_RESULT_FILE, "frames.xdmf", "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5", "stop"};
+    for (size_t k = 0; k < (fresh ? sizeof stale / sizeof *stale : 3) && status == BT_OK; k++) {
         char *path = bt_file_join(r->dir, stale[k]);
         status = bt_file_remove(path, err);
         free(path);
     }
-    return status == BT_OK ? write_text(r, "case.resolved.yml", resolved, err) : status;
+    return status == BT_OK && fresh ? bt_record_write_text(r, "case.resolved.yml", resolved, err) : status;
 }
 
-bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
-                         const char *command_line, bt_errors *err)
+static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bool fresh,
+                             bt_errors *err)
 {
     *out = NULL;
     bt_record *r = bt_alloc(1, sizeof *r);
@@ -141,13 +121,13 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     r->towed = b->towed;
     r->last_flush = bt_clock();
     bt_history_init(&r->history);
-    r->buffer = bt_alloc((size_t)bt_n_series_fields * BUFFER, sizeof *r->buffer);
+    r->buffer = bt_alloc((size_t)bt_n_series_fields * BT_RECORD_BUFFER, sizeof *r->buffer);
     r->series = bt_alloc((size_t)bt_n_series_fields, sizeof *r->series);
     for (int k = 0; k < bt_n_series_fields; k++) r->series[k] = -1;
     for (int k = 0; k < 4; k++) r->events[k] = -1;
 
-    char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, "result.h5");
-    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? prepare_dir(r, resolved, err) : BT_OK);
+    char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
+    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? prepare_dir(r, resolved, fresh, err) : BT_OK);
     if (status == BT_OK) status = bt_h5_create_shared(&r->h5, comm, path, err);
     if (status == BT_OK) {
         bt_h5_attr_int(&r->h5, "/", "complete", 0);
@@ -177,6 +157,16 @@ bt_status bt_record_open(bt_record **out, const bt_comm *comm, const char *dir, 
     return BT_OK;
 }
 
+bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+{
+    return open_record(r, comm, dir, c, b, command_line, true, err);
+}
+
+bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+{
+    return open_record(r, comm, dir, c, b, command_line, false, err);
+}
+
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err)
 {
     if (r->comm->rank != 0) return BT_OK;
@@ -194,11 +184,11 @@ static double member_of(const bt_sample *s, int k)
     return value;
 }
 
-static void write_buffer(bt_record *r)
+void bt_record_flush(bt_record *r)
 {
     for (int k = 0; k < bt_n_series_fields; k++)
         bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, (hsize_t)r->written, (hsize_t)r->buffered,
-                     r->buffer + (size_t)k * BUFFER);
+                     r->buffer + (size_t)k * BT_RECORD_BUFFER);
     r->written += r->buffered;
     r->buffered = 0;
     bt_impact_store_write(&r->impacts);
@@ -212,7 +202,7 @@ static void end_entry(bt_record *r)
     for (int k = 0; k < bt_n_series_fields; k++) {
         double value = *member(&r->merged, k);
         if (bt_series_fields[k].keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
-        r->buffer[(size_t)k * BUFFER + (size_t)r->buffered] = value;
+        r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
     }
     r->buffered++;
     r->n_merged = 0;
@@ -236,7 +226,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
         }
     }
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
-    if (r->buffered == BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS)) write_buffer(r);
+    if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS)) bt_record_flush(r);
     return r->h5.status;
 }
 
@@ -245,7 +235,7 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, b
     r->h5.err = err;
     const bt_status status = bt_frames_add(&r->frames, time, rows);
     if (status != BT_OK) return status;
-    write_buffer(r);
+    bt_record_flush(r);
     return bt_comm_agree(r->comm, r->h5.status);
 }
 
@@ -260,7 +250,7 @@ static void write_totals(bt_record *r, const bt_run_totals *t)
     bt_h5_attr_int(&r->h5, "/", "complete", 1);
 }
 
-static char *xdmf_text(const bt_record *r)
+char *bt_record_xdmf(const bt_record *r)
 {
     const bt_frames *f = &r->frames;
     return bt_xdmf_text(&(bt_xdmf){.n_floes = f->n_floes, .n_bodies = f->n_others, .floe_vertices = f->floe_vertices,
@@ -272,32 +262,55 @@ static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_er
     bt_summary s;
     bt_summary_make(&s, &r->history, r->c, t, r->n_floes, r->towed >= 0);
     char *text = bt_summary_json(&s, &r->history, r->c, t, r->n_floes);
-    const bt_status status = write_text(r, "summary.json", text, err);
+    const bt_status status = bt_record_write_text(r, "summary.json", text, err);
     free(text);
     bt_summary_free(&s);
+    return status;
+}
+
+/// The file that was written, now closed, under its final name.
+static bt_status hand_in(const bt_record *r, bt_errors *err)
+{
+    char *part = bt_file_join(r->dir, BT_RESULT_PART), *path = bt_file_join(r->dir, BT_RESULT_FILE);
+    bt_status status = bt_seal_write(part, BT_SEAL_RESULT, err);
+    if (status == BT_OK) status = bt_file_rename(part, path, err);
+    free(part);
+    free(path);
     return status;
 }
 
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
 {
     const bool first = r->comm->rank == 0;
-    char *xdmf = first ? xdmf_text(r) : NULL;
+    char *xdmf = first ? bt_record_xdmf(r) : NULL;
     r->h5.err = err;
     if (first) {
         if (r->n_merged > 0) end_entry(r);
         if (t) bt_impact_store_take_closed(&r->impacts);
-        write_buffer(r);
+        bt_record_flush(r);
         if (t) bt_impact_store_totals(&r->impacts);
         if (t) write_totals(r, t);
     }
+    bt_h5_sync_raw(&r->h5);
     bt_status status = bt_comm_agree(r->comm, close_file(r));
     // The summary comes last: where there is one, the rest is complete.
-    if (first && status == BT_OK) status = write_text(r, "frames.xdmf", xdmf, err);
+    if (first && status == BT_OK) status = hand_in(r, err);
+    if (first && status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
     if (first && status == BT_OK && t) status = write_summary(r, t, err);
     status = bt_comm_agree(r->comm, status);
     free(xdmf);
     record_free(r);
     return status;
+}
+
+void bt_record_abandon(bt_record *r)
+{
+    bt_h5_give_up(&r->h5, BT_ERR_IO);
+    close_file(r);
+    char *part = bt_file_join(r->dir, BT_RESULT_PART);
+    if (r->comm->rank == 0) unlink(part);
+    free(part);
+    record_free(r);
 }
 
 void bt_record_print_summary(const bt_record *r, const bt_run_totals *t)

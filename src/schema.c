@@ -220,6 +220,11 @@ const bt_key bt_case_keys[] = {
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of sweeps of the position projection, assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
+    REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]", "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),
+    REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]", "kinetic energy of all bodies / that at the reference speed that ends the run, 0 = any is let through; assumed"),
+    INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]", "steps in a row without convergence that end the run, 0 = any number is let through; assumed"),
+    BOOL("guard.escape", guard.escape, "true", "a floe beyond a wall of the domain ends the run"),
+
     CHOICE("impact.conversion", impact.conversion, conversions, "duration",
            "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a corner at a pressure; none: collisions are not told apart"),
     REAL("impact.duration", impact.duration, TIME, "= run.dt", "(0, 1000]",
@@ -234,6 +239,8 @@ const bt_key bt_case_keys[] = {
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
+    INT("output.checkpoint_steps", output.checkpoint_steps, "0", "[0, 1e12]", "steps between checkpoints, 0 = none by steps"),
+    REAL("output.checkpoint_wall", output.checkpoint_wall, TIME, "600 s", "[0, 1e9]", "wall time between checkpoints, 0 = none by time; one is always written at the end and at a stop"),
     BOOL("output.panels", output.panels, "false", "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
 
     REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),

@@ -386,6 +386,21 @@ static void drop_parted(const bt_world *w, bt_trace *trace, int64_t *n)
     *n = kept;
 }
 
+/// Bodies to their ranks and places under the labels they have, and tiles around them with these traces, which are released.
+static void place(bt_world *w, bt_trace *trace, int64_t n)
+{
+    bt_tiles *t = w->tiles;
+    for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
+    t->n = 0;
+    trace = bt_domain_migrate(w, trace, &n);
+    sort_bodies(w);
+    make_tiles(w);
+    bt_tiles_put_traces(w, trace, n);
+    bt_domain_connect(w);
+    free(trace);
+    t->labelled = true;
+}
+
 /// With `renew` new tiles and labels, otherwise only new owners.
 static void deal(bt_world *w, bool renew, double margin)
 {
@@ -398,17 +413,11 @@ static void deal(bt_world *w, bool renew, double margin)
     int64_t n;
     bt_trace *trace = bt_tiles_take_traces(w, &n);
     if (renew) drop_parted(w, trace, &n);
-    for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    t->n = 0;
-    trace = bt_domain_migrate(w, trace, &n);
-    sort_bodies(w);
-    make_tiles(w);
-    bt_tiles_put_traces(w, trace, n);
-    bt_domain_connect(w);
-    free(trace);
-    t->labelled = true;
+    place(w, trace, n);
     t->relabel = false;
 }
+
+void bt_tiles_restore(bt_world *w, bt_trace *trace, int64_t n) { place(w, trace, n); }
 
 void bt_tiles_begin(bt_world *w)
 {

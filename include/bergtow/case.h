@@ -191,6 +191,12 @@ typedef struct bt_case {
         int64_t position_sweeps; ///< limit of the position projection
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
+    struct {                     ///< what ends a run, see src/guard.h; 0 or false = not looked at
+        double overlap;          ///< / mean floe size
+        double energy;           ///< / that at the reference speed
+        int64_t unconverged;     ///< steps in a row
+        bool escape;             ///< a floe beyond a wall
+    } guard;
     struct {
         bt_impact_conversion conversion; ///< of the impulse of a collision into a force
         double duration;         ///< T_c of a collision, s
@@ -205,6 +211,8 @@ typedef struct bt_case {
         double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
+        int64_t checkpoint_steps;///< steps between checkpoints, 0 = none by steps
+        double checkpoint_wall;  ///< s of wall time between checkpoints, 0 = none by time
         bool panels;             ///< series of the loads on the hull's panels
     } output;
     struct {
@@ -223,6 +231,9 @@ typedef struct bt_case {
 /// Read and check a case file; every error of the file is appended to err with file, line, key and remedy.
 /// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
+
+/// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file is read.
+bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err);
 
 /// All defaults, for tests and programs that build a case in memory.
 void bt_case_defaults(bt_case *c);

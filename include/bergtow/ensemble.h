@@ -11,7 +11,8 @@
 // ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word between them:
 // each takes the next member that is neither finished, failed nor locked, the longest first by an estimate. (Tried in thought and left: a
 // counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it on every network.)
-// A member whose process died is tried again after all others, and given up after some attempts, so that it cannot stop the rest.
+// A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are removed. One whose process died is tried again after
+// all others, and given up after some attempts without a checkpoint between them, so that it cannot stop the rest.
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 

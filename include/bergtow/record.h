@@ -126,11 +126,28 @@ typedef struct bt_run_totals {
 
 typedef struct bt_record bt_record;
 
-/// Collective. Open dir (made if missing), write case.resolved.yml and result.h5 with case, provenance and bodies; the summary and
-/// frames.xdmf of an earlier run in dir are removed. c and comm must stay valid until the record is closed; b is copied.
+/// Collective. Open dir (made if missing), write case.resolved.yml and result.part.h5 with case, provenance and bodies; what an earlier run has
+/// left in dir is removed. result.h5 is there once it is complete, see bt_record_publish. c and comm must stay valid until the record is closed; b is copied.
 /// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
 bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
                          const char *command_line, bt_errors *err);
+
+/// Collective. The same for a run that goes on from a checkpoint in dir: nothing but its summary is removed. Then bt_record_load.
+bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
+                           const char *command_line, bt_errors *err);
+
+struct bt_snapshot;
+
+/// Where the record stands, on rank 0; all it has taken is in the file then. n_frames: of those taken, how many belong to the run whatever
+/// its end is. The status is that of rank 0.
+bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, bt_errors *err);
+
+/// Collective. result.h5 and frames.xdmf as they are now: a sealed copy of the file under way, in place of what was there.
+bt_status bt_record_publish(bt_record *r, bt_errors *err);
+
+/// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from result.h5, which may
+/// hold more by now; events from e. After bt_record_reopen and bt_record_watch_impacts. Errors: BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
+bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e, bt_errors *err);
 
 /// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left in m, which must stay
 /// valid until the record is closed. Before the first sample. The status is that of rank 0: agree on it.
@@ -156,6 +173,9 @@ bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, b
 /// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t = NULL closes a run
 /// that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no summary.
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
+
+/// Collective. Close and free a record that is of no use, and remove result.part.h5.
+void bt_record_abandon(bt_record *r);
 
 /// Print the end-of-run table (summary and phases) on stdout. On rank 0. Call it before the record is closed.
 void bt_record_print_summary(const bt_record *r, const bt_run_totals *t);

@@ -169,6 +169,9 @@ typedef struct bt_trace {
 
 /// Traces of the pairs in contact, and of those that have crushed each other, that this rank owns, [*n]; the caller frees.
 bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n);
+/// Collective. Tiles as another run left them: their geometry and the labels of all bodies, which every rank holds, have been set, and the
+/// traces [n], which are released, are those of all ranks. A domain has been created, but nothing is dealt yet.
+void bt_tiles_restore(bt_world *w, bt_trace *trace, int64_t n);
 /// Put traces, in any order, into the pair lists of empty tiles.
 void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n);
 

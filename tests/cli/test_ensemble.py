@@ -99,7 +99,14 @@ def test_interrupted(quiet, tmp_path):
     assert child.returncode == SIGNAL and "goes on with the" in err
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert f.attrs["complete"] == 0
+    kept = list(tmp_path.glob("all/members/*/checkpoint.h5"))
+    assert len(kept) == 1  # of the member at hand, which goes on from there: its steps up to then are not made again
+    with h5py.File(kept[0]) as f:
+        assert f["world/step"][0] > 0
     assert ensemble(tmp_path).returncode == DONE
+    with h5py.File(kept[0].parent / "result.h5") as f:
+        assert f.attrs["complete"] == 1
+    assert not list(tmp_path.glob("all/members/*/checkpoint*.h5"))
     assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 

@@ -146,7 +146,7 @@ def test_no_key_of_a_case_names_output(tmp_path):
 
 def test_links_in_the_output_folder_are_not_followed(tmp_path):
     """Somebody's links under the names that a run writes: they are replaced."""
-    names = ["result.h5", "summary.json", "summary.json.tmp", "frames.xdmf", "frames.xdmf.tmp", "case.resolved.yml", "case.resolved.yml.tmp"]
+    names = ["result.h5", "result.part.h5", "result.h5.tmp", "checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.previous.h5", "stop", "summary.json", "summary.json.tmp", "frames.xdmf", "frames.xdmf.tmp", "case.resolved.yml", "case.resolved.yml.tmp"]
     outside, out = tmp_path / "outside", tmp_path / "out"
     outside.mkdir()
     out.mkdir()

@@ -179,7 +179,7 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     deadline = time.time() + 30
     while time.time() < deadline:
         try:
-            if (tmp_path / "out/result.h5").stat().st_size > 600_000:
+            if (tmp_path / "out/result.part.h5").stat().st_size > 600_000:
                 break
         except FileNotFoundError:
             pass
@@ -187,7 +187,7 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     p.kill()
     p.communicate(timeout=30)
     assert not (tmp_path / "out/summary.json").exists()
-    with h5py.File(tmp_path / "out/result.h5") as f:
+    with h5py.File(tmp_path / "out/result.part.h5") as f:
         lengths = {d.shape for d in f["series"].values()}
         assert len(lengths) == 1 and f.attrs["complete"] == 0
         n = lengths.pop()[0]
@@ -229,7 +229,7 @@ def limited(kilobytes):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * kilobytes, 1024 * kilobytes))
 
 
-@pytest.mark.parametrize("kilobytes, what", [(2, "case.resolved.yml"), (60, "result.h5"), (400, "result.h5")])
+@pytest.mark.parametrize("kilobytes, what", [(2, "case.resolved.yml"), (60, "result.part.h5"), (400, "result.part.h5")])
 def test_a_full_disk(tmp_path, kilobytes, what):
     """A limit on the size of files acts as a disk that fills up: at the start, while the bodies are written, in mid-run."""
     case = changed(ENDLESS, run__duration=1e5, output__frame_interval=0.5)

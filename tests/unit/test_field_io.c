@@ -148,6 +148,17 @@ static char *read_bytes(size_t *n)
     return bytes;
 }
 
+/// The good file without its seal, as another program would write it.
+static void write_bare(void)
+{
+    size_t n;
+    write_row();
+    char *bytes = read_bytes(&n);
+    assert_memory_equal(bytes, "bergtow sealed file\n", 20);
+    write_bytes(bytes + 512, n - 512);
+    free(bytes);
+}
+
 static void test_not_a_field(void **state)
 {
     (void)state;
@@ -162,10 +173,8 @@ static void test_not_a_field(void **state)
     assert_refused(BT_ERR_CASE, "/floes/offsets: is missing");
 }
 
-static void test_truncated(void **state)
+static void refuse_truncated(void)
 {
-    (void)state;
-    write_row();
     size_t n;
     char *bytes = read_bytes(&n);
     for (int k = 0; k < 64; k++) {
@@ -180,19 +189,58 @@ static void test_truncated(void **state)
     free(bytes);
 }
 
-static void test_flipped_bits(void **state)
+static void test_truncated(void **state)
+{
+    (void)state;
+    write_row();
+    refuse_truncated();
+    write_bare();
+    refuse_truncated();
+}
+
+static uint64_t next_random(void)
+{
+    static uint64_t x = 88172645463325252u; // xorshift64
+    x ^= x << 13, x ^= x >> 7, x ^= x << 17;
+    return x;
+}
+
+/// Of a sealed file every flip is refused, wherever it is: seal, metadata, numbers.
+static void test_flipped_bits_of_a_sealed_file(void **state)
 {
     (void)state;
     write_row();
     size_t n;
     char *bytes = read_bytes(&n);
-    uint64_t x = 88172645463325252u; // xorshift64
+    for (int k = 0; k < 1000; k++) {
+        const uint64_t x = next_random();
+        // A fifth of them in the seal and the first metadata, which are few bytes.
+        const size_t at = k % 5 ? x % n : x % 1024;
+        bytes[at] ^= (char)(1 << (x >> 40) % 8);
+        write_bytes(bytes, n);
+        bytes[at] ^= (char)(1 << (x >> 40) % 8);
+        bt_field f;
+        bt_errors err = {0};
+        const bt_status status = read_quietly(&f, &err);
+        if (status != BT_ERR_CASE || err.n != 1 || f.n != 0) fail_msg("byte %zu flipped: status %d, %s", at, status, err.n ? err.text[0] : "no message");
+        bt_errors_free(&err);
+        bt_field_free(&f);
+    }
+    free(bytes);
+}
+
+static void test_flipped_bits_of_a_bare_file(void **state)
+{
+    (void)state;
+    write_bare();
+    size_t n;
+    char *bytes = read_bytes(&n);
     int accepted = 0;
     for (int k = 0; k < 400; k++) {
         char *damaged = malloc(n);
         memcpy(damaged, bytes, n);
         for (int hit = 0; hit < 1 + k % 4; hit++) {
-            x ^= x << 13, x ^= x >> 7, x ^= x << 17;
+            const uint64_t x = next_random();
             damaged[x % n] ^= (char)(1 << (x >> 40) % 8);
         }
         write_bytes(damaged, n);
@@ -216,7 +264,7 @@ static void test_flipped_bits(void **state)
 // Write the good file, then overwrite one number of a dataset.
 static void spoil(const char *dataset, hsize_t at, double value)
 {
-    write_row();
+    write_bare();
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), d = H5Dopen2(file, dataset, H5P_DEFAULT), space = H5Dget_space(d);
     hssize_t n = H5Sget_simple_extent_npoints(space);
     double *data = malloc((size_t)n * sizeof *data);
@@ -232,7 +280,7 @@ static void spoil(const char *dataset, hsize_t at, double value)
 // Write the good file, then replace a dataset; type 0: leave it out.
 static void replace(const char *dataset, hid_t type, int rank, const hsize_t *dims, const void *data)
 {
-    write_row();
+    write_bare();
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
     assert_true(H5Ldelete(file, dataset, H5P_DEFAULT) >= 0);
     if (type) {
@@ -295,7 +343,7 @@ static void test_spoiled_layout(void **state)
     assert_refused(BT_ERR_CASE, "/floes/thickness: holds no numbers");
     replace("/floes/thickness", H5T_NATIVE_FLOAT, 1, &(hsize_t){4}, numbers);
     assert_refused(BT_ERR_CASE, "/floes/thickness: has 4 rows for 5 floes");
-    write_row(); // a header that promises a petabyte
+    write_bare(); // a header that promises a petabyte
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), create = H5Pcreate(H5P_DATASET_CREATE);
     H5Pset_chunk(create, 1, (hsize_t[]){1024});
     H5Ldelete(file, "/floes/offsets", H5P_DEFAULT);
@@ -317,7 +365,7 @@ static void test_spoiled_layout(void **state)
     assert_int_equal(read_quietly(&f, &err), BT_OK);
     assert_true(f.thickness[4] == 5);
     bt_field_free(&f);
-    write_row();
+    write_bare();
     file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
     H5Adelete_by_name(file, "/floes", "ice_area", H5P_DEFAULT);
     H5Fclose(file);
@@ -328,7 +376,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_write_failure),  cmocka_unit_test(test_not_a_field),
-        cmocka_unit_test(test_truncated),    cmocka_unit_test(test_flipped_bits),   cmocka_unit_test(test_spoiled_values),
+        cmocka_unit_test(test_truncated),    cmocka_unit_test(test_flipped_bits_of_a_sealed_file), cmocka_unit_test(test_flipped_bits_of_a_bare_file),   cmocka_unit_test(test_spoiled_values),
         cmocka_unit_test(test_spoiled_layout),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

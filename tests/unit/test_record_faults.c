@@ -65,11 +65,11 @@ static void a_running_and_a_killed_run_can_be_read(void **state)
     char go;
     close(ready[1]); // so that a child that fails ends the wait
     assert_int_equal(read(ready[0], &go, 1), 1);
-    lengths_seen_by_others(in_folder("killed/result.h5"), seen); // the writer lives and has the file open
+    lengths_seen_by_others(in_folder("killed/result.part.h5"), seen); // the writer lives and has the file open
     assert_true(seen[0] >= 401 + 256 && seen[0] == seen[1] && seen[2] == 1);
     kill(child, SIGKILL);
     waitpid(child, NULL, 0);
-    lengths_seen_by_others(in_folder("killed/result.h5"), seen);
+    lengths_seen_by_others(in_folder("killed/result.part.h5"), seen);
     assert_true(seen[0] >= 401 + 256 && seen[0] == seen[1] && seen[2] == 1);
 }
 
@@ -118,12 +118,12 @@ static int run_without_space(rlim_t limit)
         int code = 0;
         if (status != BT_ERR_IO) code = 10;
         else if (err.n != 1) code = 11;
-        else if (!strstr(err.text[0], "result.h5") && !strstr(err.text[0], "case.resolved.yml")) code = 12;
+        else if (!strstr(err.text[0], "result.part.h5") && !strstr(err.text[0], "case.resolved.yml")) code = 12;
         else if (!strstr(err.text[0], "File too large")) code = 13;
         else if (access(in_folder("full/summary.json"), F_OK) == 0) code = 14;
         else if (limit > 60000) { // what was flushed before is still there, in series of one length
             int seen[3];
-            lengths_seen_by_others(in_folder("full/result.h5"), seen);
+            lengths_seen_by_others(in_folder("full/result.part.h5"), seen);
             if (seen[0] != seen[1]) code = 15;
         }
         if (code && err.n) fprintf(stderr, "%s\n", err.text[0]);

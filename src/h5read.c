@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// Reading back what this program wrote: a sealed file, with one way to fail.
+#include "h5read.h"
+
+#include "seal.h"
+
+static void fail(bt_h5_reader *r, const char *name)
+{
+    if (r->status != BT_OK) return;
+    r->status = BT_ERR_CASE;
+    bt_errors_add(r->err, "%s: %s cannot be read or has another shape than expected; use the program that wrote the file", r->path, name);
+}
+
+bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
+{
+    *r = (bt_h5_reader){.file = -1, .path = path, .err = err};
+    r->status = bt_seal_check(path, kind, NULL, err);
+    if (r->status != BT_OK) return r->status;
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    if (r->file < 0) fail(r, "as HDF5 it");
+    return r->status;
+}
+
+bt_status bt_h5_end(bt_h5_reader *r)
+{
+    if (r->file >= 0) H5Fclose(r->file);
+    r->file = -1;
+    return r->status;
+}
+
+int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k)
+{
+    if (r->status != BT_OK) return 0;
+    hsize_t size[H5S_MAX_RANK] = {0};
+    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
+    if (space >= 0) H5Sclose(space);
+    if (d >= 0) H5Dclose(d);
+    if (rank < 0) fail(r, name);
+    return k < rank ? (int64_t)size[k] : 0;
+}
+
+void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, void *to)
+{
+    if (r->status != BT_OK || n == 0) return;
+    hsize_t size[H5S_MAX_RANK] = {0}, start[H5S_MAX_RANK] = {0};
+    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
+    bool good = rank >= 1 && first >= 0 && (hsize_t)(first + n) <= size[0];
+    if (good) {
+        start[0] = (hsize_t)first;
+        size[0] = (hsize_t)n;
+        const hid_t here = H5Screate_simple(rank, size, NULL);
+        const bool filled = H5Sget_simple_extent_npoints(here) > 0;
+        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 && (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
+        H5Sclose(here);
+    }
+    if (space >= 0) H5Sclose(space);
+    if (d >= 0) H5Dclose(d);
+    if (!good) fail(r, name);
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Reading back what this program wrote: a sealed file, with one way to fail.
+#ifndef BT_H5READ_H
+#define BT_H5READ_H
+
+#include <hdf5.h>
+
+#include "bergtow/base.h"
+
+/// An open file; after a failure, which is told once, every function below does nothing.
+typedef struct bt_h5_reader {
+    hid_t file;
+    const char *path;
+    bt_status status;
+    bt_errors *err;
+} bt_h5_reader;
+
+/// Check the seal, then open. path must stay valid. Errors: those of bt_seal_check.
+bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
+bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
+
+/// Size of a dataset's dimension k, 0 = not so many.
+int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
+/// Rows first up to first + n along the first dimension, all of the others. mem: H5T_NATIVE_...
+void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, void *to);
+
+#endif

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// What a run is asked for from outside while it steps: checkpoints by signal, steps and wall time, and stops.
+//
+//     SIGINT, SIGTERM, SIGUSR2   checkpoint and stop      (mpirun hands on SIGUSR1 and SIGUSR2; at the others it kills the ranks a second later)
+//     SIGUSR1                    checkpoint and go on
+//     DIR/stop                   checkpoint and stop; the file is removed
+//     --max-wall                 the same after that time
+//     output.checkpoint_steps, output.checkpoint_wall       checkpoint and go on
+//
+// Every rank may meet a signal; files and clocks are looked at by rank 0. What the ranks have met is joined once a step, as bits, so that
+// all do the same after the same step.
+#ifndef BT_HALT_H
+#define BT_HALT_H
+
+#include <signal.h>
+
+#include "bergtow/base.h"
+
+enum { BT_N_CAUGHT = 4 };
+
+typedef struct bt_halt {
+    int64_t steps;          ///< between checkpoints, 0 = none
+    double wall, max_wall;  ///< s between checkpoints, until the stop; 0 = none
+    double started;         ///< bt_clock when the call began
+    const char *dir;
+    volatile sig_atomic_t *told; ///< of the caller (bergtow/run.h), or NULL
+    bool first;             ///< this is rank 0
+    // state
+    double last, looked;    ///< bt_clock: of the last checkpoint, of the last look for the stop file
+    struct sigaction before[BT_N_CAUGHT];
+} bt_halt;
+
+/// From here on signals are kept for the next look; bt_halt_end brings back the handlers of before.
+void bt_halt_begin(bt_halt *h);
+void bt_halt_end(bt_halt *h);
+
+/// What this rank knows after a step, as bits. Bit 0 is never set.
+uint64_t bt_halt_look(bt_halt *h, int64_t step);
+
+static inline bool bt_halt_stops(uint64_t bits) { return (bits & ((UINT64_C(1) << 50) - 2)) != 0; }
+static inline bool bt_halt_saves(uint64_t bits) { return bits >> 50 != 0; }
+
+/// A checkpoint has been written.
+void bt_halt_saved(bt_halt *h);
+
+/// Why the run stops after this step, in words; removes the stop file (rank 0).
+void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96]);
+
+/// Start threads that leave these signals to the main thread: block them, and set *before for pthread_sigmask.
+void bt_halt_block(sigset_t *before);
+
+#endif

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// A seal in front of an HDF5 file: what it is, how long it is, and a digest of every byte.
+//
+// HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours begins with a user block of 512
+// bytes, which readers of HDF5 skip (h5py, ParaView, h5dump), and is compared with it before HDF5 sees a byte:
+//
+//     bergtow sealed file\nkind: checkpoint 1\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//
+// The block must be, to the last byte, what the file's length and digest (XXH3, 128 bits) make it: any flipped bit, any cut, any swapped part is
+// refused. It protects against damage, not against intent. Rejected: HDF5's Fletcher-32, which leaves metadata and the pairing of
+// datasets open; a digest in a file beside it, which can be of another moment.
+#ifndef BT_SEAL_H
+#define BT_SEAL_H
+
+#include "bergtow/base.h"
+
+enum { BT_SEAL_BYTES = 512 };
+
+// Kinds carry the version of the format: another one is refused with both names.
+#define BT_SEAL_CHECKPOINT "checkpoint 1"
+#define BT_SEAL_RESULT "result 1"
+#define BT_SEAL_FIELD "field 1"
+
+/// Write the seal into the room at the front of a file that is complete, and bring all of it to the disk. Errors: BT_ERR_IO.
+bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err);
+
+/// Does the file have a sound seal of this kind? bare: a file without seal, one that begins as HDF5, is let through (or NULL). Errors:
+/// BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_errors *err);
+
+#endif

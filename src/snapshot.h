@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// A set of named arrays: what a checkpoint is in memory.
+//
+// Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows what the
+// arrays mean. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it took: they are no part of
+// it, and are not compared.
+#ifndef BT_SNAPSHOT_H
+#define BT_SNAPSHOT_H
+
+#include "bergtow/comm.h"
+
+typedef enum { BT_ITEM_F64, BT_ITEM_I64, BT_ITEM_I32, BT_ITEM_U32, BT_ITEM_U16, BT_ITEM_U8, BT_ITEM_TEXT, BT_ITEM_TYPES } bt_item_type;
+
+typedef struct bt_item {
+    char *name;
+    bt_item_type type;
+    int64_t n;   ///< rows; of a text its bytes with the 0 at the end
+    int width;   ///< numbers a row
+    void *data;  ///< [n][width]
+} bt_item;
+
+typedef struct bt_snapshot {
+    bt_item *item; ///< [n]
+    int n, cap;
+    const char *path; ///< of the file, for messages
+    bt_errors *err;   ///< where bt_snapshot_take complains
+    bool faulty;      ///< it has
+} bt_snapshot;
+
+/// A member of a struct that is saved.
+typedef struct bt_state_row {
+    const char *name;
+    bt_item_type type;
+    int width;
+    size_t offset;
+} bt_state_row;
+
+size_t bt_item_size(bt_item_type type); ///< bytes of one number
+const char *bt_item_number(const bt_item *i, int64_t at, char out[40]); ///< number `at` of an array in digits that give it back; returns out
+
+/// Add an array [n][width]; data are copied, or zeros. Returns where it lies.
+void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data);
+void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text);
+void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value);
+void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value);
+/// Add the members of a struct, group/name each.
+void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base);
+
+/// The array of that name, or NULL.
+const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name);
+/// Rows of the array of that name; 0 and a complaint when it is missing.
+int64_t bt_snapshot_rows(bt_snapshot *s, const char *name);
+/// Copy an array that must be there with this type and shape; otherwise complain, and leave `to`.
+void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to);
+const char *bt_snapshot_text(bt_snapshot *s, const char *name); ///< "" and a complaint when it is missing
+int64_t bt_snapshot_int(bt_snapshot *s, const char *name);
+double bt_snapshot_real(bt_snapshot *s, const char *name);
+void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base);
+/// In new memory, [rows][width]: as bt_snapshot_take.
+void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n);
+
+/// Collective. The snapshot of rank 0 to all ranks; on others it is empty before.
+void bt_snapshot_share(const bt_comm *c, bt_snapshot *s);
+
+/// The first difference between two states, in words; false when there is none.
+bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400]);
+
+void bt_snapshot_free(bt_snapshot *s);
+
+/// Into a sealed HDF5 file and back; errors as bt_seal_check, and BT_ERR_IO.
+bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err);
+bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
+
+#endif

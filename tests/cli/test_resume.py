@@ -1,0 +1,330 @@
+# SPDX-License-Identifier: MIT
+"""Checkpoints as a user meets them: stops and limits, damage, full disks, two processes in one folder, failures that can be met again."""
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+
+from harness import BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed, environment, run, write_case
+from resuming import assert_same_result, check_readable
+
+# Long enough to strike at, with steps that cost next to nothing.
+LONG = changed(TOW, run__dt=0.0005, run__duration=6, output__frame_interval=0.5, output__sample_every=7)
+BROKEN = "checkpoint.h5: is damaged"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, run(folder, LONG, "--quiet", name="whole")
+
+
+def begun(folder, name, *arguments):
+    p = subprocess.Popen([BERGTOW, "run", "case.yml", "-o", name, "--quiet", *map(str, arguments)], cwd=folder, env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE,
+                         stderr=subprocess.PIPE, text=True)
+    end = time.time() + 30
+    while not (folder / name / "result.part.h5").exists() and time.time() < end:
+        time.sleep(0.005)
+    time.sleep(0.1)
+    return p
+
+
+def ended(p, code):
+    out, err = p.communicate(timeout=60)
+    assert p.returncode == code, (p.returncode, out, err)
+    return err
+
+
+def resumed(folder, name, *arguments, code=DONE, **more):
+    result = call("resume", name, "--quiet", *arguments, cwd=folder, **more)
+    assert result.returncode == code, (result.returncode, result.stdout, result.stderr)
+    return result.stderr
+
+
+# ---- stops ----
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGUSR2])
+def test_stopped_by_a_signal(whole, number):
+    folder, one = whole
+    name = f"signal{int(number)}"
+    p = begun(folder, name)
+    p.send_signal(number)
+    err = ended(p, SIGNAL)
+    assert f"stopped by signal {int(number)} after step" in err and f"bergtow resume {name}" in err
+    n = Run(folder / name, None).summary["n_steps"]
+    assert 0 < n < 12000
+    assert resumed(folder, name) == ""
+    assert_same_result(one.dir, folder / name)
+
+
+def test_a_checkpoint_by_a_signal(whole):
+    """SIGUSR1: a checkpoint and a result to look at, and the run goes on to its end."""
+    folder, one = whole
+    p = begun(folder, "usr1")
+    p.send_signal(signal.SIGUSR1)
+    end = time.time() + 20
+    while not (folder / "usr1/checkpoint.h5").exists() and time.time() < end:
+        time.sleep(0.005)
+    assert p.poll() is None, "the run had ended before it was looked at"
+    check_readable(folder / "usr1")
+    with h5py.File(folder / "usr1/result.h5") as f:
+        assert f.attrs["complete"] == 0
+    ended(p, DONE)
+    assert (folder / "usr1/checkpoint.previous.h5").exists()
+    assert_same_result(one.dir, folder / "usr1")
+
+
+def test_the_stop_file(whole):
+    folder, one = whole
+    p = begun(folder, "stopped")
+    (folder / "stopped/stop").touch()
+    assert "stopped by the file stop after step" in ended(p, SIGNAL)
+    assert not (folder / "stopped/stop").exists()
+    assert resumed(folder, "stopped") == ""
+    assert_same_result(one.dir, folder / "stopped")
+
+
+def test_the_wall_time(whole):
+    folder, one = whole
+    result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.3", cwd=folder)
+    assert result.returncode == SIGNAL and "stopped by the limit of 0.3 s of wall time after step" in result.stderr, result.stderr
+    pieces = 1
+    while call("resume", "walled", "--quiet", "--max-wall", "0.3s", cwd=folder).returncode == SIGNAL:
+        pieces += 1
+        assert pieces < 60
+    assert_same_result(one.dir, folder / "walled")
+
+
+def test_by_wall_time(tmp_path):
+    """output.checkpoint_wall: many on the way, and the last two are kept."""
+    r = run(tmp_path, changed(LONG, output__checkpoint_wall=0.02), "--quiet")
+    assert (r.dir / "checkpoint.previous.h5").exists() and not list(r.dir.glob("*.tmp"))
+    with h5py.File(r.dir / "checkpoint.h5") as a, h5py.File(r.dir / "checkpoint.previous.h5") as b:
+        assert a["world/step"][0] == 12000 > b["world/step"][0] > 0
+
+
+def test_a_finished_run_says_so(whole):
+    folder, one = whole
+    before = (one.dir / "result.h5").read_bytes()
+    result = call("resume", one.dir)
+    assert result.returncode == DONE and "is finished: all 12000 steps are done" in result.stdout
+    assert (one.dir / "result.h5").read_bytes() == before
+
+
+# ---- the folder ----
+
+def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
+    path = write_case(tmp_path, LONG)
+    p = begun(tmp_path, "out")
+    p.send_signal(signal.SIGSTOP) # it holds the folder, and does not end meanwhile
+    again = call("resume", "out", cwd=tmp_path)
+    assert again.returncode == IO and f"another run is at work in this folder (process {p.pid} on" in again.stderr
+    again = call("run", path, "-o", "out", "--force", cwd=tmp_path)
+    assert again.returncode == IO and "another run is at work" in again.stderr
+    p.kill()
+    p.communicate()
+    again = call("run", path, "-o", "out", cwd=tmp_path)
+    assert again.returncode == IO and "holds an unfinished run; go on with it by `bergtow resume out`" in again.stderr
+    # Killed before its first checkpoint: from its case, at time zero.
+    result = call("resume", "out", cwd=tmp_path)
+    assert result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout, result.stderr
+    assert Run(tmp_path / "out", None).summary["n_steps"] == 12000
+
+
+@pytest.mark.parametrize("arguments, code, text", [
+    ([], USAGE, "no folder given"),
+    (["nowhere"], IO, "nowhere: there is no such folder"),
+    (["empty"], IO, "empty: holds no checkpoint"),
+    (["empty", "--max-wall", "2 parsecs"], USAGE, "--max-wall 2 parsecs"),
+    (["empty", "--max-wall", "0"], USAGE, "give a time of more than 0"),
+    (["empty", "--stops"], USAGE, "did you mean --steps?"),
+    (["empty/notes.txt"], REFUSED, "empty/notes.txt: is cut off, or no file of this program"),
+    (["empty/field.h5"], REFUSED, "empty/field.h5: is a field file, and a checkpoint file is needed here"),
+])
+def test_what_cannot_be_resumed(tmp_path, arguments, code, text):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "empty/notes.txt").write_text("no checkpoint")
+    if "field" in text:
+        call("field", write_case(tmp_path, TOW), "-o", tmp_path / "empty/field.h5")
+    result = call("resume", *arguments, cwd=tmp_path)
+    assert result.returncode == code and text in result.stderr, result.stderr
+
+
+# ---- damage ----
+
+def flip(path, at):
+    raw = bytearray(path.read_bytes())
+    raw[at % len(raw)] ^= 16
+    path.write_bytes(raw)
+
+
+@pytest.fixture
+def stopped(tmp_path):
+    """A run stopped in its middle, with two checkpoints."""
+    write_case(tmp_path, changed(TOW, output__checkpoint_steps=60))
+    whole = run(tmp_path, tmp_path / "case.yml", "--quiet", name="whole")
+    run(tmp_path, tmp_path / "case.yml", "--quiet", "--steps", 160)
+    return tmp_path, whole.dir
+
+
+def test_a_damaged_checkpoint_is_not_taken(stopped):
+    """The one before it is, with a warning that says why; when that is damaged too, nothing runs."""
+    folder, whole = stopped
+    flip(folder / "out/checkpoint.h5", 70000)
+    assert re.search(f"warning: out/{BROKEN}.*; out/checkpoint.previous.h5 is taken, step 120", resumed(folder, "out"))
+    assert_same_result(whole, folder / "out")
+    for name in "checkpoint.h5", "checkpoint.previous.h5":
+        flip(folder / "out" / name, 12345)
+    err = resumed(folder, "out", code=REFUSED)
+    assert f"out/{BROKEN}: its bytes do not fit their digest; take another copy" in err and "HDF5-DIAG" not in err
+
+
+def test_a_missing_and_a_cut_checkpoint(stopped):
+    folder, whole = stopped
+    path = folder / "out/checkpoint.h5"
+    path.write_bytes(path.read_bytes()[:-100])
+    assert "checkpoint.h5: is cut off" in resumed(folder, "out", "--steps", 3)
+    assert (folder / "out/checkpoint.damaged.h5").exists() # set aside: it must not push out the sound one
+    path.unlink()
+    assert "the last checkpoint is missing; out/checkpoint.previous.h5 is taken" in resumed(folder, "out")
+    assert_same_result(whole, folder / "out")
+
+
+def test_a_damaged_result_is_not_continued(stopped):
+    folder, whole = stopped
+    kept = (folder / "out/result.h5").read_bytes()
+    flip(folder / "out/result.h5", 99999)
+    assert "out/result.h5: is damaged" in resumed(folder, "out", code=REFUSED)
+    shutil.copy(whole / "result.h5", folder / "out/result.h5") # later, and of the same run: what is too much is left out
+    assert resumed(folder, "out", "--steps", 2) == ""
+    (folder / "out/result.h5").unlink()
+    assert "out/result.h5: cannot read the file: No such file" in resumed(folder, "out", code=IO)
+    (folder / "out/result.h5").write_bytes(kept)
+    assert "holds" in resumed(folder, "out", code=REFUSED) # older than the checkpoint by now
+    shutil.copy(whole / "result.h5", folder / "out/result.h5")
+    assert resumed(folder, "out") == ""
+    assert_same_result(whole, folder / "out")
+
+
+def test_tables_and_fields_may_be_gone(tmp_path):
+    """The checkpoint holds them: a run that goes on reads no file that the case names."""
+    (tmp_path / "wind.csv").write_text("t,u,v\n0,1,0\n40,-2,3\n")
+    call("field", write_case(tmp_path, TOW, "field.yml"), "-o", tmp_path / "ice.h5")
+    case = changed(TOW, ice={"field": "ice.h5", "friction": 0.3}, air={"wind_table": "wind.csv"})
+    whole = run(tmp_path, case, "--quiet", name="whole")
+    run(tmp_path, case, "--quiet", "--steps", 100)
+    (tmp_path / "wind.csv").unlink()
+    (tmp_path / "ice.h5").unlink()
+    (tmp_path / "case.yml").unlink()
+    assert resumed(tmp_path, "out") == ""
+    assert_same_result(whole.dir, tmp_path / "out")
+
+
+def test_diff_names_the_first_difference(stopped):
+    folder, whole = stopped
+    out, old = folder / "out/checkpoint.h5", folder / "out/checkpoint.previous.h5"
+    same = call("diff", out, out)
+    assert same.returncode == DONE and same.stdout == "the states are the same\n"
+    other = call("diff", out, old)
+    assert other.returncode == 1 and re.match(r"/bodies/\w+: row \d+, column \d+: \S+ and \S+ \(\d+ of \d+ numbers differ\)\n", other.stdout), other.stdout
+    shown = call("diff", "out", cwd=folder)
+    assert shown.returncode == DONE and re.search(r"world/step +int64 +160\n", shown.stdout) and "tow/travel_x" in shown.stdout
+    flip(old, 5000)
+    assert call("diff", out, old).returncode == REFUSED
+
+
+# ---- no space, no permission ----
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of 6 MB, or, where none can be mounted, None: then a limit on the size of files stands in for it."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", disk], capture_output=True).returncode == 0
+    yield disk, mounted
+    if mounted:
+        subprocess.run(["umount", "-l", disk], check=False)
+
+
+def test_a_disk_that_fills_up(tmp_path, small_disk):
+    """Whatever write meets it, the earlier checkpoint stays, and the run goes on to the same end when there is space."""
+    disk, mounted = small_disk
+    case = changed(TOW, output__checkpoint_steps=20, output__frame_interval=0.5)
+    whole = run(tmp_path, case, "--quiet", name="whole")
+    write_case(disk, case)
+    assert call("run", "case.yml", "-o", "out", "--quiet", "--steps", 100, cwd=disk).returncode == DONE
+    before = (disk / "out/checkpoint.h5").read_bytes()
+    faults = set()
+    for left in 0, 30, 200, 500, 900, 1500:
+        ballast = disk / "ballast"
+        if mounted:
+            free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize
+            ballast.write_bytes(bytes(max(0, free - 1024 * left)))
+            result = call("resume", "out", "--quiet", cwd=disk)
+            ballast.unlink()
+        else:
+            result = call("resume", "out", "--quiet", cwd=disk, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * left, 1024 * left)))
+        if result.returncode == DONE:
+            break
+        assert result.returncode == IO and len(result.stderr.splitlines()) == 1, (left, result.returncode, result.stderr)
+        fault = re.search(r"out/(\S+): cannot (?:write the|make the|create the) file: (?:No space left on device|File too large); (free|raise)", result.stderr)
+        assert fault, result.stderr
+        faults.add(fault[1])
+        check_readable(disk / "out")
+        if "checkpoint.h5" not in faults: # none has been completed since
+            checkpoints = [(disk / "out" / n).read_bytes() for n in ("checkpoint.h5", "checkpoint.previous.h5") if (disk / "out" / n).exists()]
+            assert len(checkpoints) == 2 and (before in checkpoints or left > 200)
+    assert len(faults) >= 2, faults
+    if result.returncode != DONE:
+        resumed(disk, "out")
+    assert_same_result(whole.dir, disk / "out")
+
+
+@pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="the superuser may write anywhere, and there is no setpriv to be someone else with")
+def test_a_folder_that_must_not_be_written(tmp_path, stopped):
+    folder, whole = stopped
+    out = folder / "out"
+    before = (out / "checkpoint.h5").read_bytes()
+    for path in [folder, *folder.parents][:3]:
+        path.chmod(path.stat().st_mode | 0o55)
+    out.chmod(0o555)
+    other = ["setpriv", "--reuid", "65534", "--clear-groups"] if os.geteuid() == 0 else []
+    result = subprocess.run([*other, BERGTOW, "resume", "out", "--quiet"], cwd=folder, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
+    out.chmod(0o755)
+    assert result.returncode == IO and re.search(r"out/run.lock: cannot make the file: Permission denied; change the permissions", result.stderr), result.stderr
+    assert (out / "checkpoint.h5").read_bytes() == before
+    resumed(folder, "out")
+    assert_same_result(whole, out)
+
+
+# ---- guards ----
+
+JAM = changed(TOW, run__duration=25, ice__concentration=0.8, solver={"max_sweeps": 3, "tolerance": 1e-6}, output__checkpoint_steps=30)
+
+
+@pytest.mark.parametrize("guard, value, text", [
+    ("overlap", 0.002, r"two bodies overlap by \S+ m, \S+ of the mean floe size \(guard.overlap 0.002\)"),
+    ("energy", 0.002, r"the bodies have \S+ J of kinetic energy"),
+    ("unconverged", 7, r"7 steps in a row did not converge"),
+])
+def test_a_guard_leaves_the_state_before(tmp_path, guard, value, text):
+    """Exit code 5; failure.h5 is the state one step before, and to take it up meets the same failure."""
+    r = run(tmp_path, changed(JAM, **{f"guard__{guard}": value}), "--quiet", code=NUMERIC)
+    said = re.search(rf"step (\d+): {text}.*", r.result.stderr)
+    assert said and f"{r.dir}/failure.h5 holds the state before that step" in r.result.stderr, r.result.stderr
+    step = int(said[1])
+    with h5py.File(r.dir / "failure.h5") as f:
+        assert f["world/step"][0] == step - 1 > 0
+    assert not (r.dir / "summary.json").exists() and not (r.dir / "result.part.h5").exists()
+    check_readable(r.dir)
+    for what in "out/failure.h5", "out":
+        assert said[0] in resumed(tmp_path, what, code=NUMERIC)
+    free = run(tmp_path, JAM, "--quiet", "--steps", step - 1, name="free")
+    text = call("diff", free.dir, r.dir / "failure.h5").stdout
+    assert text.startswith("/case/resolved: the texts differ"), text # and nothing before it: bodies

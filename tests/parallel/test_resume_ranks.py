@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""A run that is stopped or killed on some ranks ends, on others, as the run that was never stopped.
+
+What turns these tests red (tried): traces of contacts gathered from one rank alone, the state saved after the open collisions have been closed, the entry of the
+series under way left out, the frame that the end of --steps adds kept, the panel loads or the stall left out, a checkpoint without the result that it counts on.
+"""
+import random
+import signal
+import time
+
+import h5py
+import pytest
+
+from harness import SIGNAL, Run, changed
+from resuming import assert_same_result, check_readable, done, killed_after, started, uninterrupted
+from test_window import LINE as WINDOW
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    path, seconds = uninterrupted(folder)
+    events = [e["kind"] for e in Run(path, None).summary["events"]]
+    assert "line_broken" in events and "waypoint" in events
+    return folder, path, seconds
+
+
+@pytest.mark.parametrize("before, after, steps", [(1, 2, 104), (2, 1, 106), (2, 4, 92)])
+def test_on_other_ranks(whole, before, after, steps):
+    """Stopped in the middle of a sample of three steps, between two frames, with a collision under way."""
+    folder, path, _ = whole
+    name = f"r{before}to{after}"
+    done(before, "run", "case.yml", "-o", name, "--quiet", "--threads", 1, "--steps", steps, cwd=folder)
+    with h5py.File(folder / name / "checkpoint.h5") as f:
+        assert f["record/merged_steps"][0] > 0 and len(f["impacts/open"]) > 0
+    done(after, "resume", name, "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / name)
+    assert Run(folder / name, None).summary["ranks"] == after
+
+
+def test_the_window(tmp_path):
+    """Floes that have changed their place, and laps that are counted."""
+    case = changed(WINDOW, run__duration=25, output__checkpoint_steps=37)
+    path, _ = uninterrupted(tmp_path, case)
+    assert Run(path, None).summary["moving_window"]["renewed"] > 50
+    done(2, "run", "case.yml", "-o", "cut", "--quiet", "--threads", 1, "--steps", 110, cwd=tmp_path)
+    done(3, "resume", "cut", "--quiet", "--threads", 1, "--steps", 50, cwd=tmp_path)
+    done(1, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(path, tmp_path / "cut")
+
+
+def test_killed_again_and_again(whole):
+    """Eight kills at random moments of one run, on ranks that change each time; most fall into the writing of a checkpoint."""
+    folder, path, seconds = whole
+    moments = random.Random(20)
+    kills, early = 0, ()
+    command = ["run", "case.yml", "-o", "killed"]
+    for k in range(40):
+        ranks = [2, 1, 2, 3][k % 4]
+        if killed_after((0.1 + 0.5 * moments.random()) * (seconds + 0.5 * ranks), ranks, *command, "--quiet", "--threads", 1, cwd=folder):
+            kills += 1
+            check_readable(folder / "killed")
+            if not list((folder / "killed").glob("checkpoint*.h5")):
+                early = "/case_as_given",
+        elif (folder / "killed/summary.json").exists():
+            break
+        if (folder / "killed/case.resolved.yml").exists():
+            command = ["resume", "killed"]
+        if kills == 8:
+            break
+    assert kills >= 3, "the run was over too soon"
+    done(2, "resume", "killed", "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / "killed", early)
+
+
+def test_a_signal_to_all_ranks(whole):
+    """mpirun hands on SIGUSR2: all stop after the same step, with a checkpoint."""
+    folder, path, _ = whole
+    p = started(2, "run", "case.yml", "-o", "told", "--quiet", "--threads", 1, cwd=folder)
+    while not (folder / "told/checkpoint.h5").exists() and p.poll() is None:
+        time.sleep(0.01)
+    p.send_signal(signal.SIGUSR2)
+    _, err = p.communicate(timeout=60)
+    assert p.returncode == SIGNAL and "bergtow resume told" in err, err
+    done(1, "resume", "told", "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / "told")
