@@ -69,7 +69,12 @@ double bt_cost_machine(void)
 
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err)
 {
-    const double need = bt_cost_memory(c, n_floes, comm->size, comm->ranks_here);
+    const double need = bt_cost_memory(c, n_floes, comm->size, comm->ranks_here), result = bt_cost_result(c, n_floes);
+    if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
+        bt_errors_add(err, "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g are written; lengthen it, or raise output.sample_every",
+                      c->path ? c->path : "case", n_floes, result, BT_MOST_RESULT_BYTES);
+        return BT_ERR_CASE;
+    }
     if (need <= machine) return BT_OK;
     bt_errors_add(err, "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take larger floes (ice.size), a smaller region, fewer steps (run.duration), "
                   "or more machines (mpirun)", c->path ? c->path : "case", n_floes, (double)bt_case_steps(c), need / 1e9, machine / 1e9);

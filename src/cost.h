@@ -24,7 +24,7 @@ double bt_cost_result(const bt_case *c, double n_floes);
 /// Memory of this machine, or less where the control group of this process has less, B.
 double bt_cost_machine(void);
 
-/// Refuse a case of n_floes that needs more memory than a machine has. Errors: BT_ERR_CASE.
+/// Refuse a case of n_floes that needs more memory than a machine has, or more disk than any run may take. Errors: BT_ERR_CASE.
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err);
 
 #endif

@@ -16,8 +16,9 @@
 #include "tree.h"
 #include "value.h"
 
-static const char *const words[] = {"title", "base", "set", "parameters", "variants", "with", "sampling", "samples", "repeats", "seed", "ranks", NULL};
+static const char *const words[] = {"title", "base", "set", "parameters", "variants", "with", "sampling", "samples", "repeats", "seed", "fields", "ranks", NULL};
 static const char *const samplings[] = {"grid", "latin-hypercube", NULL};
+static const char *const fields[] = {"own", "common", NULL};
 
 typedef struct {
     bt_study *s;
@@ -327,6 +328,18 @@ static const bt_node *entry(const bt_node *root, const char *word, int *line)
     return NULL;
 }
 
+/// Place of the word given for a key in its list of two, 0 where there is none.
+static int read_choice(const reader *r, const bt_node *root, const char *key, const char *const *list)
+{
+    int line;
+    const bt_node *node = entry(root, key, &line);
+    if (!node || !scalar(r, node, line, key)) return 0;
+    for (int k = 0; list[k]; k++)
+        if (!strcmp(list[k], node->text)) return k;
+    COMPLAIN(r, line, "%s: %.60s: give %s or %s", key, node->text, list[0], list[1]);
+    return 0;
+}
+
 static void read_entries(const reader *r, const bt_node *root)
 {
     bt_study *s = r->s;
@@ -351,12 +364,8 @@ static void read_entries(const reader *r, const bt_node *root)
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
     if ((node = entry(root, "with", &line))) read_with(r, node, line);
-    if ((node = entry(root, "sampling", &line)) && scalar(r, node, line, "sampling")) {
-        int k = 0;
-        while (samplings[k] && strcmp(samplings[k], node->text)) k++;
-        if (samplings[k]) s->sampling = (bt_sampling)k;
-        else COMPLAIN(r, line, "sampling: %.60s: give grid or latin-hypercube", node->text);
-    }
+    s->sampling = (bt_sampling)read_choice(r, root, "sampling", samplings);
+    s->common_fields = read_choice(r, root, "fields", fields) == 1;
     const int64_t most = BT_MAX_MEMBERS;
     if ((node = entry(root, "samples", &line))) read_whole(r, node, line, "samples", 1, most, &s->samples);
     else if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) bt_errors_add(r->err, "%s: samples: missing; a Latin hypercube needs the number of its conditions", s->path);
@@ -438,7 +447,8 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
 {
     *out = (bt_member){.condition = m / s->repeats, .repeat = m % s->repeats};
     snprintf(out->name, sizeof out->name, "c%03" PRId64 "-r%03" PRId64, out->condition + 1, out->repeat + 1);
-    bt_rng r = bt_rng_start(s->seed, BT_RNG_MEMBER, out->condition * ((int64_t)1 << 32) + out->repeat);
+    const int64_t condition = s->common_fields ? 0 : out->condition;
+    bt_rng r = bt_rng_start(s->seed, BT_RNG_MEMBER, condition * ((int64_t)1 << 32) + out->repeat);
     out->seed = (int64_t)(bt_rng_bits(&r) >> 2); // below 4.7e18
     int most = s->n_set + s->n_parameters + 1;
     for (int i = 0; i < s->n_variants; i++) most += s->variant[i].n_set;
@@ -477,7 +487,8 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     FILE *out = open_memstream(&text, &size);
     if (!out) abort();
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n", s->seed, samplings[s->sampling], s->n_conditions);
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, samplings[s->sampling], s->n_conditions,
+            s->common_fields ? "fields: common\n" : "");
     for (int p = 0; p < s->n_parameters; p++) {
         fprintf(out, "%s:", s->parameter[p].name);
         if (s->parameter[p].continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)

@@ -16,10 +16,11 @@
 //     samples: 100                         # conditions of the Latin hypercube
 //     repeats: 20                          # fields of each condition
 //     seed: 1
+//     fields: own                          # of each condition; common: the same seeds in all, to compare conditions on the same ice
 //     ranks: 1                             # MPI ranks that work on one member
 //
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows from
-// (seed, condition, repeat) alone, so more repeats may be asked for later without changing a member.
+// (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later without changing a member.
 #ifndef BERGTOW_STUDY_H
 #define BERGTOW_STUDY_H
 
@@ -61,6 +62,7 @@ typedef struct bt_study {
     bt_study_variant *with; ///< [n_with] name: "key=value" of a parameter
     int n_with;
     bt_sampling sampling;
+    bool common_fields;  ///< repeat r has the same seed in every condition
     int64_t samples, repeats, seed, ranks;
     int64_t n_conditions;
 } bt_study;

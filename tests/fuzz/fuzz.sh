@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; a second word "keep" in place of the seconds puts the smallest set of inputs that
-# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 40 kB. Found inputs stay in build/fuzz/found/NAME; one that breaks
+# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB. Found inputs stay in build/fuzz/found/NAME; one that breaks
 # something is in build/fuzz/broken/: mend the program and keep the input.
 set -eu
 name=$1 what=${2:-60}
@@ -30,12 +30,12 @@ if [ "$what" = keep ]; then
     total=0
     find "$merged" -type f -printf '%s %p\n' | sort -n | while read -r size path; do
         total=$((total + size))
-        [ $total -lt 40000 ] || break
+        [ $total -lt 20000 ] || break
         cp "$path" "$kept"/
     done
     rm -rf "$merged"
     du -sb "$kept"
 else
-    $build/fuzz_"$name" -max_total_time="$what" -timeout=20 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
         -print_final_stats=1 "$found" "$kept" </dev/null
 fi

@@ -48,6 +48,9 @@ static void what_does_not_fit_is_refused_with_both_numbers(void **state)
     assert_non_null(strstr(err.text[0], "need some 3.33 GB of memory"));
     assert_non_null(strstr(err.text[0], "ice.size"));
     bt_errors_free(&err);
+    assert_int_equal(bt_cost_fits(&c, 4.1e8, &bt_comm_alone, 1e15, &err), BT_ERR_CASE);
+    assert_non_null(strstr(err.text[0], "output.frame_interval"));
+    bt_errors_free(&err);
     assert_true(bt_cost_machine() > 1e6 && isfinite(bt_cost_machine()));
 }
 

@@ -107,8 +107,33 @@ static void hypercube_has_one_sample_in_each_stratum(void **state)
     bt_study_free(&s);
 }
 
+static void common_fields_are_the_same_in_every_condition(void **state)
+{
+    (void)state;
+    const char *text = "base: a.yml\nrepeats: 3\nfields: %s\nparameters:\n  run.dt: [1 s, 2 s]\n";
+    int64_t seed[2][6];
+    for (int k = 0; k < 2; k++) {
+        char *t;
+        assert_true(asprintf(&t, text, k ? "common" : "own") > 0);
+        bt_study s = read_text(t);
+        free(t);
+        for (int64_t i = 0; i < 6; i++) {
+            bt_member m;
+            bt_study_member(&s, i, &m);
+            seed[k][i] = m.seed;
+            bt_member_free(&m);
+        }
+        bt_study_free(&s);
+    }
+    for (int i = 0; i < 3; i++) {
+        assert_true(seed[0][i] != seed[0][i + 3]);
+        assert_true(seed[1][i] == seed[1][i + 3] && seed[1][i] == seed[0][i] && seed[1][i] != seed[1][(i + 1) % 3]);
+    }
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once), cmocka_unit_test(hypercube_has_one_sample_in_each_stratum)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once), cmocka_unit_test(common_fields_are_the_same_in_every_condition),
+                                       cmocka_unit_test(hypercube_has_one_sample_in_each_stratum)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
