@@ -12,6 +12,7 @@
 #include "largest.h"
 
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 64, BASE_BYTES = 20e6;
+static const double CHECKPOINT_BYTES_PER_FLOE = 1000; // on rank 0 while it writes one: rows on the way, columns, the field, contacts
 static const double BYTES_PER_FLOE_FRAME = 100; // pose, force and speed 40 B, outline in single precision 8 B a vertex
 
 double bt_cost_floe_step(double concentration)
@@ -28,7 +29,7 @@ double bt_cost_seconds(const bt_case *c)
 
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
 {
-    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here + BYTES_PER_STEP * (double)bt_case_steps(c);
+    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here + CHECKPOINT_BYTES_PER_FLOE * n_floes + BYTES_PER_STEP * (double)bt_case_steps(c);
 }
 
 double bt_cost_result(const bt_case *c, double n_floes)

@@ -246,7 +246,9 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     } else if (status == BT_OK) {
         status = finish(r, err);
     } else {
-        bt_record_close(r->record, NULL, err);
+        bt_errors more = {0}; // after a failed write another one says nothing new
+        bt_record_close(r->record, NULL, status == BT_ERR_IO ? &more : err);
+        bt_errors_free(&more);
     }
     bt_halt_end(&r->halt);
     return status;

@@ -286,21 +286,53 @@ def test_a_disk_that_fills_up(tmp_path, small_disk):
     assert_same_result(whole.dir, disk / "out")
 
 
-@pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="the superuser may write anywhere, and there is no setpriv to be someone else with")
-def test_a_folder_that_must_not_be_written(tmp_path, stopped):
+@pytest.fixture
+def somebody(tmp_path):
+    """Words before a command that make it run without the rights of the superuser, who may write anywhere."""
+    if os.geteuid() != 0:
+        return []
+    if not shutil.which("setpriv"):
+        pytest.skip("the superuser may write anywhere, and there is no setpriv to be someone else with")
+    for path in [tmp_path, *tmp_path.parents][:3]:
+        path.chmod(path.stat().st_mode | 0o55)
+    return ["setpriv", "--reuid", "65534", "--clear-groups"]
+
+
+def test_a_folder_that_must_not_be_written(stopped, somebody):
     folder, whole = stopped
     out = folder / "out"
     before = (out / "checkpoint.h5").read_bytes()
-    for path in [folder, *folder.parents][:3]:
-        path.chmod(path.stat().st_mode | 0o55)
     out.chmod(0o555)
-    other = ["setpriv", "--reuid", "65534", "--clear-groups"] if os.geteuid() == 0 else []
-    result = subprocess.run([*other, BERGTOW, "resume", "out", "--quiet"], cwd=folder, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
+    result = subprocess.run([*somebody, BERGTOW, "resume", "out", "--quiet"], cwd=folder, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
     out.chmod(0o755)
     assert result.returncode == IO and re.search(r"out/run.lock: cannot make the file: Permission denied; change the permissions", result.stderr), result.stderr
     assert (out / "checkpoint.h5").read_bytes() == before
     resumed(folder, "out")
     assert_same_result(whole, out)
+
+
+def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
+    """In the middle of the run: it ends at the next checkpoint, the last one stays, and it goes on when it may."""
+    case = changed(LONG, output__checkpoint_steps=1500)
+    whole = run(tmp_path, case, "--quiet", name="whole")
+    out = tmp_path / "out"
+    out.mkdir()
+    out.chmod(0o777)
+    p = subprocess.Popen([*somebody, BERGTOW, "run", "case.yml", "-o", "out", "--quiet"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    end = time.time() + 30
+    while not (out / "checkpoint.h5").exists() and time.time() < end:
+        time.sleep(0.005)
+    p.send_signal(signal.SIGSTOP)
+    out.chmod(0o555)
+    before = (out / "checkpoint.h5").read_bytes()
+    p.send_signal(signal.SIGCONT)
+    _, err = p.communicate(timeout=60)
+    out.chmod(0o777)
+    assert p.returncode == IO and re.fullmatch(r"bergtow: out/\S+: cannot \w+ the file: Permission denied; change the permissions.*\n", err), err
+    assert before in [(out / n).read_bytes() for n in ("checkpoint.h5", "checkpoint.previous.h5") if (out / n).exists()]
+    check_readable(out)
+    resumed(tmp_path, "out")
+    assert_same_result(whole.dir, out)
 
 
 # ---- guards ----

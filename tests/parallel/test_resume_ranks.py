@@ -4,6 +4,7 @@
 What turns these tests red (tried): traces of contacts gathered from one rank alone, the state saved after the open collisions have been closed, the entry of the
 series under way left out, the frame that the end of --steps adds kept, the panel loads or the stall left out, a checkpoint without the result that it counts on.
 """
+import json
 import random
 import signal
 import time
@@ -13,6 +14,8 @@ import pytest
 
 from harness import SIGNAL, Run, changed
 from resuming import assert_same_result, check_readable, done, killed_after, started, uninterrupted
+from test_everything import ALL
+from test_outlines_ranks import with_bays
 from test_window import LINE as WINDOW
 
 
@@ -47,6 +50,21 @@ def test_the_window(tmp_path):
     done(3, "resume", "cut", "--quiet", "--threads", 1, "--steps", 50, cwd=tmp_path)
     done(1, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
     assert_same_result(path, tmp_path / "cut")
+
+
+def test_everything_at_once(tmp_path):
+    """Window, floes in parts, crushing, a vessel on a bridle that breaks, tide, wind: two stops, three numbers of ranks."""
+    path = with_bays(tmp_path, ALL)
+    case = json.loads(path.read_text())
+    case["ice"] |= {"crushing": ALL["ice"]["crushing"]}
+    path.write_text(json.dumps(case))
+    done(1, "run", path, "-o", "whole", "--quiet", "--threads", 1, cwd=tmp_path)
+    done(2, "run", path, "-o", "cut", "--quiet", "--threads", 1, "--steps", 131, cwd=tmp_path)
+    with h5py.File(tmp_path / "cut/checkpoint.h5") as f:
+        assert f["contacts/crushed"][:].any() and f["bodies/copy"][:].any() and f["contacts/part"][:].any()
+    done(3, "resume", "cut", "--quiet", "--threads", 1, "--steps", 97, cwd=tmp_path)
+    done(1, "resume", "cut", "--quiet", "--threads", 2, cwd=tmp_path)
+    assert_same_result(tmp_path / "whole", tmp_path / "cut")
 
 
 def test_killed_again_and_again(whole):
