@@ -15,7 +15,8 @@ from harness import BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, US
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
-LONG = changed(TOW, run__dt=0.0005, run__duration=6, output__frame_interval=0.5, output__sample_every=7)
+STEPS = 40000
+LONG = changed(TOW, run__dt=0.0005, run__duration=0.0005 * STEPS, output__frame_interval=1.5, output__sample_every=7)
 BROKEN = "checkpoint.h5: is damaged"
 
 
@@ -58,7 +59,7 @@ def test_stopped_by_a_signal(whole, number):
     err = ended(p, SIGNAL)
     assert f"stopped by signal {int(number)} after step" in err and f"bergtow resume {name}" in err
     n = Run(folder / name, None).summary["n_steps"]
-    assert 0 < n < 12000
+    assert 0 < n < STEPS
     assert resumed(folder, name) == ""
     assert_same_result(one.dir, folder / name)
 
@@ -92,12 +93,12 @@ def test_the_stop_file(whole):
 
 def test_the_wall_time(whole):
     folder, one = whole
-    result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.3", cwd=folder)
-    assert result.returncode == SIGNAL and "stopped by the limit of 0.3 s of wall time after step" in result.stderr, result.stderr
+    result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.2", cwd=folder)
+    assert result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr, result.stderr
     pieces = 1
-    while call("resume", "walled", "--quiet", "--max-wall", "0.3s", cwd=folder).returncode == SIGNAL:
+    while call("resume", "walled", "--quiet", "--max-wall", "0.2s", cwd=folder).returncode == SIGNAL:
         pieces += 1
-        assert pieces < 60
+        assert pieces < 200
     assert_same_result(one.dir, folder / "walled")
 
 
@@ -106,14 +107,14 @@ def test_by_wall_time(tmp_path):
     r = run(tmp_path, changed(LONG, output__checkpoint_wall=0.02), "--quiet")
     assert (r.dir / "checkpoint.previous.h5").exists() and not list(r.dir.glob("*.tmp"))
     with h5py.File(r.dir / "checkpoint.h5") as a, h5py.File(r.dir / "checkpoint.previous.h5") as b:
-        assert a["world/step"][0] == 12000 > b["world/step"][0] > 0
+        assert a["world/step"][0] == STEPS > b["world/step"][0] > 0
 
 
 def test_a_finished_run_says_so(whole):
     folder, one = whole
     before = (one.dir / "result.h5").read_bytes()
     result = call("resume", one.dir)
-    assert result.returncode == DONE and "is finished: all 12000 steps are done" in result.stdout
+    assert result.returncode == DONE and f"is finished: all {STEPS} steps are done" in result.stdout
     assert (one.dir / "result.h5").read_bytes() == before
 
 
@@ -134,7 +135,7 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     # Killed before its first checkpoint: from its case, at time zero.
     result = call("resume", "out", cwd=tmp_path)
     assert result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout, result.stderr
-    assert Run(tmp_path / "out", None).summary["n_steps"] == 12000
+    assert Run(tmp_path / "out", None).summary["n_steps"] == STEPS
 
 
 @pytest.mark.parametrize("arguments, code, text", [
@@ -313,7 +314,7 @@ def test_a_folder_that_must_not_be_written(stopped, somebody):
 
 def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     """In the middle of the run: it ends at the next checkpoint, the last one stays, and it goes on when it may."""
-    case = changed(LONG, output__checkpoint_steps=1500)
+    case = changed(LONG, run__duration=6, output__checkpoint_steps=1500)
     whole = run(tmp_path, case, "--quiet", name="whole")
     out = tmp_path / "out"
     out.mkdir()
@@ -328,7 +329,7 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     p.send_signal(signal.SIGCONT)
     _, err = p.communicate(timeout=60)
     out.chmod(0o777)
-    assert p.returncode == IO and re.fullmatch(r"bergtow: out/\S+: cannot \w+ the file: Permission denied; change the permissions.*\n", err), err
+    assert p.returncode == IO and re.fullmatch(r"(bergtow: out/\S+: cannot \w+ the file: Permission denied; change the permissions.*\n){1,2}", err), err
     assert before in [(out / n).read_bytes() for n in ("checkpoint.h5", "checkpoint.previous.h5") if (out / n).exists()]
     check_readable(out)
     resumed(tmp_path, "out")

@@ -33,6 +33,7 @@ JAM = {
     "body": {"shape": "none"},
     "solver": {"tile": 2.5, "max_sweeps": 15},
     "output": {"frame_interval": 2.5},
+    "guard": {"overlap": 0, "escape": False}, # a jam that no one would run on: overlap beyond a floe, floes through the walls
 }
 # No walls, every force, and floes of very different size; the current, which the tide turns, carries them through tiles and seams.
 SEAMS = {

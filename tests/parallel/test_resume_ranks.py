@@ -67,28 +67,34 @@ def test_everything_at_once(tmp_path):
     assert_same_result(tmp_path / "whole", tmp_path / "cut")
 
 
-def test_killed_again_and_again(whole):
-    """Eight kills at random moments of one run, on ranks that change each time; most fall into the writing of a checkpoint."""
-    folder, path, seconds = whole
+def kill_and_resume(folder, name, path, share):
+    """Kill a run again and again, on ranks that change each time, after a random part of `share` seconds; True when three kills and more have struck."""
     moments = random.Random(20)
     kills, early = 0, ()
-    command = ["run", "case.yml", "-o", "killed"]
+    command = ["run", "case.yml", "-o", name]
     for k in range(40):
         ranks = [2, 1, 2, 3][k % 4]
-        if killed_after((0.1 + 0.5 * moments.random()) * (seconds + 0.5 * ranks), ranks, *command, "--quiet", "--threads", 1, cwd=folder):
+        if killed_after((0.2 + moments.random()) * share * (0.5 + 0.5 * ranks), ranks, *command, "--quiet", "--threads", 1, cwd=folder):
             kills += 1
-            check_readable(folder / "killed")
-            if not list((folder / "killed").glob("checkpoint*.h5")):
+            check_readable(folder / name)
+            if not list((folder / name).glob("checkpoint*.h5")):
                 early = "/case_as_given",
-        elif (folder / "killed/summary.json").exists():
+        elif (folder / name / "summary.json").exists():
             break
-        if (folder / "killed/case.resolved.yml").exists():
-            command = ["resume", "killed"]
+        if (folder / name / "case.resolved.yml").exists():
+            command = ["resume", name]
         if kills == 8:
             break
-    assert kills >= 3, "the run was over too soon"
-    done(2, "resume", "killed", "--quiet", "--threads", 1, cwd=folder)
-    assert_same_result(path, folder / "killed", early)
+    done(2, "resume", name, "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / name, early)
+    return kills >= 3
+
+
+def test_killed_again_and_again(whole):
+    """Eight kills at random moments of one run; most fall into the writing of a checkpoint. How long a run takes depends on what else the machine
+    does: where it was over too soon, another is killed sooner."""
+    folder, path, seconds = whole
+    assert any(kill_and_resume(folder, f"killed{k}", path, 0.5 * seconds / 2**k) for k in range(5)), "the runs were over too soon"
 
 
 def test_a_signal_to_all_ranks(whole):
