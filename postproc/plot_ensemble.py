@@ -53,8 +53,6 @@ def groups(e, key):
 
 
 def headline(figure, e, subject):
-    height = figure.get_size_inches()[1]
-    figure.text(0.02, 1 - 0.14 / height, f"{style.plain(e.title)}: {subject}", va="top", fontsize=13.5, fontweight="bold")
     doubtful = sum(bool(e.doubts(m)) for m in e.used)
     words = [f"{len(e.used)} members"]
     if doubtful:
@@ -62,7 +60,7 @@ def headline(figure, e, subject):
     missing = e.n - len(e.used)
     if missing:
         words.append(f"{missing} failed, waiting or left out")
-    figure.text(0.02, 1 - 0.42 / height, ", ".join(words), va="top", color=style.FAINT)
+    style.head(figure, f"{style.plain(e.title)}: {subject}", ", ".join(words))
 
 
 def of(e, rows):

@@ -111,10 +111,14 @@ def title(run):
     return plain(textwrap.shorten(run.summary.get("title") or run.path.resolve().name, 80, placeholder=" ..."))
 
 
-def headline(figure, run, subject, left=0.02):
-    """Title and conditions at the head of a figure, at fixed distances from its top."""
+def head(figure, words, below, left=0.02):
+    """Two lines at the head of a figure, at fixed distances from its top."""
     width, height = figure.get_size_inches()
-    words = f"{title(run)}: {subject}"
     size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))  # a letter is on average less than 0.6 of the font size wide: nothing is cut off
     figure.text(left, 1 - 0.14 / height, words, va="top", fontsize=size, fontweight="bold")
-    figure.text(left, 1 - 0.42 / height, conditions(run), va="top", fontsize=10.5, color=FAINT)
+    figure.text(left, 1 - 0.42 / height, below, va="top", fontsize=10.5, color=FAINT)
+
+
+def headline(figure, run, subject, left=0.02):
+    """Title and conditions at the head of a figure."""
+    head(figure, f"{title(run)}: {subject}", conditions(run), left)
