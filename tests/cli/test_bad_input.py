@@ -287,10 +287,8 @@ def test_help(folder, arguments, fragment):
     assert result.returncode == DONE and fragment in result.stdout and not result.stderr
 
 
-@pytest.mark.parametrize("case", sorted((ROOT / "cases").rglob("*.yml")), ids=lambda p: p.name)
+@pytest.mark.parametrize("case", sorted(p for p in (ROOT / "cases").rglob("*.yml") if p.parent.name != "studies"), ids=lambda p: p.name)
 def test_shipped_cases_are_valid(folder, case):
-    if "run:" not in case.read_text():
-        pytest.skip("not a case but a study")
     result = call("check", case, cwd=folder)
     assert result.returncode == DONE, result.stderr
     assert b"TOO LARGE" not in result.stdout
