@@ -7,6 +7,9 @@ PYTHON ?= /usr/bin/python3
 PREFIX ?= /usr/local
 J      ?= $(shell nproc 2>/dev/null || echo 2)
 
+ifneq ($(filter $(CONFIG),fuzz tsan),)
+CC     := clang-14
+endif
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
 MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
@@ -22,9 +25,13 @@ endif
 OPT_release := -O3 -g -march=x86-64-v3 -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -march=x86-64-v3 -DBT_VALIDATE
-OPT_asan    := -O1 -g3 -fsanitize=address,undefined -fno-sanitize-recover=undefined
-ifeq ($(filter $(CONFIG),release debug validate asan),)
-$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate or asan)
+OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
+# Every loop that may run in parallel does: BT_VALIDATE. gcc's libgomp is not known to a thread sanitizer, hence clang.
+OPT_tsan    := -O1 -g -fsanitize=thread -DBT_VALIDATE -Wno-pass-failed
+OPT_coverage := -O0 -g --coverage -fprofile-abs-path -fprofile-update=atomic
+ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
+$(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
 LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lm
@@ -37,10 +44,14 @@ LIB_OBJ := $(LIB_SRC:%.c=$(BUILD)/%.o)
 BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)
 TEST_BIN := $(TEST_SRC:%.c=$(BUILD)/%)
+# Hostile input: harnesses for libFuzzer, and the kept inputs as a test.
+HARNESS := $(patsubst tests/fuzz/fuzz_%.c,%,$(wildcard tests/fuzz/fuzz_*.c)) setup
+HARNESS_OBJ := $(patsubst %.c,$(BUILD)/%.o,tests/fuzz/fuzz.c $(wildcard tests/fuzz/fuzz_*.c))
+TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo test test-long validate bench fullscale clean install tests lint asan partition-study FORCE
+.PHONY: all help deps demo report test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -81,6 +92,20 @@ $(BUILD)/tests/%: tests/%.c $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $< $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
 
+$(BUILD)/tests/fuzz/%.o: tests/fuzz/%.c $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  CC   $<'
+	@$(CC) $(CFLAGS) -Itests -c $< -o $@
+
+$(BUILD)/tests/fuzz/test_corpus: tests/fuzz/test_corpus.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@echo '  TEST $@'
+	@$(CC) $(CFLAGS) -Itests $(filter %.c %.o,$^) $(BUILD)/libbergtow.a -lcmocka $(LDLIBS) -o $@
+
+# build/fuzz/fuzz_NAME (CONFIG=fuzz)
+$(HARNESS:%=$(BUILD)/fuzz_%): $(BUILD)/fuzz_%: tests/fuzz/entry.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@echo '  FUZZ $@'
+	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
+
 tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
 
 $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
@@ -92,16 +117,26 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
-        python3-yaml python3-pytest ffmpeg
+        python3-yaml python3-jinja2 python3-pytest ffmpeg chromium chromium-driver python3-selenium
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages (on a bare system 360 MB to fetch, some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages (on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
 	$$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+
+# For make lint, and for the other checks of developers; make test needs none of them.
+DEPS_LINT := cppcheck shellcheck pyflakes3
+DEPS_DEV  := $(DEPS_LINT) clang-14 clang-tidy-14 llvm-14 libclang-rt-14-dev libomp-14-dev valgrind gcovr
+
+deps-lint: ## install what make lint can use
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_LINT)'
+
+deps-dev: ## install what tidy, tsan, valgrind, coverage and fuzz need
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_DEV)'
 
 # pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
 AGAIN := $(MAKE) --no-print-directory -j$(J)
@@ -114,6 +149,11 @@ demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw i
 	$(PYTHON) postproc/plot_field.py $(DEMO)
 	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
 	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+
+RUN ?=
+report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
+	@[ -n "$(RUN)" ] || { echo "which run? make report RUN=out/demo"; exit 2; }
+	$(PYTHON) postproc/report.py $(RUN)
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
 test: deps ## every test: units, known answers, same bits, command line
@@ -144,12 +184,33 @@ fullscale: deps ## resistance of an 80 m berg at 20 to 95 % ice beside the estim
 	@$(AGAIN) CONFIG=release all
 	$(PYTHON) cases/fullscale/study.py concentration
 
-lint: all ## names of external symbols, licence lines, syntax
+lint: all ## names of external symbols, licence lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh
 
-asan: ## the unit and physics tests under AddressSanitizer and UBSan
+tidy: all ## clang-tidy over the program (minutes)
+	@tests/tidy.sh
+
+asan: ## tests of units and physics, kept hostile input, and runs on threads and ranks under AddressSanitizer and UBSan
 	@$(AGAIN) CONFIG=asan all tests
-	@for t in $(TEST_SRC:%.c=build/asan/%); do echo $$t; ASAN_OPTIONS=allocator_may_return_null=1 OMP_WAIT_POLICY=passive $$t >build/asan/log 2>&1 || { cat build/asan/log; exit 1; }; done
+	@tests/sanitize.sh asan $(TEST_BIN:build/$(CONFIG)/%=build/asan/%)
+
+tsan: ## tows on threads and ranks, and the tests that use threads, under ThreadSanitizer (clang, libomp with archer)
+	@$(AGAIN) CONFIG=tsan all build/tsan/tests/unit/test_contacts
+	@tests/sanitize.sh tsan build/tsan/tests/unit/test_contacts
+
+valgrind: ## short runs under memcheck
+	@$(AGAIN) CONFIG=debug all
+	@tests/sanitize.sh valgrind
+
+coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/table.txt
+	@$(AGAIN) CONFIG=coverage all tests
+	@tests/coverage.sh $(TEST_BIN:build/$(CONFIG)/%=build/coverage/%)
+
+# make fuzz TARGET=case TIME=600
+TIME ?= 60
+fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, study, table, outlines or field, TIME in seconds
+	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
+	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 
 validate: deps ## the program with assertions, checks of the division, and teams of threads for every loop: build/validate/bergtow
 	@$(AGAIN) CONFIG=validate all
@@ -160,4 +221,4 @@ install: all ## install the program into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(LIB_OBJ:.o=.d) $(HARNESS_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d

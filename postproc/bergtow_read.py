@@ -223,9 +223,14 @@ class Run:
         return self._text("case_as_given" if "case_as_given" in self._file else "case")
 
     @property
+    def resolved_text(self):
+        """Text of the resolved case, as in case.resolved.yml: every key with its unit, meaning and source."""
+        return self._text("case")
+
+    @property
     def case(self):
         """{"section.key": text} of the resolved case: every key, numbers with their units."""
-        return self._once("resolved", lambda: parse_case(self._text("case")))
+        return self._once("resolved", lambda: parse_case(self.resolved_text))
 
     def value(self, key, default=np.nan):
         """Number of a case key in SI units and radians; default where it is missing or no number."""

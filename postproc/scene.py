@@ -131,6 +131,27 @@ def view_body(run):
     return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
+def tow_line(run, frame, position):
+    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where all have broken.
+
+    None without a line.
+    """
+    at = run.frame_times[frame]
+    if run.case.get("tow.mode") not in ("line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+        return None
+    sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
+    if sample >= len(run["time"]):
+        return None
+    ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
+    end, points = position + ahead, []
+    broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
+    for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
+        if broken.get(branch + 1, np.inf) > at:
+            hull = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
+            points += [hull[0]] if points else [hull[0], end]
+    return np.array(points or [end])
+
+
 class Scene:
     """Artists of the ice field on an axes.
 
@@ -273,20 +294,10 @@ class Scene:
 
     def _show_line(self, frame, position):
         """The tow line from the hull to its towing end, a square; two branches meet there; none that has broken."""
-        run, at = self.run, self.run.frame_times[frame]
-        if run.case.get("tow.mode") not in ("line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
-            return
-        sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
-        if sample >= len(run["time"]):
-            return
-        ahead = [run["carriage_x"][sample] - run["body_x"][sample], run["carriage_y"][sample] - run["body_y"][sample]]
-        end, points = position + ahead, []
-        broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
-        for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
-            if broken.get(branch + 1, np.inf) > at:
-                hull = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
-                points += [hull[0]] if points else [hull[0], end]
-        self._line.set_data(*self._flat(np.array(points or [end])).T)
+        points = tow_line(self.run, frame, position)
+        if points is not None:
+            self._line.set_markevery([min(1, len(points) - 1)])  # the end alone where all branches have broken
+            self._line.set_data(*self._flat(points).T)
 
     def _show_arrow(self, position, outline):
         """An arrow ahead of the body, along the tow."""

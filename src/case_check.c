@@ -7,6 +7,7 @@
 
 #include "bergtow/shape.h"
 #include "bergtow/environment.h"
+#include "largest.h"
 #include "schema.h"
 
 #include <math.h>
@@ -14,10 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-static const double largest_number_of_floes = 20e6; // about 40 GB; also keeps bt_idx far from its limit
-static const double largest_number_of_steps = 1e9;
-static const double largest_number_of_frames = 1e6;
 
 typedef struct bt_check {
     bt_case *c;
@@ -201,10 +198,10 @@ static void check_run(const check *k)
     if (c->run.dt > c->run.duration)
         fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run", c->run.dt, c->run.duration);
     double steps = (double)bt_case_steps(c);
-    if (steps > largest_number_of_steps)
-        fault(k, "run.dt", "makes %.3g steps of run.duration, at most %g are run; lengthen the step or shorten the run", steps, largest_number_of_steps);
-    if (sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > largest_number_of_frames)
-        fault(k, "output.frame_interval", "makes %.3g frames, at most %g are written; lengthen it", c->run.duration / c->output.frame_interval, largest_number_of_frames);
+    if (steps > BT_MOST_STEPS)
+        fault(k, "run.dt", "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run", steps, BT_MOST_STEPS);
+    if (sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
+        fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it", c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
     if (sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
         fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time", c->output.window_start, c->run.duration);
 }
@@ -260,8 +257,8 @@ static void check_sizes(const check *k)
     if (power && hi > room) fault(k, "ice.size_max", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
     else if (!power && c->ice.size > room) fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", c->ice.size, room);
     double n = bt_case_expected_floes(c);
-    if (n > largest_number_of_floes)
-        fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %g are simulated; take larger floes or a smaller region", n, largest_number_of_floes);
+    if (n > BT_MOST_FLOES)
+        fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n, BT_MOST_FLOES);
 }
 
 static void check_outlines(const check *k)
@@ -442,7 +439,8 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_check_environment(c, from, err);
     bt_case_check_lead(c, n, v, from, err);
     check_estimate(&k);
-    for (bt_idx i = 0; i < c->n_floes; i++) check_floe(&k, i);
+    for (bt_idx i = 0; i < c->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&k, i);
+    if (err->n == before) bt_case_check_cost(&k);
     return err->n == before ? BT_OK : err->n == at_files ? loaded : BT_ERR_CASE;
 }
 

@@ -50,6 +50,8 @@ void bt_case_tow_course(const bt_check *k);
 void bt_case_tow_follow(const bt_check *k);
 /// Fastening points that are not given, from the waterline v [n][2].
 void bt_case_tow_hull(bt_case *c, int n, const double *v);
+/// Work and output of the run against the limits of size, of a case that is sound so far.
+void bt_case_check_cost(const bt_check *k);
 /// Programme, way-points, lines and vessel.
 void bt_case_tow_check(const bt_check *k);
 /// Where the towing end starts. False when two branches are too short to meet.

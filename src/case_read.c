@@ -4,6 +4,7 @@
 
 #include "bergtow/shape.h"
 #include "fileio.h"
+#include "largest.h"
 #include "schema.h"
 #include "table.h"
 #include "tree.h"
@@ -174,7 +175,12 @@ static void read_floes(reader *r)
         return;
     }
     r->c->floes = bt_alloc((size_t)list->n, sizeof *r->c->floes);
+    const size_t before = r->err->n;
     for (int i = 0; i < list->n; i++) {
+        if (r->err->n - before >= BT_MOST_COMPLAINTS) {
+            bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first", r->c->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+            return;
+        }
         bt_floe_def f = {.line = list->item[i]->line};
         bt_schema_preset(bt_floe_keys, bt_n_floe_keys, &f);
         // A refused floe is left out so that the checks across keys do not complain about it a second time.

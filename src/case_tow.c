@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The tow of a case: defaults that follow from other keys, checks, and where its path leads.
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "bergtow/path.h"
@@ -93,7 +94,7 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
     double start[2];
     *path = (bt_path){0};
     if (!bt_case_tow_start(c, start)) {
-        strcpy(why, "the branches do not reach the middle between their fastening points; lengthen the shorter one or move its fastening point");
+        snprintf(why, 200, "the branches do not reach the middle between their fastening points; lengthen the shorter one or move its fastening point");
         return false;
     }
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;

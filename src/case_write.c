@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Writing of a case: the resolved file, and the table of keys for --list-keys.
+#include "largest.h"
 #include "schema.h"
 #include "value.h"
 
@@ -89,4 +90,5 @@ void bt_case_list_keys(void *stream)
     fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the meaning.\n"
           "floes: is a list of floes given by hand, each a map with the keys\n\n", out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
+    bt_largest_print(out);
 }

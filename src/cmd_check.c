@@ -17,7 +17,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static const double bytes_per_floe = 2048;     // body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice
 static const double gravity = 9.81;
 
 typedef struct {
@@ -212,7 +211,7 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
     const double per_step = bt_cost_floe_step(n->concentration);
     double seconds = n->count * (double)bt_case_steps(c) * per_step;
     double frames = c->run.duration / c->output.frame_interval;
-    printf("memory               about %.3g MB\n", n->count * bytes_per_floe / 1e6 + 20);
+    printf("memory               about %.3g MB\n", bt_cost_memory(c, n->count, 1, 1) / 1e6);
     printf("frames               %.0f, about %.3g MB on disk\n", floor(frames) + 1, frames * n->count * 32 / 1e6);
     printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
 }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with ice.outlines.
 #include "bergtow/field.h"
+#include "case_check.h"
 #include "cmd.h"
+#include "cost.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,6 +58,7 @@ int bt_cmd_field(int argc, char **argv)
         status = BT_ERR_CASE;
     }
     double start = bt_clock();
+    if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);
     if (status == BT_OK) status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     if (status == BT_OK)

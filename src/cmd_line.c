@@ -110,7 +110,9 @@ char *bt_cmd_default_folder(const char *path)
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
     bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
     char *folder = NULL;
-    if (asprintf(&folder, "out/%.*s", yaml ? (int)(dot - name) : (int)strlen(name), name) < 0) abort();
+    const int n = yaml ? (int)(dot - name) : (int)strlen(name);
+    const bool dots = (int)strspn(name, ".") >= n; // "...yml" would be the folder above out/
+    if (asprintf(&folder, "out/%.*s", dots ? 4 : n, dots ? "case" : name) < 0) abort();
     return folder;
 }
 

@@ -21,7 +21,10 @@ enum { KEY_STEPS = 256, KEY_DUMP, KEY_FORCE };
 static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
 {
     char *colon = strchr(arg, ':');
-    if (!colon || !colon[1]) argp_error(state, "--dump-contacts %s: give STEP:FILE.h5, as in 100:contacts.h5", arg);
+    if (!colon || !colon[1]) {
+        argp_error(state, "--dump-contacts %s: give STEP:FILE.h5, as in 100:contacts.h5", arg);
+        return;
+    }
     *colon = 0;
     run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 0, INT64_MAX);
     run->dump_path = colon + 1;

@@ -6,6 +6,7 @@
 // (it is no contact) is held at its solved value. With ice.crushing the bounds of the normal impulses are those at the solution.
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bergtow/fclib.h"
 #include "bergtow/crush.h"
@@ -65,6 +66,35 @@ static row *rows_of(const bt_world *w, int *n)
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;
+}
+
+/// Lever of a row's contact point from r × n and r × t, with t = (−n_y, n_x): r = (r × t) n − (r × n) t.
+static void lever_of(double nx, double ny, double rn, double rt, double out[2])
+{
+    out[0] = rt * nx + rn * ny;
+    out[1] = rt * ny - rn * nx;
+}
+
+/// Where the rows and all bodies are; the arrays belong to the caller afterwards.
+static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
+{
+    const bt_bodies *b = &w->bodies;
+    int64_t *body = bt_alloc(2 * (size_t)n, sizeof *body);
+    double *normal = bt_alloc(2 * (size_t)n, sizeof *normal), *lever = bt_alloc(4 * (size_t)n, sizeof *lever);
+    double *pose = bt_alloc(3 * (size_t)b->n_global, sizeof *pose);
+    for (int k = 0; k < n; k++) {
+        const row *p = &rows[k];
+        body[2 * k] = p->gid_a, body[2 * k + 1] = p->gid_b;
+        normal[2 * k] = p->nx, normal[2 * k + 1] = p->ny;
+        lever_of(p->nx, p->ny, p->ran, p->rat, lever + 4 * k);
+        lever_of(p->nx, p->ny, p->rbn, p->rbt, lever + 4 * k + 2);
+    }
+    for (bt_gid g = 0; g < b->n_global; g++) {
+        const bt_idx i = bt_world_index(w, g);
+        const double at[3] = {i < 0 ? NAN : b->pose[i].x, i < 0 ? NAN : b->pose[i].y, i < 0 ? NAN : b->pose[i].yaw};
+        memcpy(pose + 3 * g, at, sizeof at);
+    }
+    return (bt_fclib_places){.time = (double)w->step * w->par.dt, .dt = w->par.dt, .body = body, .normal = normal, .lever = lever, .n_bodies = (int64_t)b->n_global, .pose = pose};
 }
 
 static int by_contact(const void *a, const void *b)
@@ -154,9 +184,10 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         for (int64_t e = ptr[i]; e < ptr[i + 1]; e++) wr += val[e] * r[col[e]];
         q[i] = u[i] - wr;
     }
-    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, "bergtow",
+    const bt_fclib_places places = places_of(w, rows, n);
+    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, &places, "bergtow",
                                               "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound};
+    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

@@ -68,7 +68,7 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
     bt_errors none = {0};
     if (bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
         char *rest = strchr(text, '\n');
-        if (code) *code = atoi(text);
+        if (code) *code = (int)strtol(text, NULL, 10);
         if (why && rest) *why = strdup(rest + 1);
     }
     free(text);

@@ -8,6 +8,7 @@
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
+//     /bound, /places                              of our own: bounds of the normal impulses; where contacts and bodies are
 // A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 
@@ -85,10 +86,31 @@ static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_
     free(u);
 }
 
+static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
+{
+    bt_h5_attr_text(h, path, "units", units);
+    bt_h5_attr_text(h, path, "description", text);
+}
+
+static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
+{
+    bt_h5_group(h, "/places");
+    bt_h5_attr_double(h, "/places", "time", p->time);
+    bt_h5_attr_double(h, "/places", "dt", p->dt);
+    bt_h5_write(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body);
+    describe(h, "/places/body", "1", "ids of the two bodies of each contact");
+    bt_h5_write(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal);
+    describe(h, "/places/normal", "1", "from the first body to the second, world frame");
+    bt_h5_write(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever);
+    describe(h, "/places/lever", "m", "from the centroid of the first and of the second body to the contact point, world frame, at the start of the step");
+    bt_h5_write(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose);
+    describe(h, "/places/pose", "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
+}
+
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
                                  const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound, const char *title,
-                                 const char *description, bt_errors *err)
+                                 const double *solution_u, const double *solution_r, const double *bound, const bt_fclib_places *places,
+                                 const char *title, const char *description, bt_errors *err)
 {
     bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
     if (status != BT_OK) return status;
@@ -106,6 +128,7 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
         bt_h5_write_text(&h, "/fclib_local/info/math_info",
                          "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent");
         if (bound) bt_h5_write(&h, "/bound", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, bound);
+        if (places) write_places(&h, places, (hsize_t)n_contacts);
         if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
         if (solution_r) {
             bt_h5_group(&h, "/solution");
@@ -126,5 +149,5 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
                                const double *solution_u, const double *solution_r, const char *title,
                                const char *description, bt_errors *err)
 {
-    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, title, description, err);
+    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, NULL, title, description, err);
 }

@@ -22,8 +22,7 @@
 #include "field_load.h"
 #include "fileio.h"
 #include "h5util.h"
-
-static const hsize_t MOST_FLOES = 20000000;
+#include "largest.h"
 
 // ---- write ----
 
@@ -186,18 +185,18 @@ static void read_floes(reader *r, bt_field *f)
 {
     hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
     bt_field_free(f);
-    f->offsets = read_dataset(r, "/floes/offsets", true, 0, MOST_FLOES + 1, &n_offsets);
+    f->offsets = read_dataset(r, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
     if (r->r.status == BT_OK && n_offsets < 1) bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
     hsize_t n = n_offsets ? n_offsets - 1 : 0;
     f->vertices = read_dataset(r, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
     check_offsets(r, f->offsets, n, n_vertices);
-    f->pose = read_dataset(r, "/floes/pose", false, 3, MOST_FLOES, &n_pose);
+    f->pose = read_dataset(r, "/floes/pose", false, 3, BT_MOST_FLOES, &n_pose);
     same_length(r, "/floes/pose", n_pose, n);
-    f->thickness = read_dataset(r, "/floes/thickness", false, 0, MOST_FLOES, &n_thickness);
+    f->thickness = read_dataset(r, "/floes/thickness", false, 0, BT_MOST_FLOES, &n_thickness);
     same_length(r, "/floes/thickness", n_thickness, n);
     double *stored_area = NULL;
     if (r->r.status == BT_OK && H5Lexists(r->file, "/floes/area", H5P_DEFAULT) > 0) {
-        stored_area = read_dataset(r, "/floes/area", false, 0, MOST_FLOES, &n_area);
+        stored_area = read_dataset(r, "/floes/area", false, 0, BT_MOST_FLOES, &n_area);
         same_length(r, "/floes/area", n_area, n);
     }
     f->ice_area = read_ice_area(r);

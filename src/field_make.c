@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "field_make.h"
+#include "largest.h"
 #include "rng.h"
 
 static const double CLEARANCE = 2e-3; // water kept around obstacles / mean size
@@ -19,7 +20,7 @@ static const double STRIDE = 0.3;     // move of a floe in a step of the shake /
 static const double PUSH = 1.02;      // growth of a floe that has no room
 static const double GROWN = 1e-3;     // shortfall of area at which a growing floe counts as grown
 static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
-enum { GROWTH_STAGES = 120, MAX_FLOES = 20000000 };
+enum { GROWTH_STAGES = 120 };
 
 static const char *path_of(const bt_case *c) { return c->path ? c->path : "case"; }
 
@@ -36,9 +37,9 @@ static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
 static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n, bt_errors *err)
 {
     double expected = wanted / bt_sizes_mean_area(s);
-    if (expected > MAX_FLOES) {
+    if (expected > BT_MOST_FLOES) {
         bt_errors_add(err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-                      path_of(c), bt_sizes_mean(s), expected, MAX_FLOES);
+                      path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
         return BT_ERR_CASE;
     }
     size_t cap = 64;

@@ -9,6 +9,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "largest.h"
+
 const char *bt_file_remedy(int errnum)
 {
     switch (errnum) {
@@ -46,7 +48,11 @@ char *bt_file_join(const char *dir, const char *name)
 
 bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
 {
-    enum { LARGEST = 16 << 20 };
+    return bt_file_read_to(path, what, BT_MOST_TEXT_BYTES, text, size, err);
+}
+
+bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err)
+{
     *text = NULL;
     *size = 0;
     struct stat st;
@@ -66,7 +72,7 @@ bt_status bt_file_read(const char *path, const char *what, char **text, size_t *
     // Read to the end rather than st_size bytes: /dev/stdin and pipes have no size.
     size_t cap = 1 << 14, n = 0;
     *text = bt_alloc(cap, 1);
-    for (size_t got; n <= LARGEST && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
+    for (size_t got; n <= most && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
         n += got;
         if (n == cap - 1) *text = bt_realloc(*text, cap *= 2, 1);
     }
@@ -78,8 +84,8 @@ bt_status bt_file_read(const char *path, const char *what, char **text, size_t *
         bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(broken));
         return BT_ERR_IO;
     }
-    if (n > LARGEST) {
-        bt_errors_add(err, "%s: larger than 16 MiB, which %s never is; put large fields into an HDF5 file and name it in ice.field", path, what);
+    if (n > most) {
+        bt_errors_add(err, "%s: larger than %zu MiB, which %s never is; check the name (large fields belong into an HDF5 file that ice.field names)", path, most >> 20, what);
         return BT_ERR_CASE;
     }
     return BT_OK;
@@ -92,7 +98,9 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     snprintf(temporary, size, "%s.tmp", path);
 
     int reason = 0;
-    FILE *f = fopen(temporary, "w");
+    // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name, which the rename replaces.
+    unlink(temporary);
+    FILE *f = fopen(temporary, "wx");
     if (!f) {
         reason = errno;
     } else {

@@ -15,6 +15,9 @@ const char *bt_file_remedy(int errnum);
 /// messages. Errors: BT_ERR_IO, BT_ERR_CASE (too large).
 bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err);
 
+/// The same, of at most so many bytes.
+bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err);
+
 /// Write text to path by way of a temporary name and a rename: path holds the old or the new text, never a part.
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err);
 

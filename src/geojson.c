@@ -9,6 +9,7 @@
 // is then east and y north, in the geographic frame x north and y east, where a ring that runs anticlockwise on the map runs clockwise: rings are
 // turned as needed. A MultiPolygon of one polygon is one, too. A height (third coordinate) is passed over.
 #include <errno.h>
+#include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,8 +20,8 @@
 #include "field_load.h"
 #include "field_make.h"
 #include "fileio.h"
+#include "largest.h"
 
-enum { MOST_RING = 10000, MOST_FEATURES = 20000000 };
 static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
 static const double THICKEST = 100;   // m, as ice.thickness
 
@@ -63,7 +64,7 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     }
     const json_t *ring = json_array_get(polygon, 0);
     if (!json_is_array(ring)) *why = "its coordinates are no list of rings; write [[[x, y], [x, y], ...]]";
-    else if (json_array_size(ring) > MOST_RING) *why = "it has more than 10000 vertices; simplify it";
+    else if (json_array_size(ring) > BT_MOST_RING) *why = "it has more than 10000 vertices; simplify it";
     else return ring;
     return NULL;
 }
@@ -191,15 +192,15 @@ static void read_features(reader *s, const json_t *root)
         bt_refuse(&s->r, "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
-    if (json_array_size(features) == 0 || json_array_size(features) > MOST_FEATURES) {
-        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", json_array_size(features), MOST_FEATURES);
+    if (json_array_size(features) == 0 || json_array_size(features) > BT_MOST_FLOES) {
+        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", json_array_size(features), BT_MOST_FLOES);
         return;
     }
     check_own_mark(s, root);
     if (s->r.status != BT_OK) return;
     const bool lonlat = s->c->ice.outlines_crs == BT_CRS_LONLAT;
     if (lonlat) find_origin(s, features);
-    double *v = bt_alloc(2 * (MOST_RING + 1), sizeof *v);
+    double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
     for (size_t i = 0; i < json_array_size(features); i++) read_feature(s, json_array_get(features, i), i, v);
     free(v);
     s->f->outlines.lon = lonlat ? s->lon0 : NAN;
@@ -220,27 +221,35 @@ static void set_concentration(reader *s)
     bt_yard_free(&y);
 }
 
+/// The file as a tree. What a hostile one could make of it is known before: the tree takes far more room than the text.
+static bt_status load(const char *path, json_t **root, bt_errors *err)
+{
+    char *text;
+    size_t size;
+    bt_status status = bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &text, &size, err);
+    int64_t lists = 0;
+    for (size_t i = 0; status == BT_OK && i < size; i++) lists += text[i] == '[';
+    if (lists > BT_MOST_LISTS) {
+        bt_errors_add(err, "%s: holds %" PRId64 " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files", path, lists, BT_MOST_LISTS);
+        status = BT_ERR_CASE;
+    }
+    json_error_t why;
+    if (status == BT_OK && !(*root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why))) {
+        bt_errors_add(err, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
+        status = BT_ERR_CASE;
+    }
+    free(text);
+    return status;
+}
+
 bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err)
 {
     const char *path = c->ice.outlines;
     bt_field_free(f);
     bt_field_init(f);
-    errno = 0;
-    FILE *in = fopen(path, "rb");
-    if (!in) return bt_file_fail(path, "read the outlines", errno, err);
-    json_error_t why;
-    errno = 0;
-    json_t *root = json_loadf(in, JSON_REJECT_DUPLICATES, &why);
-    const int reason = ferror(in) ? errno : 0;
-    fclose(in);
-    if (reason) {
-        json_decref(root);
-        return bt_file_fail(path, "read the outlines", reason, err);
-    }
-    if (!root) {
-        bt_errors_add(err, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
-        return BT_ERR_CASE;
-    }
+    json_t *root = NULL;
+    const bt_status status = load(path, &root, err);
+    if (status != BT_OK) return status;
     reader s = {.c = c, .r = {.path = path, .err = err, .status = BT_OK}, .f = f};
     read_features(&s, root);
     json_decref(root);

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "fileio.h"
@@ -64,6 +65,9 @@ bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err)
     cache.flash_incr_mode = H5C_flash_incr__off;
     cache.decr_mode = H5C_decr__off;
     set = set && H5Pset_mdc_config(access, &cache) >= 0;
+    // A link under this name is replaced, as a rename would, and not followed.
+    struct stat st;
+    if (lstat(path, &st) == 0 && S_ISLNK(st.st_mode)) unlink(path);
     if (set) h->file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access);
     if (h->file < 0) fail(h, "create the file");
     H5Pclose(access);

@@ -9,10 +9,10 @@
 
 #include "bergtow/shape.h"
 #include "field_make.h"
+#include "largest.h"
 
 static const double SLIT = 1e-4;        // width of a cut / diameter of the largest piece, assumed
 static const double SHORT_EDGE = 0.01;  // edges cut off / root of a piece's area, as in the generator
-static const double MOST_PIECES = 20e6; // as for floes of a case
 enum { JOINT = 32, ROOM = BT_MAX_VERTICES + 2 };
 
 /// One convex part of the strip: a leg, or the round of a joint.
@@ -196,9 +196,9 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
     // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger than allowed is cut.
     const double most = l->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * l->floe_size * l->floe_size) : 0;
     bt_status status = BT_OK;
-    if (most > MOST_PIECES) {
-        bt_errors_add(err, "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %g are simulated; take larger pieces, or a narrower or shorter lead",
-                      l->name, l->floe_size, most, MOST_PIECES);
+    if (most > BT_MOST_FLOES) {
+        bt_errors_add(err, "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, or a narrower or shorter lead",
+                      l->name, l->floe_size, most, BT_MOST_FLOES);
         status = BT_ERR_CASE;
     }
     if (status == BT_OK) {

@@ -30,7 +30,7 @@ enum { HEM_GROUPS = 2 * BT_COLOURS };
 void bt_order_measure(bt_tiles *t)
 {
     for (bt_idx k = 0; k < t->n - 1; k++) t->tile[k].depth = t->tile[k].border ? 0 : BT_PHASES;
-    for (int8_t depth = 1; depth < BT_PHASES; depth++)
+    for (int8_t depth = 1; depth < (int8_t)BT_PHASES; depth++)
         for (bt_idx k = 0; k < t->n - 1; k++) {
             const bt_tile *tile = &t->tile[k];
             if (tile->depth != depth - 1) continue;

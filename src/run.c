@@ -24,6 +24,8 @@
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "bergtow/world.h"
+#include "case_check.h"
+#include "cost.h"
 #include "domain.h"
 #include "handover.h"
 #include "progress.h"
@@ -51,7 +53,9 @@ typedef struct {
 static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
-    if (comm->rank == 0) status = bt_field_load(c, f, err);
+    if (comm->rank == 0) status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, bt_cost_machine(), err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_field_load(c, f, err);
+    if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err); // a field that was read has only now a number
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);

@@ -12,6 +12,7 @@
 // "assumed" is a choice of this program without a measurement behind it.
 #include "schema.h"
 
+#include "largest.h"
 #include "suggest.h"
 #include "value.h"
 
@@ -145,10 +146,10 @@ const bt_key bt_case_keys[] = {
     REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow at the start, from the x axis towards y; with way-points that from the body to the first"),
     REAL("tow.ramp", tow.ramp, TIME, "5 s", "[0, 1e6]", "time in which the speed rises linearly from 0, assumed; with a programme the time of its largest speed"),
     {.name = "tow.programme", .type = BT_KEY_POINTS, .unit = BT_UNIT_SPEED, .preset = "none", .range = "[0, 50]", AT(tow.programme), .unit_first = BT_UNIT_TIME,
-     .range_first = "[0, 1e9]", .offset_count = offsetof(bt_case, tow.n_programme), .least = 1, .most = 10000,
+     .range_first = "[0, 1e9]", .offset_count = offsetof(bt_case, tow.n_programme), .least = 1, .most = BT_MOST_POINTS,
      .doc = "speed over time, [[time, speed], ...], linear between and constant outside, instead of speed and ramp: ramp, hold, stop"},
     {.name = "tow.waypoints", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = ANYWHERE, AT(tow.waypoints),
-     .offset_count = offsetof(bt_case, tow.n_waypoints), .least = 1, .most = 10000,
+     .offset_count = offsetof(bt_case, tow.n_waypoints), .least = 1, .most = BT_MOST_POINTS,
      .doc = "[[x, y], ...] that the end of the line (mode speed: the body, which keeps its yaw) goes through from where it starts; after the last it goes straight on"},
     REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]", "radius of the corners at way-points, 0 = sharp"),
     REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, modes line and thrust, assumed"),

@@ -35,11 +35,6 @@ extern const int bt_n_case_keys;
 extern const bt_key bt_floe_keys[];  ///< the keys of one entry of the list `floes:`
 extern const int bt_n_floe_keys;
 
-enum {
-    BT_MAX_FLOES_BY_HAND = 10000, ///< entries of the list `floes:`
-    BT_MAX_TEXT = 4096,           ///< bytes of a text value
-};
-
 /// Index of a key by its dotted name, or −1.
 int bt_schema_find(const bt_key *keys, int n, const char *name);
 

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "fileio.h"
+#include "largest.h"
 #include "rng.h"
 #include "schema.h"
 #include "suggest.h"
@@ -119,6 +120,10 @@ static void read_set(const reader *r, const bt_node *map, int line, const char *
 static void read_list(const reader *r, const bt_node *list, int line, bt_study_parameter *p)
 {
     if (list->n == 0) COMPLAIN(r, line, "%s: the list is empty; give at least one value", p->name);
+    if (list->n > BT_MOST_VALUES) { // each is compared with all before it
+        COMPLAIN(r, line, "%s: %d values, at most %d are read; take fewer, or a range", p->name, list->n, BT_MOST_VALUES);
+        return;
+    }
     p->value = bt_alloc((size_t)list->n, sizeof *p->value);
     for (int i = 0; i < list->n; i++) {
         if (!check_value(r, list->item[i]->line, p->name, p->key, list->item[i])) continue;
@@ -173,7 +178,7 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
             good = good && read;
             bt_case_free(&scratch);
         } else if (!strcmp(map->key[i], "n")) {
-            read_whole(r, value, at, "n", 2, 10000, &n);
+            read_whole(r, value, at, "n", 2, BT_MOST_VALUES, &n);
         } else if (!strcmp(map->key[i], "scale")) {
             if (!scalar(r, value, at, "scale")) continue;
             p->logarithmic = !strcmp(value->text, "log");

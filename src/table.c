@@ -2,16 +2,15 @@
 // Tables of a velocity in time: strict reading of CSV, and linear interpolation.
 #include "table.h"
 
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "fileio.h"
+#include "largest.h"
 #include "units.h"
 
-enum { LARGEST_FILE = 64 << 20, LONGEST_LINE = 256, MOST_COMPLAINTS = 10 };
+enum { LONGEST_LINE = 255, MOST_COMPLAINTS = 10 };
 static const double largest_speed = 100; // m/s, as for the keys of a constant current or wind
 
 void bt_table_free(bt_table *t)
@@ -55,15 +54,28 @@ static const char *read_row(char *line, double row[3], char why[BT_WHY])
     return NULL;
 }
 
-static void read_lines(bt_table *t, FILE *f, const char *path, bt_errors *err)
+/// The line at *rest, which then stands behind it, terminated; its length, or NULL after the last.
+static char *next_line(char **rest, const char *end, size_t *n)
 {
-    char line[LONGEST_LINE], why[BT_WHY];
+    char *line = *rest;
+    if (line >= end) return NULL;
+    char *stop = memchr(line, '\n', (size_t)(end - line));
+    *n = stop ? (size_t)(stop - line) : (size_t)(end - line);
+    *rest = line + *n + 1;
+    line[*n] = 0;
+    return line;
+}
+
+static void read_lines(bt_table *t, char *rest, const char *end, const char *path, bt_errors *err)
+{
+    char *line, why[BT_WHY];
+    size_t length;
     const size_t before = err->n;
     int64_t cap = 0;
     bool header = false;
-    for (int number = 1; err->n - before < MOST_COMPLAINTS && fgets(line, sizeof line, f); number++) {
-        if (strlen(line) == sizeof line - 1 && line[sizeof line - 2] != '\n') {
-            bt_errors_add(err, "%s:%d: is longer than a row of a table can be; write t,u,v in each line", path, number);
+    for (int number = 1; err->n - before < MOST_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
+        if (length > LONGEST_LINE || strlen(line) != length) {
+            bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number, length > LONGEST_LINE ? "is longer than a row of a table can be" : "holds a NUL character");
             return;
         }
         char *text = trimmed(line);
@@ -81,6 +93,10 @@ static void read_lines(bt_table *t, FILE *f, const char *path, bt_errors *err)
             bt_errors_add(err, "%s:%d: %s", path, number, fault);
             continue;
         }
+        if (t->n == BT_MOST_ROWS) {
+            bt_errors_add(err, "%s:%d: more than %d rows; take longer steps between them", path, number, BT_MOST_ROWS);
+            return;
+        }
         if (t->n == cap) t->row = bt_realloc(t->row, (size_t)(cap = cap ? 2 * cap : 256), 3 * sizeof *t->row);
         memcpy(t->row + 3 * t->n++, row, sizeof row);
     }
@@ -91,21 +107,14 @@ bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
 {
     bt_table_free(t);
     const size_t before = err->n;
-    FILE *f = fopen(path, "r");
-    if (!f) return bt_file_fail(path, "be read", errno, err);
-    // A folder opens but cannot be read, nor has it an end worth going to.
-    if (fseek(f, 0, SEEK_END) || ftell(f) < 0 || ftell(f) > LARGEST_FILE) {
-        bt_errors_add(err, "%s: is no file of at most 64 MiB; give the path of a CSV table", path);
-        fclose(f);
-        return BT_ERR_CASE;
-    }
-    rewind(f);
-    read_lines(t, f, path, err);
-    const bool broken = ferror(f);
-    fclose(f);
-    if (err->n == before && !broken) return BT_OK;
-    bt_table_free(t);
-    return broken ? bt_file_fail(path, "be read", EIO, err) : BT_ERR_CASE;
+    char *text;
+    size_t size;
+    bt_status status = bt_file_read_to(path, "a CSV table", BT_MOST_TABLE_BYTES, &text, &size, err);
+    if (status == BT_OK) read_lines(t, text, text + size, path, err);
+    free(text);
+    if (status == BT_OK && err->n > before) status = BT_ERR_CASE;
+    if (status != BT_OK) bt_table_free(t);
+    return status;
 }
 
 void bt_table_at(const bt_table *t, double time, double v[2])

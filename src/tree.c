@@ -2,6 +2,8 @@
 // YAML events of libyaml to a tree. The recursion is bounded by BT_TREE_DEPTH, the memory by BT_TREE_NODES.
 #include "tree.h"
 
+#include "largest.h"
+
 #include <stdlib.h>
 #include <string.h>
 #include <yaml.h>

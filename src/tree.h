@@ -18,12 +18,6 @@ typedef struct bt_node {
     int *key_line;         ///< [n] of a map
 } bt_node;
 
-enum {
-    BT_TREE_DEPTH = 16,       ///< nesting
-    BT_TREE_NODES = 2000000,  ///< values of one file
-    BT_TREE_MAP = 256,        ///< entries of one map
-};
-
 /// Parse a text of n bytes into a tree; NULL with one message in err, prefixed by name and line, when the text is not
 /// YAML of the plain kind: anchors, aliases, tags, several documents, keys that are not scalars and too deep nesting are
 /// refused. Duplicate keys are reported and the first one is kept. An empty text gives an empty map.

@@ -2,6 +2,7 @@
 // Values of keys: strict reading of scalars with unit and range, and writing that keeps every bit.
 #include "value.h"
 
+#include "largest.h"
 #include "suggest.h"
 
 #include <ctype.h>

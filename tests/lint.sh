@@ -1,21 +1,42 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# House rules that a machine can check: names of external symbols, licence lines, Python syntax.
+# House rules that a machine can check: names of external symbols, licence lines, include guards, and what cppcheck, shellcheck and pyflakes find.
+# A checker that is not installed is left out and named; where CI=true it must be there. clang-tidy takes minutes: make tidy.
 bad=0
 complain() { echo "lint: $*"; bad=1; }
+have() {
+    command -v "$1" >/dev/null && return 0
+    if [ "${CI:-}" = true ]; then complain "$1 is missing; run: make deps-lint"
+    else echo "lint: $1 is not installed, and what it checks is left out (make deps-lint)"; fi
+    return 1
+}
 
 lib=build/release/libbergtow.a
 [ -f $lib ] || { echo "lint: $lib is missing; run make first"; exit 1; }
 others=$(nm --defined-only -g $lib | awk 'NF == 3 && $3 !~ /^bt_/ {print $3}' | sort -u)
-[ -z "$others" ] || complain "external symbols without the prefix bt_:" $others
+[ -z "$others" ] || complain "external symbols without the prefix bt_: $others"
 
-for f in $(git ls-files '*.c' '*.h' '*.py' '*.sh' Makefile .ci/run); do
+# Names without blanks; what is new and not yet in git is looked at, too.
+files() { git ls-files --cached --others --exclude-standard "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
+
+for f in $(files '*.c' '*.h' '*.py' '*.sh' Makefile .ci/run .clang-tidy); do
     head -3 "$f" | grep -q 'SPDX-License-Identifier: MIT' || complain "$f: no SPDX line among the first three"
 done
-for f in $(git ls-files '*.h'); do
+for f in $(files '*.h'); do
     grep -q '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f" || complain "$f: no include guard BERGTOW_..._H or BT_..._H"
 done
-for f in $(git ls-files '*.py'); do
+for f in $(files '*.py'); do
     "${PYTHON:-/usr/bin/python3}" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
+later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
+
+# shellcheck disable=SC2046 # one word a file
+if have shellcheck; then shellcheck $(files '*.sh' .ci/run) || complain "shellcheck: see above"; fi
+# shellcheck disable=SC2046
+if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
+if have cppcheck; then
+    cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" --suppressions-list=tests/cppcheck.supp \
+        --suppress=missingIncludeSystem -Iinclude -Isrc -Ipartition -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
+        --template='{file}:{line}: {id}: {message}' src partition || complain "cppcheck: see above"
+fi
 exit $bad

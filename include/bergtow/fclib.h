@@ -21,11 +21,22 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
                                const double *solution_u, const double *solution_r, const char *title,
                                const char *description, bt_errors *err);
 
+/// Where the contacts and the bodies of a problem are, which FCLIB's format does not know: for pictures. Normals point from the first body of a
+/// contact to the second, levers from the centroid of each to the contact point, all in the world frame.
+typedef struct bt_fclib_places {
+    double time, dt;       ///< end and length of the step, s
+    const int64_t *body;   ///< [n_contacts][2] ids
+    const double *normal;  ///< [n_contacts][2]
+    const double *lever;   ///< [n_contacts][4] m, of the first and of the second body
+    int64_t n_bodies;
+    const double *pose;    ///< [n_bodies][3] x m, y m, yaw rad at the end of the step, by id
+} bt_fclib_places;
+
 /// The same with an upper bound of the normal impulses, 0 <= r_n <= bound [n] N s (u_n < 0 where it holds): what FCLIB's format does not know, stored
-/// as /bound beside it. NULL: none.
+/// as /bound beside it. NULL: none. Places, or NULL, are stored as /places.
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
                                  const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound, const char *title,
-                                 const char *description, bt_errors *err);
+                                 const double *solution_u, const double *solution_r, const double *bound, const bt_fclib_places *places,
+                                 const char *title, const char *description, bt_errors *err);
 
 #endif

@@ -29,7 +29,7 @@ def test_a_channel_as_wide_as_the_body_is_open_water(tmp_path):
     r = run(tmp_path, changed(BASE, lead=CHANNEL), name="channel")
     assert plain.series("ice_resistance").max() > 5 and plain.summary["lead"] is None
     assert r.series("ice_resistance").max() == 0
-    lead, (was, h_was), (now, h_now) = r.summary["lead"], floes(plain), floes(r)
+    lead, (was, _), (now, _) = r.summary["lead"], floes(plain), floes(r)
     removed = [p for p in was if not any(np.array_equal(p, q) for q in now)]
     assert lead["mode"] == "channel" and lead["width_m"] == 2.2 and lead["pieces"] == 0
     assert lead["length_m"] == pytest.approx(0.2 * (25 - 1) + 2, rel=1e-12), "the length of the tow and the body"

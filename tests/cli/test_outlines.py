@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, IO, area, call, changed, placed, run, worst_overlap, write_case
+from harness import CASE, DONE, IO, area, call, changed, placed, run, write_case
 
 BASE = {
     "run": {"dt": 0.1, "duration": 2},

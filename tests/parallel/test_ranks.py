@@ -9,7 +9,7 @@ knew of the last step left behind when it goes to another rank. Each was tried.
 import numpy as np
 import pytest
 
-from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, environment, run, write_case
+from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, run, write_case
 from test_ranks_output import mpirun
 
 # A heavy berg on a line: one rank does its contacts, and the tiles under it go with it. Tiles are small, so that there are many.

@@ -5,7 +5,6 @@ What turns these tests red: the impulse of the second branch not sent to the oth
 at another time, or not), a vessel moved before that.
 """
 import h5py
-import pytest
 
 from harness import changed, run
 from test_ranks import LINE, assert_same, many

@@ -3,6 +3,7 @@
 #include "bergtow/case.h"
 #include "bergtow/shape.h"
 #include "case_check.h"
+#include "largest.h"
 #include "schema.h"
 #include "suggest.h"
 #include "value.h"
@@ -336,7 +337,7 @@ static void cross_checks_refuse(void **state)
         {"output.frame_interval=1e-6", "frames, at most"}, {"output.window_start=10", "not before the end of the run"},
         {"body.shape=square;body.length=11", "spans 11 m along y in a domain of 10 m"}, {"body.x=0.5", "is outside the domain"}, {"body.y=4.5", "is outside the domain"}, {"body.x=100", "is outside the domain"},
         {"ice.x_min=80", "the ice region is empty"}, {"ice.x_max=73", "outside the domain, which ends at 72 m"}, {"ice.y_min=-6", "outside the domain, which begins at -5 m"},
-        {"ice.x_min=-1", "outside the domain"}, {"ice.y_max=6", "outside the domain"}, {"ice.size=11", "larger than the ice region"}, {"ice.size=1 mm", "floes, at most 2e+07"},
+        {"ice.x_min=-1", "outside the domain"}, {"ice.y_max=6", "outside the domain"}, {"ice.size=11", "larger than the ice region"}, {"ice.size=1 mm", "floes, at most 20000000"},
         {"ice.size_law=power", "needs a smallest size"}, {"ice.size_min=3;ice.size_max=2", "is not below ice.size_max"}, {"ice.size_law=power;ice.size_min=2;ice.size_max=20", "ice.size_max=20: 20 m is larger"},
         {"ice.size_law=lognormal;ice.size_min=2;ice.size_max=3", "not between"},
         {"domain.ends=periodic;domain.ends_closing=0.1", "needs a wall to move"}, {"domain.sides=open;domain.sides_closing=0.1", "needs a wall to move"},

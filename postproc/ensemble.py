@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT
+"""Statistics of an ensemble: means with intervals, estimates beside them, distributions, extreme peaks, sensitivity; as text, CSV and JSON.
+
+Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder.
+"""
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import command
+import ensemble_text
+import stat_extreme
+import stat_fit
+import stat_mean
+import stat_sensitivity
+from bergtow_read import RunError
+from ensemble_read import DOUBTS, Ensemble
+
+import numpy as np
+
+ESTIMATES = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
+MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
+
+
+def member(e, m):
+    """Mean of one member with its standard error within the run."""
+    within = stat_mean.series_mean(e.steady(m))
+    mean = e.number("mean_ice_resistance_n", m)
+    low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
+    return {"name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean, "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
+            "independent": within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))}
+
+
+def samples(e, rows, members):
+    """Every 2 tau-th sample of the steady windows of a condition: (values above zero, at most MOST_SAMPLES; share that is not; all values)."""
+    every = []
+    for m in rows:
+        x, tau = e.steady(m), members[m]["tau_samples"]
+        every.append(x[::max(1, int(np.ceil(2 * tau)))] if np.isfinite(tau) else x[:0])
+    pooled = np.concatenate(every) if every else np.zeros(0)
+    above = pooled[pooled > 0]
+    step = max(1, int(np.ceil(len(above) / MOST_SAMPLES)))
+    return above[::step], (1 - len(above) / len(pooled) if len(pooled) else np.nan), pooled
+
+
+def estimates(e, rows, mean):
+    """Force of each estimate, mean of the condition's fields, and simulated / estimate."""
+    out = {}
+    for name in ESTIMATES:
+        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[rows] for what in ("force_n", "valid"))
+        force = float(np.mean(force)) if len(rows) else np.nan
+        out[name] = {"force": force, "valid": bool(len(rows) and np.all(valid == 1)),
+                     "ratio": mean / force if force > 0 and name != "open_water_drag" else np.nan}
+    return out
+
+
+def extremes(e, rows, options):
+    """Exceedance, block maxima and peaks over a threshold of a condition's collisions."""
+    fields, conversions = [], set()
+    for m in rows:
+        hits = e.impacts(m)
+        if hits:
+            time, peak, start, hours, conversion = hits
+            fields.append({"time": time, "peak": peak, "start": start, "hours": hours, "gap": 2 * e.number("window_correlation_time_s", m)})
+            conversions.add(conversion)
+    if not fields:
+        return {"refused": "no collisions: the members' folders are not there, or impact.conversion was none"}
+    if len(conversions) > 1:
+        return {"refused": f"peaks of different conversions: {'; '.join(sorted(conversions))}"}
+    gaps = [f["gap"] for f in fields if np.isfinite(f["gap"])]
+    gap = options.gap if options.gap is not None else float(np.median(gaps)) if gaps else 0.0
+    peaks, rate = stat_extreme.exceedance(fields)
+    hours = sum(f["hours"] for f in fields)
+    ranks = [k for k in (1, 3, 10, 30, 100, 300, 1000) if k <= len(peaks)]
+    return {"conversion": conversions.pop(), "fields": len(fields), "hours": hours, "collisions": len(peaks), "collisions_per_hour": len(peaks) / hours,
+            "exceedance": [{"per_hour": rate[k - 1], "peak": peaks[k - 1]} for k in ranks],
+            "block_maxima": stat_extreme.by_blocks(fields, options.hours, options.blocks, options.resamples),
+            "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)}
+
+
+def condition(e, c, members, options):
+    """All statistics of one condition."""
+    rows = c.finished
+    means, errors = (np.array([members[m][key] for m in rows]) for key in ("mean", "se_within"))
+    fields = stat_mean.between_fields(means, errors, options.error)
+    values, none, pooled = samples(e, rows, members)
+    quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
+    return {"index": c.index, "label": c.label, "values": c.values, "units": c.units,
+            "members": {"all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
+                        "doubts": {kind: sum(kind in e.doubts(m) for m in rows) for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)},
+            "resistance": fields, "estimates": estimates(e, rows, fields.get("mean", np.nan)),
+            "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)],
+            "samples": {"independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
+                        "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]},
+            "extremes": extremes(e, rows, options)}
+
+
+def sensitivity(e, members):
+    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was varied.
+
+    Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be predicted.
+    """
+    rows = e.used
+    varied = {k: v[rows] for k, v in e.parameters.items() if len(set(v[rows].tolist())) > 1}
+    y = np.array([members[m]["mean"] for m in rows])
+    if not varied or len(rows) < 8:
+        return {"refused": "nothing is varied" if not varied else f"{len(rows)} members, needs 8"}
+    logs = stat_sensitivity.sobol(varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
+    return {"members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y), "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
+
+
+def statistics(e, options):
+    """The statistics of an ensemble as nested dicts; statistics.json."""
+    dropped = e.exclude(options.exclude) if options.exclude else {}
+    if not len(e.used):
+        raise RunError(e.file, "has no member with a mean ice resistance" + (" left" if dropped else ""), "run the ensemble further" if not dropped else "exclude less")
+    members = {int(m): member(e, m) for m in e.used}
+    conditions = [condition(e, c, members, options) for c in e.conditions()]
+    failed = {e.name[m]: e.reason[m] for m in np.flatnonzero(e.status == 2)}
+    return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error, "excluded": dropped, "exclude": sorted(options.exclude),
+            "failed": failed, "members_without_folder": int(e.texts_missing), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
+            "members": list(members.values())}
+
+
+def plain(value):
+    """Numbers as JSON has them: NaN and infinity are null."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(v) for v in value]
+    if isinstance(value, (np.bool_, bool)):
+        return bool(value)
+    if isinstance(value, (int, np.integer)):
+        return int(value)
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def csv_row(c):
+    """Flat columns of a condition; forces in N."""
+    r = c["resistance"]
+    row = {"condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"], **{k: c["members"][k] for k in ("failed", "waiting", "excluded")},
+           **{f"doubt_{k}": n for k, n in c["members"]["doubts"].items()}}
+    for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max", "largest_share", "fields_needed"):
+        row[key] = r.get(key)
+    for key in ("t_95", "bootstrap_95", "median_95"):
+        row[f"{key}_low"], row[f"{key}_high"] = r.get(key, (None, None))
+    for name, estimate in c["estimates"].items():
+        row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
+        if name != "open_water_drag":
+            row[f"simulated_over_{name}"] = estimate["ratio"]
+    return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
+
+
+def write(s, folder):
+    """statistics.json and statistics.csv in the folder. Errors: RunError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "statistics.json").write_text(json.dumps(plain(s), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        rows = [csv_row(c) for c in s["conditions"]]
+        with open(folder / "statistics.csv", "w", newline="", encoding="utf-8") as f:
+            table = csv.DictWriter(f, list(rows[0]))
+            table.writeheader()
+            table.writerows(rows)
+    except OSError as error:
+        raise RunError(folder, f"cannot be written ({error.strerror or error})", "choose another folder with -o") from None
+
+
+def positive(text):
+    value = float(text)
+    if not (np.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text} is not above zero")
+    return value
+
+
+def whole(text):
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is below 1")
+    return value
+
+
+def main(argv=None):
+    p = argparse.ArgumentParser(description="Statistics of an ensemble: tables, statistics.csv and statistics.json.")
+    p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
+    p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to write statistics.csv and .json (default: DIR)")
+    p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
+    p.add_argument("--error", type=positive, default=0.05, metavar="E", help="relative error of the mean that the number of fields needed is for (default 0.05)")
+    p.add_argument("--exclude", action="append", choices=sorted(DOUBTS), default=[], help="leave out members with this doubt, and name them; may be repeated")
+    p.add_argument("--hours", type=positive, nargs="+", default=[1.0, 10.0, 100.0], metavar="T", help="return times of peaks, hours of tow (default 1 10 100)")
+    p.add_argument("--threshold", type=float, metavar="N", help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
+    p.add_argument("--gap", type=float, metavar="S", help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
+    p.add_argument("--blocks", type=whole, metavar="K", help="blocks a field for block maxima (default: so many that there are 20)")
+    p.add_argument("--resamples", type=whole, default=stat_fit.RESAMPLES, metavar="B", help="resamples for p-values and return levels (default %(default)s)")
+    a = p.parse_args(argv)
+    e = Ensemble(a.folder)
+    s = statistics(e, a)
+    folder = a.output or e.path
+    write(s, folder)
+    print(ensemble_text.report(s, a.markdown))
+    print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
+
+
+if __name__ == "__main__":
+    command.guarded(main)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""Read the folder of an ensemble: its members, what was varied, their summaries, series, collisions and doubts.
+
+    e = Ensemble("out/concentration")
+    for c in e.conditions():                       # members of one combination of values
+        print(c.label, e.summary["mean_ice_resistance_n"][c.finished])
+    time, ice = e.series(m)                        # of member m, all of its run
+    e.doubts(m)                                    # {"unconverged", "jammed", ...}
+
+ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. Errors: RunError.
+"""
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from bergtow_read import Run, RunError
+
+WAITING, FINISHED, FAILED = 0, 1, 2
+MIN_INDEPENDENT = 20  # samples below which the program itself calls a window short
+
+#: kinds of doubt about a member, and what each means
+DOUBTS = {
+    "unconverged": "steps met the sweep limit before the tolerance",
+    "jammed": "the towed body stood still while the tow asked for motion",
+    "short": "no steady window, or fewer than 20 independent samples in it",
+    "stopped": "the run stopped early",
+    "other": "a warning of another kind",
+}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One combination of the values that were varied."""
+
+    index: int            #: from 0
+    values: dict          #: {key: number or text}
+    units: dict           #: {key: unit}
+    members: np.ndarray   #: rows of all its members
+    finished: np.ndarray  #: rows of those that finished and are not excluded
+    failed: int
+    waiting: int
+    excluded: int
+
+    @property
+    def label(self):
+        words = []
+        for key, value in self.values.items():
+            unit = self.units[key]
+            words.append(f"{short_key(key)} " + (value if isinstance(value, str) else f"{value:.4g}" + (f" {unit}" if unit not in ("", "1") else "")))
+        return ", ".join(words) or "the case"
+
+
+def short_key(key):
+    """Last part of a case key, in words: ice.friction is "ice friction", ice.concentration "concentration"."""
+    section, _, name = key.rpartition(".")
+    plain = name.replace("_", " ")
+    return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
+
+
+class Ensemble:
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M]."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self.file = self.path / "ensemble.h5"
+        if not self.path.is_dir():
+            raise RunError(self.path, "no such folder", "give the folder that `bergtow ensemble -o` wrote")
+        if not self.file.exists():
+            raise RunError(self.path, "holds no ensemble.h5", "give the folder that `bergtow ensemble -o` wrote, or wait for its first member")
+        try:
+            self._read()
+        except (OSError, KeyError, ValueError, RuntimeError) as error:
+            raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})", "run `bergtow ensemble` again: it makes the file anew") from None
+        self._dropped = {}
+
+    def _read(self):
+        with h5py.File(self.file, "r") as f:
+            self.attributes = dict(f.attrs)
+            for key in ("id", "condition", "repeat", "seed", "status"):
+                setattr(self, key, f[f"members/{key}"][()])
+            self.name, self.reason = (list(f[f"members/{key}"].asstr()[()]) for key in ("name", "reason"))
+            self.parameters, self.units = {}, {}
+            for key, data in f["parameters"].items():
+                self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
+                unit = data.attrs.get("units", "1")
+                self.units[key] = unit.decode() if isinstance(unit, bytes) else str(unit)
+            self.summary = {key: data[()] for key, data in f["summary"].items()}
+            self._series = {key: f[f"series/{key}"][()] for key in ("time", "ice_resistance")}
+            self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
+        self.study = self.study.decode() if isinstance(self.study, bytes) else str(self.study)
+        self.n = len(self.name)
+        title = self.attributes.get("title", b"")
+        self.title = (title.decode() if isinstance(title, bytes) else str(title)) or self.path.resolve().name
+
+    def number(self, key, m):
+        """A number of a member's summary, NaN where there is none."""
+        return float(self.summary[key][m]) if key in self.summary else np.nan
+
+    @property
+    def complete(self):
+        return bool(np.all(self.status != WAITING))
+
+    @cached_property
+    def sampled(self):
+        """True for a Latin hypercube, False for a grid."""
+        return "sampling: latin-hypercube" in self.study.split("# base case")[0]
+
+    # ---- members
+
+    def folder(self, m):
+        return self.path / "members" / self.name[m]
+
+    def series(self, m):
+        """(time s, ice resistance N) of a member's whole run."""
+        time, ice = (self._series[key][m] for key in ("time", "ice_resistance"))
+        there = np.isfinite(time)
+        return time[there], ice[there]
+
+    def steady(self, m):
+        """Ice resistance over the steady window that the member's summary names, N; empty where it names none."""
+        time, ice = self.series(m)
+        start, end = self.number("window_start_s", m), self.number("window_end_s", m)
+        if not np.isfinite([start, end]).all():
+            return np.zeros(0)
+        slack = 1e-9 * max(1.0, abs(end))
+        return ice[(time >= start - slack) & (time <= end + slack)]
+
+    def _texts(self, m):
+        """summary.json of a member, {} where its folder is not there."""
+        try:
+            found = json.loads((self.folder(m) / "summary.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    @cached_property
+    def _doubts(self):
+        out = {}
+        for m in np.flatnonzero(self.status == FINISHED):
+            texts, found = self._texts(m), set()
+            window = texts.get("window") or {}
+            independent = self.number("window_n_independent", m)
+            checks = {"unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
+                      "short": not independent >= MIN_INDEPENDENT or bool(window.get("warning")), "stopped": bool(texts.get("stopped"))}
+            found |= {kind for kind, there in checks.items() if there}
+            told = len(texts.get("warnings") or [])
+            if told > sum(checks.values()):
+                found.add("other")
+            out[int(m)] = found
+        return out
+
+    def doubts(self, m):
+        """Kinds of doubt (keys of DOUBTS) about a finished member."""
+        return self._doubts.get(int(m), set())
+
+    @property
+    def texts_missing(self):
+        """Finished members whose summary.json is not there: their warnings are known by numbers alone."""
+        return sum(not (self.folder(m) / "summary.json").exists() for m in np.flatnonzero(self.status == FINISHED))
+
+    def exclude(self, kinds):
+        """Leave members with these doubts out from here on; returns {name: kinds} of those dropped."""
+        for m in np.flatnonzero(self.status == FINISHED):
+            hit = self.doubts(m) & set(kinds)
+            if hit:
+                self._dropped[int(m)] = hit
+        return {self.name[m]: sorted(hit) for m, hit in self._dropped.items()}
+
+    @property
+    def used(self):
+        """Rows of members that finished with a mean and are not excluded."""
+        mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
+        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean)) if int(m) not in self._dropped], dtype=int)
+
+    def conditions(self):
+        """Every Condition, in the order of the study."""
+        used, out = set(self.used.tolist()), []
+        for index in np.unique(self.condition):
+            rows = np.flatnonzero(self.condition == index)
+            first = rows[0]
+            values = {key: (str(column[first]) if column.dtype == object else float(column[first])) for key, column in self.parameters.items()}
+            out.append(Condition(int(index), values, self.units, rows, np.array([m for m in rows if m in used], dtype=int),
+                                 int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)), sum(int(m) in self._dropped for m in rows)))
+        return out
+
+    def impacts(self, m):
+        """Collisions of a member from the program's `from` on: (time s, peak N, from s, hours, conversion), or None where they were not told apart."""
+        hours, start = self.number("impacts_hours", m), self.number("impacts_from_s", m)
+        if not hours > 0 or not self.folder(m).is_dir():
+            return None
+        with Run(self.folder(m)) as run:
+            hits = run.impacts
+        late = hits["time"] >= start
+        return hits["time"][late], hits["peak"][late], start, hours, hits["conversion"]

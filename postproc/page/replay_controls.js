@@ -1,0 +1,368 @@
+// SPDX-License-Identifier: MIT
+// The replay's force curve, controls, keys and what scripts may ask of it; follows replay.js within one function.
+
+// ---- force curve
+
+const curve = head.curve;
+const margin = {left: 64, right: 14, top: 18, bottom: 34};
+
+// Round numbers that cut [low, high] into about n pieces.
+function ticks(low, high, n) {
+    const raw = (high - low) / n, power = Math.pow(10, Math.floor(Math.log10(raw))), step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw), out = [];
+    for (let k = Math.ceil(low / step); k * step <= high * (1 + 1e-9); k++) out.push(+(k * step).toPrecision(12));
+    return out;
+}
+
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named, not drawn.
+function forceRange() {
+    const largest = (values, from) => values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0), steady = curve.window ? curve.window[0] : curve.start;
+    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start))), lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
+    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0), ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
+    const top = Math.min(wish, highest) || highest || 1;
+    const single = largest(curve.lines[0].high, curve.start);
+    return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: single > 1.05 * top ? single : null};
+}
+
+const range = curve ? forceRange() : null;
+const prefix = range && range.high >= 2e6 ? [1e6, "M"] : range && range.high >= 2e3 ? [1e3, "k"] : [1, ""];
+
+const chartScale = (ratio) => {
+    const left = margin.left * ratio, right = chart.width - margin.right * ratio, top = margin.top * ratio, bottom = chart.height - margin.bottom * ratio;
+    return {left, right, top, bottom, x: (t) => left + (right - left) * (t - curve.start) / (curve.end - curve.start),
+            y: (f) => bottom - (bottom - top) * (f - range.low) / (range.high - range.low)};
+};
+
+function axes(g, s, ink, faint, ratio) {
+    g.font = `${11 * ratio}px sans-serif`;
+    g.fillStyle = ink;
+    g.strokeStyle = faint;
+    g.lineWidth = ratio * 0.7;
+    g.textAlign = "right";
+    g.textBaseline = "middle";
+    for (const f of ticks(range.low, range.high, 5)) {
+        g.beginPath();
+        g.moveTo(s.left, s.y(f));
+        g.lineTo(s.right, s.y(f));
+        g.stroke();
+        g.fillText(+(f / prefix[0]).toPrecision(6), s.left - 6 * ratio, s.y(f));
+    }
+    g.textAlign = "center";
+    g.textBaseline = "top";
+    for (const t of ticks(curve.start, curve.end, Math.max(3, (s.right - s.left) / ratio / 110))) g.fillText(t, s.x(t), s.bottom + 5 * ratio);
+    g.fillText("time (s)", (s.left + s.right) / 2, s.bottom + 19 * ratio);
+    g.save();
+    g.translate(11 * ratio, (s.top + s.bottom) / 2);
+    g.rotate(-Math.PI / 2);
+    g.textBaseline = "middle";
+    g.fillText(`${curve.lines.length > 1 ? "force" : curve.lines[0].label} (${prefix[1]}${curve.lines[0].unit})`, 0, 0);
+    g.restore();
+}
+
+// Each piece from its least to its largest sample.
+function band(g, s, line, ratio) {
+    g.strokeStyle = line.colour;
+    g.lineWidth = 0.8 * ratio;
+    g.globalAlpha = 0.4;
+    g.beginPath();
+    curve.time.forEach((t, k) => {
+        if (line.low[k] === null) return;
+        g.lineTo(s.x(t), s.y(line.high[k]));
+        g.lineTo(s.x(t), s.y(line.low[k]));
+    });
+    g.stroke();
+    g.globalAlpha = 1;
+}
+
+function mean(g, s, line, ratio) {
+    g.strokeStyle = line.colour;
+    g.lineWidth = 1.7 * ratio;
+    g.beginPath();
+    let pen = false;
+    curve.time.forEach((t, k) => {
+        if (line.smooth[k] === null) { pen = false; return; }
+        g[pen ? "lineTo" : "moveTo"](s.x(t), s.y(line.smooth[k]));
+        pen = true;
+    });
+    g.stroke();
+}
+
+function drawChart() {
+    if (!curve) return;
+    const g = chart.getContext("2d"), look = getComputedStyle(root), colour = (name) => look.getPropertyValue(name).trim(), ratio = window.devicePixelRatio || 1, s = chartScale(ratio);
+    g.clearRect(0, 0, chart.width, chart.height);
+    if (curve.window) {
+        g.fillStyle = colour("--shade");
+        g.fillRect(s.x(curve.window[0]), s.top, s.x(curve.window[1]) - s.x(curve.window[0]), s.bottom - s.top);
+    }
+    axes(g, s, colour("--ink"), colour("--rule"), ratio);
+    g.save();
+    g.beginPath();
+    g.rect(s.left, s.top, s.right - s.left, s.bottom - s.top);
+    g.clip();
+    band(g, s, curve.lines[0], ratio);
+    for (const line of curve.lines) mean(g, s, line, ratio);
+    if (curve.window && curve.mean !== null) {
+        g.strokeStyle = colour("--ink");
+        g.setLineDash([6 * ratio, 4 * ratio]);
+        g.lineWidth = 1.3 * ratio;
+        g.beginPath();
+        g.moveTo(s.x(curve.window[0]), s.y(curve.mean));
+        g.lineTo(s.x(curve.window[1]), s.y(curve.mean));
+        g.stroke();
+        g.setLineDash([]);
+    }
+    g.restore();
+    if (range.beyond !== null) {
+        g.fillStyle = colour("--faint");
+        g.textAlign = "right";
+        g.textBaseline = "top";
+        g.fillText(`${curve.lines[0].label}: single samples up to ${quantity(range.beyond, curve.lines[0].unit)}`, s.right, s.top - 11 * ratio);
+    }
+    for (const e of curve.events) {
+        g.fillStyle = colour("--warn");
+        g.beginPath();
+        const x = s.x(e.time);
+        g.moveTo(x, s.top + 9 * ratio);
+        g.lineTo(x - 5 * ratio, s.top);
+        g.lineTo(x + 5 * ratio, s.top);
+        g.fill();
+    }
+    const x = s.x(timeAt(state.p));
+    g.strokeStyle = colour("--cursor");
+    g.lineWidth = 2 * ratio;
+    g.beginPath();
+    g.moveTo(x, s.top);
+    g.lineTo(x, s.bottom);
+    g.stroke();
+}
+
+// Values of the curve at a time, in words.
+function reading(time) {
+    if (!curve) return "";
+    let k = curve.time.findIndex((t) => t >= time);
+    if (k < 0) k = curve.time.length - 1;
+    return curve.lines.map((l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`).join(", ");
+}
+
+// ---- words
+
+function quantity(v, unit) {
+    const a = Math.abs(v), [f, p] = unit === "N" || unit === "J" ? (a >= 2e9 ? [1e9, "G"] : a >= 2e6 ? [1e6, "M"] : a >= 2e3 ? [1e3, "k"] : [1, ""]) : [1, ""];
+    return `${+(v / f).toPrecision(3)} ${p}${unit}`;
+}
+
+function say() {
+    const t = timeAt(state.p);
+    $("replay-now").textContent = `${t.toFixed(t < 100 ? 1 : 0)} s of ${+head.times[T - 1].toPrecision(6)} s`;
+    $("replay-reading").textContent = reading(t);
+    slider.value = state.p;
+    slider.setAttribute("aria-valuetext", $("replay-now").textContent);
+    $("replay-play").textContent = state.playing ? "❚❚ pause" : "▶ play";
+}
+
+function legend() {
+    const c = head.colouring[state.colour], bar = $("replay-bar").getContext("2d");
+    c.table.forEach((rgb, k) => { bar.fillStyle = `rgb(${rgb})`; bar.fillRect(k * 4, 0, 4, 14); });
+    const at = (share) => +(c.low + (c.high - c.low) * Math.pow(share, 1 / c.power)).toPrecision(2);
+    $("replay-bar-low").textContent = at(0);
+    $("replay-bar-middle").textContent = at(0.5);
+    $("replay-bar-high").textContent = at(1) + (c.above ? " and above" : "");
+    $("replay-bar-label").textContent = c.label;
+}
+
+function draw() {
+    if (!data || scheduled) return;
+    scheduled = true;
+    requestAnimationFrame(() => { scheduled = false; drawField(); drawChart(); say(); });
+}
+
+// ---- play
+
+function seek(p) {
+    state.p = clampFrame(+p || 0);
+    hideTip();
+    draw();
+}
+
+function play(on) {
+    if (on && state.p >= T - 1) state.p = 0;
+    if (on && T < 2) return;
+    state.playing = on;
+    state.last = performance.now();
+    if (on) { hideTip(); requestAnimationFrame(tick); }
+    draw();
+}
+
+function tick(now) {
+    if (!state.playing) return;
+    const step = Math.min(0.25, Math.max(0, (now - state.last) / 1000)) * state.rate;
+    state.last = now;
+    const time = timeAt(state.p) + step;
+    state.p = time >= head.times[T - 1] ? T - 1 : frameAt(time);
+    if (state.p >= T - 1) state.playing = false;
+    draw();
+    if (state.playing) requestAnimationFrame(tick);
+}
+
+// Rates, simulated seconds a second: the whole run in some 20 s, and round multiples of that.
+function rates() {
+    const whole = (head.times[T - 1] - head.times[0]) / 20 || 1, power = Math.pow(10, Math.floor(Math.log10(whole))), base = [1, 2, 5, 10].map((k) => k * power).reduce((a, b) => Math.abs(a - whole) < Math.abs(b - whole) ? a : b);
+    const select = $("replay-rate");
+    for (const k of [0.1, 0.2, 0.5, 1, 2, 5]) select.append(new Option(`${+(base * k).toPrecision(2)} × real time`, base * k, k === 1, k === 1));
+    state.rate = base;
+    select.onchange = () => { state.rate = +select.value; };
+}
+
+// ---- pointer
+
+function inside(i, x, y, pose) {
+    const c = Math.cos(pose[2]), s = Math.sin(pose[2]), dx = x - pose[0], dy = y - pose[1], lx = c * dx + s * dy, ly = c * dy - s * dx, o = outlineOf(i);
+    let odd = false;
+    for (let a = 0, b = o.length - 1; a < o.length; b = a++)
+        if ((o[a][1] > ly) !== (o[b][1] > ly) && lx < (o[b][0] - o[a][0]) * (ly - o[a][1]) / (o[b][1] - o[a][1]) + o[a][0]) odd = !odd;
+    return odd;
+}
+
+function floeAt(sx, sy) {
+    const p = playhead(), C = centre(p), [x, y] = toWorld(sx, sy, origin(p));
+    for (let i = 0; i < N; i++) {
+        const pose = floePose(i, p), dx = image(x - pose[0], head.period[0]), dy = image(y - pose[1], head.period[1]);
+        if (Math.hypot(dx, dy) <= data.radius[i] && inside(i, pose[0] + dx, pose[1] + dy, pose)) return i;
+    }
+    return -1;
+}
+
+const idOf = (i) => head.ids ? head.ids[i] : i;
+
+function describe(i) {
+    const k = nearest(), pose = floePose(i, k);
+    return [`floe ${idOf(i)}`, `speed ${quantity(value("speed", k, i), "m/s")}`, `largest contact force ${quantity(value("force", k, i), "N")}`,
+            `thickness ${quantity(data.thickness[i], "m")}, area ${quantity(data.area[i], "m²")}`,
+            `x ${pose[0].toFixed(1)} m, y ${pose[1].toFixed(1)} m${head.period[0] || head.period[1] ? " (within the domain)" : ""}`,
+            `values of the frame at ${+head.times[k].toPrecision(6)} s`];
+}
+
+function hideTip() { tip.hidden = true; state.hover = null; }
+
+function hover(event) {
+    const ratio = canvas.width / canvas.clientWidth, box = canvas.getBoundingClientRect();
+    const i = floeAt((event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio);
+    if (i !== state.hover) { state.hover = i; draw(); }
+    tip.hidden = i < 0;
+    if (i < 0) return;
+    tip.textContent = describe(i).join("\n");
+    const x = event.clientX - box.left, y = event.clientY - box.top;
+    tip.style.left = `${Math.min(x + 14, Math.max(0, canvas.clientWidth - tip.offsetWidth - 4))}px`;
+    tip.style.top = `${y + tip.offsetHeight + 24 > canvas.clientHeight ? Math.max(0, y - tip.offsetHeight - 12) : y + 16}px`;
+}
+
+function pointers() {
+    const held = new Map();
+    const at = (event) => { const box = canvas.getBoundingClientRect(), ratio = canvas.width / canvas.clientWidth; return [(event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio]; };
+    const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
+    canvas.onpointerdown = (event) => { held.set(event.pointerId, at(event)); canvas.setPointerCapture(event.pointerId); hideTip(); };
+    canvas.onpointermove = (event) => {
+        if (!held.has(event.pointerId)) { if (!state.playing) hover(event); return; }
+        const before = held.get(event.pointerId), now = at(event), old = held.size === 2 ? spread() : 0;
+        held.set(event.pointerId, now);
+        if (held.size === 2) { const [a, b] = [...held.values()]; zoom(spread() / (old || 1), (a[0] + b[0]) / 2, (a[1] + b[1]) / 2); return; }
+        state.cx -= (now[0] - before[0]) / state.scale;
+        state.cy += (now[1] - before[1]) / state.scale;
+        draw();
+    };
+    canvas.onpointerup = canvas.onpointercancel = (event) => held.delete(event.pointerId);
+    canvas.onpointerleave = () => { if (state.hover !== null) { hideTip(); draw(); } };
+    // The wheel scrolls the page until the field has been clicked.
+    canvas.addEventListener("wheel", (event) => {
+        if (document.activeElement !== canvas && !event.ctrlKey) return;
+        event.preventDefault();
+        zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0015)), ...at(event));
+    }, {passive: false});
+    if (!curve) return;
+    const jump = (event) => {
+        const box = chart.getBoundingClientRect(), ratio = chart.width / chart.clientWidth, s = chartScale(window.devicePixelRatio || 1);
+        seek(frameAt(curve.start + (curve.end - curve.start) * ((event.clientX - box.left) * ratio - s.left) / (s.right - s.left)));
+    };
+    chart.onpointerdown = (event) => { chart.setPointerCapture(event.pointerId); jump(event); };
+    chart.onpointermove = (event) => { if (event.buttons) jump(event); };
+}
+
+// ---- buttons and keys
+
+function colourBy(k) {
+    state.colour = ((k % head.colouring.length) + head.colouring.length) % head.colouring.length;
+    $("replay-colour").value = state.colour;
+    legend();
+    draw();
+}
+
+const middle = (factor) => zoom(factor, canvas.width / 2, canvas.height / 2);
+const step = (n) => { play(false); seek((n > 0 ? Math.floor(state.p + 1e-9) : Math.ceil(state.p - 1e-9)) + n); };
+const keys = {" ": () => play(!state.playing), ArrowRight: (e) => step(e.shiftKey ? 10 : 1), ArrowLeft: (e) => step(e.shiftKey ? -10 : -1), Home: () => seek(0), End: () => seek(T - 1),
+              "+": () => middle(1.3), "=": () => middle(1.3), "-": () => middle(1 / 1.3), f: () => { fit(); draw(); }, b: () => setFollow(!state.follow), c: () => colourBy(state.colour + 1)};
+
+function controls() {
+    slider.max = T - 1;
+    slider.oninput = () => { play(false); seek(slider.value); };
+    $("replay-play").onclick = () => play(!state.playing);
+    $("replay-fit").onclick = () => { fit(); draw(); };
+    $("replay-in").onclick = () => middle(1.4);
+    $("replay-out").onclick = () => middle(1 / 1.4);
+    const select = $("replay-colour");
+    head.colouring.forEach((c, k) => select.append(new Option(c.name, k)));
+    select.onchange = () => colourBy(+select.value);
+    $("replay-smooth").onchange = (event) => { state.smooth = event.target.checked; draw(); };
+    const follow = $("replay-follow");
+    follow.checked = state.follow;
+    follow.disabled = head.towed === null;
+    follow.onchange = () => setFollow(follow.checked);
+    root.addEventListener("keydown", (event) => {
+        const own = ["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName);
+        if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key] || (own && (event.target.tagName === "SELECT" || event.target.type === "range" || event.key === " "))) return;
+        event.preventDefault();
+        keys[event.key](event);
+    });
+    for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", draw);
+    addEventListener("beforeprint", () => { drawField(); drawChart(); });
+    new ResizeObserver(resize).observe(canvas);
+    if (curve) new ResizeObserver(resize).observe(chart);
+    else chart.hidden = true;
+}
+
+// Height of the canvas, so that what it shows at first fills it.
+function shape() {
+    const box = state.follow && head.view ? head.view : head.box, [w, h] = flat(box[1] - box[0], box[3] - box[2]);
+    canvas.style.aspectRatio = `${w} / ${Math.min(Math.max(h * 1.08, 0.28 * w), 1.1 * w)}`;
+}
+
+const css = (at) => at.map((v) => v * canvas.clientWidth / canvas.width);
+
+// What the page's own controls do, for scripts (and the tests): frame numbers from 0, SI units.
+window.bergtow = {
+    get ready() { return data !== null; }, get frames() { return T; }, get floes() { return N; }, get playhead() { return state.p; }, get time() { return timeAt(state.p); },
+    get playing() { return state.playing; }, get colour() { return head.colouring[state.colour].kind; }, get follow() { return state.follow; },
+    seek, play: () => play(true), pause: () => play(false), fit: () => { fit(); draw(); }, id: idOf,
+    pose: (i) => floePose(i, playhead()), value: (kind, i) => value(kind, nearest(), i), body: (b) => bodyPose(b, playhead()),
+    screen: (i) => {  // where floe i is drawn, CSS pixels from the canvas's corner
+        const p = playhead(), C = centre(p), pose = floePose(i, p);
+        return css(toScreen(C[0] + image(pose[0] - C[0], head.period[0]), C[1] + image(pose[1] - C[1], head.period[1]), origin(p)));
+    },
+    towed: () => { const p = playhead(); return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p))); },  // the same of the towed body
+    get metre() { return css([state.scale, 0])[0]; },  // CSS pixels
+};
+
+load().then(() => {
+    $("replay-state").hidden = true;
+    shape();
+    rates();
+    controls();
+    pointers();
+    legend();
+    resize();
+    fit();
+    draw();
+}).catch((error) => {
+    $("replay-state").hidden = false;
+    $("replay-state").className = "warning";
+    $("replay-state").textContent = `The replay cannot be shown: ${error.message}.`;
+});

@@ -1,0 +1,425 @@
+# SPDX-License-Identifier: MIT
+"""Pictures of an ensemble, those that its study supports.
+
+    sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the others: every field, mean with
+                      95 %, median, jams; the estimates beside concentration, the law V^2 beside speed. A Latin hypercube: one panel, every member
+    exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
+    map.png           mean and its relative uncertainty over two numbers of a grid
+    sensitivity.png   Sobol indices and partial rank correlations
+"""
+import argparse
+from pathlib import Path
+
+import command
+import plot_resistance
+import stat_extreme
+import stat_mean
+import style
+from bergtow_read import RunError
+from ensemble import extremes, member, sensitivity
+from ensemble_read import DOUBTS, Ensemble, short_key
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.ticker import FuncFormatter
+
+MOST_PANELS = 6
+MOST_LINES = 8
+CYCLE = ("#0072b2", "#d55e00", "#009e73", "#8c6bb1", "#b8860b", "#56b4e9", "#4d4d4d", "#cc79a7")
+JAM = "#c1121f"
+
+
+def numeric(e):
+    """Keys of numbers that were varied among the members that are used."""
+    return [k for k, v in e.parameters.items() if v.dtype != object and len(set(v[e.used].tolist())) > 1]
+
+
+def axis_label(e, key):
+    unit = e.units[key]
+    return short_key(key) + (f" ({unit})" if unit not in ("", "1") else "")
+
+
+def groups(e, key):
+    """Conditions with members, in groups that differ in `key` alone: [(words for the others, [Condition])]."""
+    found = {}
+    for c in e.conditions():
+        if len(c.finished):
+            found.setdefault(tuple((k, v) for k, v in c.values.items() if k != key), []).append(c)
+    def words(others):
+        varied = [(k, v) for k, v in others if len(set(e.parameters[k].tolist())) > 1]
+        return ", ".join(f"{short_key(k)} {v}" if isinstance(v, str) else f"{short_key(k)} {v:.3g}" + (f" {e.units[k]}" if e.units[k] not in ("", "1") else "") for k, v in varied)
+    return [(words(others), sorted(some, key=lambda c: c.values[key])) for others, some in found.items()]
+
+
+def headline(figure, e, subject):
+    height = figure.get_size_inches()[1]
+    figure.text(0.02, 1 - 0.14 / height, f"{style.plain(e.title)}: {subject}", va="top", fontsize=13.5, fontweight="bold")
+    doubtful = sum(bool(e.doubts(m)) for m in e.used)
+    words = [f"{len(e.used)} members"]
+    if doubtful:
+        words.append(f"{doubtful} with warnings")
+    missing = e.n - len(e.used)
+    if missing:
+        words.append(f"{missing} failed, waiting or left out")
+    figure.text(0.02, 1 - 0.42 / height, ", ".join(words), va="top", color=style.FAINT)
+
+
+def of(e, rows):
+    return e.summary["mean_ice_resistance_n"][rows]
+
+
+def width_of(x, log):
+    """Half a width, in x, in which the dots of a condition are spread."""
+    x = np.unique(x)
+    if len(x) < 2:
+        return 0.02
+    return 0.012 * (np.log(x[-1] / x[0]) if log else x[-1] - x[0])
+
+
+def spread(x, n, half, log):
+    """n places about x, side by side, so that dots of one condition can be told apart."""
+    at = np.linspace(-half, half, n) if n > 1 else np.zeros(1)
+    return x * np.exp(at) if log else x + at
+
+
+def draw_fields(axes, e, some, key, factor, log_x):
+    """Dots of members, the mean with its 95 % interval and band, the median, and crosses for jams."""
+    x = np.array([c.values[key] for c in some])
+    half = width_of(x, log_x)
+    means = [of(e, c.finished) for c in some]
+    band = np.array([stat_mean.t_interval(y) for y in means])
+    for c, y in zip(some, means):
+        at, order = spread(c.values[key], len(y), half, log_x), np.argsort(y)
+        jam = np.array(["jammed" in e.doubts(m) for m in c.finished])[order]
+        axes.plot(at[~jam], y[order][~jam] / factor, "o", color=style.ICE, alpha=0.35, markersize=3.6, markeredgewidth=0, zorder=3)
+        axes.plot(at[jam], y[order][jam] / factor, "x", color=JAM, markersize=5, markeredgewidth=1.2, zorder=3.5)
+    centre = np.array([y.mean() for y in means])
+    if np.isfinite(band).all() and len(x) > 1:
+        axes.fill_between(x, band[:, 0] / factor, band[:, 1] / factor, color=style.ICE, alpha=0.13, linewidth=0, zorder=2)
+    axes.plot(x, centre / factor, color=style.ICE, linewidth=1.4, zorder=4)
+    half_bar = np.nan_to_num(np.abs(band - centre[:, None])).T / factor
+    axes.errorbar(x, centre / factor, yerr=half_bar, fmt="s", color=style.ICE, markersize=5, capsize=3, linewidth=1.3, zorder=5)
+    axes.plot(x, [np.median(y) / factor for y in means], marker="_", markersize=13, markeredgewidth=2, color=style.INK, linestyle="none", zorder=6)
+
+
+def fields_legend(jams):
+    """Handles and labels of draw_fields."""
+    line = plt.Line2D
+    out = [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), (line([], [], marker="o", color=style.ICE, alpha=0.35, linestyle="none", markersize=4), "a field"),
+           (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12, markeredgewidth=2), "median of the fields")]
+    if jams:
+        out.append((line([], [], marker="x", color=JAM, linestyle="none", markersize=5), "a field where the body stood still"))
+    return out
+
+
+def jammed(e):
+    return any("jammed" in e.doubts(m) for m in e.used)
+
+
+def force_limits(e, some_groups, log):
+    """Ends of the force axis, N: every field, the intervals, and the estimates that are meant for the conditions."""
+    seen = [v for _, some in some_groups for c in some for v in of(e, c.finished)]
+    tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
+    seen += [v for v in tops if np.isfinite(v)]
+    low = min((v for v in seen if v > 0), default=1.0)
+    for name in ("lichey_hellmer", "dilute_limit"):
+        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used] for what in ("force_n", "valid"))
+        seen += [v for v in force[(valid == 1) & (force > low / 30)]]
+    seen = np.array([v for v in seen if np.isfinite(v)])
+    if log:
+        return seen[seen > 0].min() / 2, 2 * seen.max()
+    return min(0.0, seen.min()), 1.08 * max(seen.max(), 1e-12)
+
+
+def wants_log(values):
+    """True where values are positive and span more than a decade and a half."""
+    values = np.asarray(values, dtype=float)
+    values = values[np.isfinite(values)]
+    return bool(len(values) and values.min() > 0 and values.max() > 30 * values.min())
+
+
+def power_law(x, means):
+    """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None where it makes no sense."""
+    lx = np.concatenate([np.full(len(y), np.log(v)) for v, y in zip(x, means)])
+    y = np.concatenate(means)
+    if len(set(lx)) < 2 or len(y) < 4 or y.min() <= 0:
+        return None
+    a = np.column_stack([np.ones(len(y)), lx])
+    c, *_ = np.linalg.lstsq(a, np.log(y), rcond=None)
+    rest = np.log(y) - a @ c
+    se = np.sqrt(np.dot(rest, rest) / (len(y) - 2) * np.linalg.inv(a.T @ a)[1, 1])
+    half = stat_mean.stats.t.ppf(0.975, len(y) - 2) * se
+    return c[1], c[1] - half, c[1] + half, np.exp(c[0])
+
+
+def draw_speed(axes, e, some, key, factor):
+    """The law V² through the geometric mean of the fields, and the exponent that fits."""
+    x = np.array([c.values[key] for c in some])
+    means = [of(e, c.finished) for c in some]
+    law = power_law(x, means)
+    if law is None:
+        return
+    v = np.geomspace(x.min(), x.max(), 50)
+    exponent, low, high, scale = law
+    weights = np.array([len(y) for y in means], dtype=float)
+    centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
+    axes.plot(v, scale * centre ** exponent * (v / centre) ** 2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2), zorder=2.5)
+    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03), xycoords="axes fraction", ha="right", fontsize=9, color=style.FAINT)
+
+
+def estimate_point(e, c):
+    """A member of the condition as plot_resistance reads it, or None where its folder is not there."""
+    for m in c.finished:
+        if (e.folder(m) / "summary.json").exists():
+            try:
+                return plot_resistance.read(e.folder(m))
+            except RunError:
+                continue
+    return None
+
+
+def draw_sweep(e, key):
+    """Figure of the resistance against one parameter of a grid."""
+    panels = groups(e, key)
+    panels = [(words, some) for words, some in panels if len(some) > 1] or panels
+    shown = panels[:MOST_PANELS]
+    columns = 2 if len(shown) == 4 else min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    values = np.array([c.values[key] for _, some in shown for c in some])
+    log_x = key == "tow.speed" and values.min() > 0
+    log_y = wants_log([v for _, some in shown for c in some for v in of(e, c.finished)]) or log_x
+    low, high = force_limits(e, shown, log_y)
+    factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
+    figure, grid = plt.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False, sharex=True, sharey=True)
+    extra = {}
+    for axes, (words, some) in zip(grid.flat, shown):
+        draw_fields(axes, e, some, key, factor, log_x)
+        if key == "ice.concentration":
+            point = estimate_point(e, some[len(some) // 2])
+            if point:
+                plot_resistance.draw_estimates(axes, [point], factor)
+        elif key == "tow.speed":
+            draw_speed(axes, e, some, key, factor)
+            extra["∝ V², through the middle of the fields"] = plt.Line2D([], [], color=style.TOW, linewidth=1.2, dashes=(5, 2))
+        for handle, label in zip(*axes.get_legend_handles_labels()):
+            extra.setdefault(label, handle)
+        axes.set_title(words, fontsize=10)
+        axes.grid(True)
+        if log_x:
+            axes.set_xscale("log")
+            axes.set_xticks(np.unique(values), [f"{v:g}" for v in np.unique(values)])
+            axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
+        if log_y:
+            axes.set_yscale("log")
+            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    grid.flat[0].set_ylim(low / factor, high / factor)
+    if not log_x:
+        margin = 0.06 * (values.max() - values.min())
+        grid.flat[0].set_xlim(max(0.0, values.min() - margin), min(1.0, values.max() + margin) if key == "ice.concentration" else values.max() + margin)
+    for axes in grid.flat[len(shown):]:
+        axes.set_visible(False)
+    for k, axes in enumerate(grid.flat[:len(shown)]):
+        if k % columns == 0:
+            axes.set_ylabel(f"mean ice resistance ({unit})")
+        if k + columns >= len(shown):
+            axes.set_xlabel(axis_label(e, key))
+            axes.tick_params(labelbottom=True)
+    pairs = fields_legend(jammed(e)) + [(handle, label) for label, handle in extra.items()]
+    note = " ".join(([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else [])
+                    + (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else [])
+                    + (["A bar down to the lower edge includes zero."] if log_y and any(stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
+    height = figure.get_size_inches()[1]
+    lines = -(-len(pairs) // 3)
+    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0], right=0.98, top=1 - 0.95 / height, bottom=(0.95 + 0.24 * lines) / height, wspace=0.08, hspace=0.28)
+    figure.legend([h for h, _ in pairs], [t for _, t in pairs], loc="lower left", bbox_to_anchor=(0.02, 0.22 / height), ncol=3, fontsize=9)
+    figure.text(0.025, 0.08 / height, note, fontsize=9, color=style.FAINT)
+    headline(figure, e, f"resistance against {short_key(key)}")
+    return figure
+
+
+def draw_scatter(e, key):
+    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of equal number with 95 %."""
+    rows = e.used
+    x, y = e.parameters[key][rows], of(e, rows)
+    log_y = wants_log(y)
+    factor, unit = style.scale([np.median(y)], "N")
+    figure, axes = plt.subplots(figsize=(9.5, 5.8))
+    figure.subplots_adjust(left=0.09, right=0.98, top=0.85, bottom=0.12)
+    jam = np.array(["jammed" in e.doubts(m) for m in rows])
+    axes.plot(x[~jam], y[~jam] / factor, "o", color=style.ICE, alpha=0.45, markersize=4, markeredgewidth=0, label="a member")
+    if jam.any():
+        axes.plot(x[jam], y[jam] / factor, "x", color=JAM, markersize=5, label="a member whose body stood still")
+    bins = np.array_split(np.argsort(x), min(8, len(x) // 8)) if len(x) >= 24 else []
+    if bins:
+        centre = np.array([y[b].mean() for b in bins])
+        bars = np.abs(np.array([stat_mean.t_interval(y[b]) for b in bins]) - centre[:, None]).T
+        axes.errorbar([x[b].mean() for b in bins], centre / factor, yerr=bars / factor, fmt="s-", color=style.INK, markersize=5, capsize=3, linewidth=1.2, label="mean of a bin, 95 % (t)")
+        axes.plot([x[b].mean() for b in bins], [np.median(y[b]) / factor for b in bins], "_", color=style.TOW, markersize=14, markeredgewidth=2, label="median of a bin")
+    if log_y:
+        axes.set_yscale("log")
+        axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlabel(axis_label(e, key))
+    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.grid(True)
+    axes.legend(loc="best")
+    headline(figure, e, f"resistance against {short_key(key)}")
+    return figure
+
+
+def draw_exceedance(e, options):
+    """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks."""
+    some = [c for c in e.conditions() if len(c.finished)]
+    step = max(1, -(-len(some) // MOST_LINES))
+    figure, axes = plt.subplots(figsize=(10.5, 6.4))
+    figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
+    conversion, top, least = None, 0.0, np.inf
+    for colour, c in zip(CYCLE, some[::step]):
+        hits = [h for h in map(e.impacts, c.finished) if h]
+        fields = [{"time": h[0], "peak": h[1], "start": h[2], "hours": h[3]} for h in hits]
+        peaks, rate = stat_extreme.exceedance(fields)
+        some_above = peaks > 0
+        if not some_above.any():
+            continue
+        conversion, top, least = hits[0][4], max(top, peaks[0]), min(least, peaks[some_above][-1])
+        axes.loglog(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4, label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
+        tail = extremes(e, c.finished, options)["over_threshold"]
+        if "refused" not in tail:
+            z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
+            beyond = np.maximum(1 + tail["shape"] * (z - tail["threshold"]) / tail["scale"], 0)
+            fitted = tail["rate_per_hour"] * (np.exp(-(z - tail["threshold"]) / tail["scale"]) if abs(tail["shape"]) < 1e-8 else beyond ** (-1 / tail["shape"]))
+            axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1, dashes=(4, 2))
+    if conversion is None:
+        plt.close(figure)
+        return None
+    axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
+    axes.set_xlabel(f"peak of a collision (N), {conversion}")
+    axes.set_ylabel("exceeded (per hour of tow)")
+    axes.grid(True)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
+    notes = ["dashed: tail fitted to clusters of peaks,", "down to once in ten times the hours simulated"]
+    if step > 1:
+        notes.append(f"one in {step} of {len(some)} conditions is shown")
+    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    headline(figure, e, "how often a peak is exceeded")
+    return figure
+
+
+def draw_map(e, first, second):
+    """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 % interval over it."""
+    conditions = [c for c in e.conditions() if len(c.finished)]
+    xs, ys = (sorted({c.values[k] for c in conditions}) for k in (first, second))
+    mean, width, count = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
+    for i, v in enumerate(ys):
+        for j, u in enumerate(xs):
+            rows = [m for c in conditions if c.values[first] == u and c.values[second] == v for m in c.finished]
+            if rows:
+                sample = of(e, np.array(rows))
+                low, high = stat_mean.t_interval(sample)
+                mean[i, j], width[i, j], count[i, j] = sample.mean(), (high - low) / 2 / abs(sample.mean()) if sample.mean() else np.nan, len(rows)
+    factor, unit = style.scale([np.nanmedian(mean)], "N")
+    figure, axes = plt.subplots(1, 2, figsize=(12, 2.6 + 0.62 * len(ys)))
+    height = figure.get_size_inches()[1]
+    figure.subplots_adjust(left=0.08, right=0.98, top=1 - 1.15 / height, bottom=0.75 / height, wspace=0.2)
+    log = wants_log(mean / factor)
+    for ax, values, label, texts, colours in ((axes[0], mean / factor, f"mean ice resistance ({unit})", lambda v: style.short(v), style.SPEED_MAP),
+                                              (axes[1], 100 * width, "half the 95 % interval of the mean (%)", lambda v: f"{v:.0f} %", style.FORCE_MAP)):
+        norm = LogNorm() if log and ax is axes[0] else None
+        image = ax.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=norm)
+        for (i, j), v in np.ndenumerate(values):
+            shade = image.norm(v) if np.isfinite(v) else 0
+            ax.text(j, i, texts(v) if np.isfinite(v) else "–", ha="center", va="center", fontsize=9.5, color=style.PAPER if shade > 0.5 else style.INK)
+        ax.set_xticks(range(len(xs)), [f"{v:.3g}" for v in xs])
+        ax.set_yticks(range(len(ys)), [f"{v:.3g}" for v in ys])
+        ax.tick_params(length=0)
+        for side in ax.spines.values():
+            side.set_visible(False)
+        ax.set_xlabel(axis_label(e, first))
+        ax.set_title(label, fontsize=10.5)
+    axes[0].set_ylabel(axis_label(e, second))
+    headline(figure, e, f"over {short_key(first)} and {short_key(second)}")
+    return figure
+
+
+def draw_indices(axes, names, indices):
+    """Bars of first-order and total Sobol indices."""
+    for k, name in enumerate(names):
+        for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"), ("total", -0.17, style.TOW, "total")) if name in indices else ():
+            axes.barh(k + shift, indices[name][what], height=0.3, color=colour, label=label if k == 0 else None)
+            axes.plot(indices[name][f"{what}_95"], [k + shift] * 2, color=style.INK, linewidth=1.2)
+    axes.set_xlabel("share of the explained variance")
+    axes.set_xlim(0, 1.02)
+    axes.legend(loc="lower right")
+
+
+def draw_sensitivity(e, x):
+    """Figure of Sobol indices, of the mean and of its logarithm where they are given, beside partial rank correlations; None where there is neither."""
+    ranks = x.get("ranks", {})
+    given = [(words, x[key]) for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "indices" in x.get(key, {})]
+    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)), key=lambda k: (max([s["indices"][k]["total"] for _, s in given if k in s["indices"]], default=0),
+                                                                                      abs(ranks.get(k, {}).get("prcc", 0))))
+    if not names:
+        return None
+    n = len(given) + 1
+    figure, grid = plt.subplots(1, n, figsize=(3.2 + 4.2 * n, 2.2 + 0.6 * len(names)), sharey=True, squeeze=False)
+    width, height = figure.get_size_inches()
+    figure.subplots_adjust(left=1.7 / width, right=0.98, top=1 - 1.15 / height, bottom=0.85 / height, wspace=0.1)
+    for axes, (words, s) in zip(grid[0], given):
+        draw_indices(axes, names, s["indices"])
+        axes.set_title(f"Sobol, of the {words}: R² {s['r2']:.2f}, Q² {s['q2']:.2f}", fontsize=10.5)
+    axes = grid[0, -1]
+    for k, name in enumerate(names):
+        if name in ranks:
+            axes.barh(k, ranks[name]["prcc"], height=0.5, color=style.DRAG)
+            axes.plot(ranks[name]["prcc_95"], [k] * 2, color=style.INK, linewidth=1.2)
+    axes.axvline(0, color=style.FAINT, linewidth=0.8)
+    axes.set_xlim(-1, 1)
+    axes.set_title("partial rank correlation (PRCC)", fontsize=10.5)
+    grid[0, 0].set_yticks(np.arange(len(names)), [short_key(k) for k in names])
+    for ax in grid[0]:
+        ax.grid(True, axis="x")
+    missing = [f"no Sobol indices of the {words}: {x[key]['refused']}" for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "refused" in x.get(key, {})]
+    figure.text(0.3 / width, 0.08 / height, "; ".join(["black: 95 %", *missing]), fontsize=9, color=style.FAINT)
+    headline(figure, e, "what the resistance depends on")
+    return figure
+
+
+def pictures(e, options):
+    """(name, function that draws it) of the pictures that the study supports."""
+    keys = numeric(e)
+    out = [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key)) for key in keys]
+    if not e.sampled and len(keys) >= 2:
+        out.append(("map", lambda: draw_map(e, keys[0], keys[1])))
+    if len(keys) >= 2:
+        out.append(("sensitivity", lambda: draw_sensitivity(e, sensitivity(e, {int(m): member(e, m) for m in e.used}))))
+    if not e.sampled or len(e.conditions()) <= MOST_LINES:
+        out.append(("exceedance", lambda: draw_exceedance(e, options)))
+    return out
+
+
+def main(argv=None):
+    p = argparse.ArgumentParser(description="Draw the pictures of an ensemble that its study supports.")
+    p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
+    p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to put the pictures (default: DIR)")
+    p.add_argument("--format", choices=[s[1:] for s in command.PICTURES], default="png", help="kind of the files (default png)")
+    p.add_argument("--exclude", action="append", choices=sorted(DOUBTS), default=[], help="leave out members with this doubt; may be repeated")
+    a = p.parse_args(argv)
+    a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0], None, None, None, 1
+    e = Ensemble(a.folder)
+    for name, kinds in (e.exclude(a.exclude) if a.exclude else {}).items():
+        print(f"left out: {name} ({', '.join(kinds)})")
+    if not len(e.used):
+        raise RunError(e.file, "has no member with a mean ice resistance", "run the ensemble further, or exclude less")
+    drawn = pictures(e, a)
+    if not drawn:
+        raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")
+    for name, draw in drawn:
+        figure = draw()
+        if figure is not None:
+            command.save(figure, (a.output or e.path) / f"{name}.{a.format}")
+            plt.close(figure)
+
+
+if __name__ == "__main__":
+    command.guarded(main)

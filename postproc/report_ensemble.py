@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: MIT
+"""What the report of an ensemble says: the tables of ensemble.py, the pictures of plot_ensemble.py, and every member with its doubts.
+
+The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the same.
+"""
+import argparse
+from itertools import groupby
+
+import ensemble
+import ensemble_text
+import plot_ensemble
+import report_run
+import stat_fit
+from bergtow_read import Run, RunError
+from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
+
+import numpy as np
+
+STATUS = {FINISHED: "finished", FAILED: "failed"}
+MOST_FIGURES = 8  #: conditions whose means stand at the head of the page
+#: as ensemble.py has them
+OPTIONS = {"error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None, "resamples": stat_fit.RESAMPLES}
+
+
+def cells(line):
+    return [cell.strip() for cell in line.strip().strip("|").split(" | ")]
+
+
+def blocks(markdown):
+    """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"}, {"kind": "text", "lines"}]."""
+    out = []
+    lines = [line for line in markdown.splitlines() if line.strip()]
+    for kind, some in groupby(lines, key=lambda line: "heading" if line.startswith("#") else "table" if line.startswith("|") else "text"):
+        some = list(some)
+        if kind == "heading":
+            out += [{"kind": kind, "text": line.lstrip("# ")} for line in some]
+        elif kind == "table":
+            out.append({"kind": kind, "head": cells(some[0]), "rows": [cells(line) for line in some[2:]]})
+        else:
+            out.append({"kind": kind, "lines": some})
+    return out
+
+
+def sections(markdown):
+    """(lines that stand before the first section but for the title, [(heading, its blocks)])."""
+    found = blocks(markdown)
+    starts = [k for k, b in enumerate(found) if b["kind"] == "heading"]
+    intro = [line for b in found[starts[0] + 1:starts[1]] for line in b["lines"]]
+    return intro, [(found[a]["text"], found[a + 1:b]) for a, b in zip(starts[1:], [*starts[2:], len(found)])]
+
+
+def figures(s):
+    """Means of the conditions for the head of the page: (label, number, what stands below it)."""
+    out = []
+    for c in s["conditions"]:
+        r = c["resistance"]
+        if not r["n"]:
+            out.append((c["label"], "–", "no field finished"))
+            continue
+        low, high = r["t_95"]
+        between = f"95 % interval of the mean {report_run.force(low)} to {report_run.force(high)}, " if np.isfinite([low, high]).all() else ""
+        out.append((c["label"], report_run.force(r["mean"]), f"{between}median {report_run.force(r['median'])}, {r['n']} field{'s' if r['n'] > 1 else ''}"))
+    return out if len(out) <= MOST_FIGURES else []
+
+
+def told(e, m):
+    """Warnings of a member in its own words, or why they are not known."""
+    try:
+        with Run(e.folder(m)) as run:
+            return [str(w) for w in run.summary.get("warnings") or []]
+    except RunError as error:
+        return [f"its folder cannot be read: {error.reason}"]
+
+
+def members(e, s):
+    """Rows of all members: what was varied, status, mean, doubts, state hash, warnings in words."""
+    labels = {c.index: c.label for c in e.conditions()}
+    by_name, out = {row["name"]: row for row in s["members"]}, []
+    for m in range(e.n):
+        row = by_name.get(e.name[m])
+        mean, interval = report_run.with_error(row["mean"], row["se_within"]) if row else ("–", "–")
+        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean,
+                    "doubts": ", ".join(sorted(e.doubts(m))), "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []})
+    return out
+
+
+def provenance(e):
+    """(rows of the first member, sentence on members of other builds or None)."""
+    rows, builds = [], set()
+    for m in np.flatnonzero(e.status == FINISHED):
+        try:
+            with Run(e.folder(m)) as run:
+                builds.add(tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))
+                rows = rows or [(name, value) for name, value in report_run.provenance(run) if name not in ("state hash", "wall time", "folder", "started")]
+        except RunError:
+            continue
+    return rows + [("folder", str(e.path.resolve()))], (f"The members come from {len(builds)} builds of the program, which need not give the same bits." if len(builds) > 1 else None)
+
+
+def caption(name):
+    """Words for a picture of plot_ensemble.py by its name, "sweep-ice-concentration"."""
+    if name.startswith("sweep-"):
+        return "Mean ice resistance against " + name[6:].replace("-", ".", 1)
+    return {"map": "Mean ice resistance over two parameters, and its interval", "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"}.get(name, name)
+
+
+def pictures(e, options):
+    """The pictures of plot_ensemble.py that the study supports."""
+    return [p for p in (report_run.picture(name, caption(name), draw) for name, draw in plot_ensemble.pictures(e, options)) if p]
+
+
+def context(folder):
+    """Everything that page/ensemble.html sets. Errors: RunError."""
+    e, options = Ensemble(folder), argparse.Namespace(**OPTIONS)
+    s = ensemble.statistics(e, options)
+    intro, found = sections(ensemble_text.report(s, markdown=True))
+    rows, other_builds = provenance(e)
+    title = report_run.breakable(e.title)
+    counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
+    return {"title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []), "figures": figures(s), "sections": found, "pictures": pictures(e, options),
+            "members": members(e, s), "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "study": e.study, "provenance": rows}

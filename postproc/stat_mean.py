@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Means with intervals: of one correlated series, and of the means of several fields.
+
+Within a run. The standard error is that of the program (src/stats.c): integrated autocorrelation time with Sokal's window M >= 5 tau and
+the bias of the sample mean taken out. It is itself an estimate, from a sum of M lags: its square has the relative variance 2 (2M + 1)/n
+[Wolff 2004, Comput. Phys. Commun. 156, eq. 42], that of a chi-square of nu = n/(2M + 1) degrees of freedom, so the 95 % interval takes the t quantile of nu.
+With the normal quantile in its place 95 % intervals cover 90 to 94 % of AR(1) series of 20 to 50 independent samples.
+
+Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense ice are skewed; the
+studentised bootstrap follows the skewness (second-order correct), where the percentile and BCa bootstrap are too short for few fields.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft, stats
+
+MAX_LAG = 256
+MIN_CORRELATED = 8
+LEVEL = 0.95
+RESAMPLES = 1999
+LEAST_BOOTSTRAP = 5  # fields: fewer have too few different resamples
+TRIM = 0.125         # share of the fields cut off at each end: one of eight, two of twenty
+SEED = 20171         # of every resampling: the same files give the same table
+
+
+@dataclass(frozen=True)
+class SeriesMean:
+    """Mean of a correlated series."""
+
+    mean: float
+    sd: float     #: of the samples
+    se: float     #: of the mean
+    tau: float    #: integrated autocorrelation time in samples, 1/2 for white noise
+    n_eff: float  #: independent samples, n / (2 tau)
+    dof: float    #: degrees of freedom of se
+    n: int
+
+    def interval(self, level=LEVEL):
+        """(low, high) with the t quantile of dof."""
+        half = stats.t.ppf(0.5 + level / 2, self.dof) * self.se if self.se > 0 else self.se
+        return self.mean - half, self.mean + half
+
+
+def autocovariance(d, most):
+    """G(t) = sum d_i d_{i+t} / (n - t), t = 0 .. most."""
+    n = len(d)
+    size = fft.next_fast_len(n + most + 1, real=True)
+    power = np.abs(fft.rfft(d, size)) ** 2
+    return fft.irfft(power, size)[:most + 1] / (n - np.arange(most + 1))
+
+
+def variance_of_mean(d):
+    """(variance of the mean of deviations d, degrees of freedom of that estimate)."""
+    while True:
+        n = len(d)
+        last = min(n // 2, MAX_LAG)
+        if n < MIN_CORRELATED or not np.dot(d, d) > 0:
+            return np.dot(d, d) / n / max(n - 1, 1), max(n - 1, 1)
+        g = autocovariance(d, last)
+        lags = np.arange(1, last + 1)
+        c = g[0] + 2 * np.cumsum(g[1:])
+        closed = np.flatnonzero(lags >= 5 * c / (2 * g[0]))
+        if len(closed) or last < MAX_LAG:
+            m = closed[0] if len(closed) else last - 1
+            corrected = c[m] * (1 + (2 * lags[m] + 1) / n)
+            return max(corrected, g[0] / n) / n, max(n / (2 * lags[m] + 1), 1.0)
+        d = 0.5 * (d[0:2 * (n // 2):2] + d[1:2 * (n // 2):2])  # means of pairs: the same variance of the mean, half the lags
+
+
+def series_mean(x):
+    """SeriesMean of an evenly spaced series; NaNs where there are fewer than two samples or one is not finite."""
+    x = np.asarray(x, dtype=float)
+    n = len(x)
+    if n < 2 or not np.isfinite(x).all():
+        return SeriesMean(x.mean() if n else np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, n)
+    if np.ptp(x) == 0:
+        return SeriesMean(x[0], 0.0, 0.0, 0.5, float(n), n - 1.0, n)
+    d = x - x.mean()
+    sd = np.sqrt(np.dot(d, d) / (n - 1))
+    variance, dof = variance_of_mean(d)
+    tau = n * variance / (2 * sd * sd)
+    return SeriesMean(x.mean(), sd, np.sqrt(variance), tau, n / (2 * tau), dof, n)
+
+
+def t_interval(x, level=LEVEL):
+    """(low, high) of the mean of independent x; NaN for fewer than two."""
+    n = len(x)
+    if n < 2:
+        return np.nan, np.nan
+    half = stats.t.ppf(0.5 + level / 2, n - 1) * np.std(x, ddof=1) / np.sqrt(n)
+    return np.mean(x) - half, np.mean(x) + half
+
+
+def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):
+    """(low, high) of the mean by the studentised bootstrap: m - q_high se, m - q_low se with q of (m* - m) / se*. NaN for fewer than LEAST_BOOTSTRAP."""
+    x = np.asarray(x, dtype=float)
+    n, m = len(x), np.mean(x)
+    if n < LEAST_BOOTSTRAP:
+        return np.nan, np.nan
+    if np.ptp(x) == 0:
+        return m, m
+    rng = rng or np.random.default_rng(SEED)
+    drawn = x[rng.integers(0, n, (resamples, n))]
+    spread = drawn.std(axis=1, ddof=1)
+    some = spread > 0
+    t = (drawn[some].mean(axis=1) - m) / (spread[some] / np.sqrt(n))
+    low, high = np.quantile(t, [(1 - level) / 2, (1 + level) / 2])
+    se = np.std(x, ddof=1) / np.sqrt(n)
+    return m - high * se, m - low * se
+
+
+def median_interval(x, level=LEVEL):
+    """(low, high) of the median by order statistics, without any assumption on the distribution; NaN where n is too small for the level."""
+    x = np.sort(x)
+    n = len(x)
+    k = int(stats.binom.ppf((1 - level) / 2, n, 0.5))
+    while k > 0 and stats.binom.cdf(k - 1, n, 0.5) > (1 - level) / 2:
+        k -= 1
+    return (x[k - 1], x[n - k]) if k > 0 else (np.nan, np.nan)
+
+
+def fields_needed(mean, sd, error, level=LEVEL):
+    """Least n whose t interval is within error * |mean|, from the mean and the standard deviation between fields; NaN without either."""
+    if not (np.isfinite([mean, sd]).all() and mean != 0):
+        return np.nan
+    ratio, n = sd / (error * abs(mean)), 2
+    while stats.t.ppf(0.5 + level / 2, n - 1) * ratio > np.sqrt(n):
+        n = max(n + 1, int((stats.norm.ppf(0.5 + level / 2) * ratio) ** 2))
+    return float(n)
+
+
+def between_fields(means, errors, wanted=0.05):
+    """Statistics of the means of fields, with the standard errors within each, as a dict of numbers and (low, high) pairs."""
+    means, errors = np.asarray(means, dtype=float), np.asarray(errors, dtype=float)
+    n = len(means)
+    if n == 0:
+        return {"n": 0}
+    sd = np.std(means, ddof=1) if n > 1 else np.nan
+    within = np.sqrt(np.nanmean(errors ** 2)) if np.isfinite(errors).any() else np.nan
+    spread = stats.chi2.ppf([0.975, 0.025], n - 1) if n > 1 else [np.nan] * 2
+    sd_range = sd * np.sqrt((n - 1) / np.asarray(spread))
+    total = np.sum(np.abs(means))
+    trimmed = stats.trim_mean(means, TRIM)
+    return {"n": n, "mean": means.mean(), "sd_between": sd, "sd_between_95": tuple(sd_range), "se_between": sd / np.sqrt(n), "se_within": within,
+            "sd_of_fields": np.sqrt(max(sd ** 2 - within ** 2, 0.0)) if np.isfinite([sd, within]).all() else np.nan,
+            "t_95": t_interval(means), "bootstrap_95": studentised_interval(means), "median": np.median(means), "median_95": median_interval(means),
+            "trimmed_mean": trimmed, "trimmed_each_end": int(TRIM * n), "largest_share": np.max(np.abs(means)) / total if total > 0 else np.nan,
+            "percentiles": {str(p): np.percentile(means, p) for p in (5, 25, 75, 95)}, "min": means.min(), "max": means.max(),
+            "fields_needed": fields_needed(means.mean(), sd, wanted),
+            "fields_needed_95": tuple(fields_needed(means.mean(), s, wanted) for s in sd_range)}

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: MIT
+"""Intervals of a quantity by its profile likelihood, widened for values that depend on each other within a field.
+
+With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval holds the q with
+    2 (l(q^) - l_p(q)) <= k c,      k the square of Student's t quantile of F - 1 degrees of freedom, c = max(1, g V_s g / g V_m g).
+g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the squared scores of the F fields:
+c is 1 where the values of a field are independent of each other and of the field, and larger where they are not [Chandler & Bate 2007, Biometrika 94].
+Follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals of exponential tails from 8 and 20 fields
+they covered 65 to 82 % and 75 to 80 %, since the shape of a short sample is low and its resamples are lower still.
+"""
+import numpy as np
+from scipy import optimize, stats
+
+LEAST_FIELDS = 5  # fewer say nothing of the scatter between fields: c = 1, and the quantile of the normal distribution
+STEPS = 60        # doublings of the distance before an interval counts as open
+BISECTIONS = 14
+
+
+def gradient(f, theta, step=1e-4):
+    """d f / d theta, f scalar or [F]: [k] or [k, F]."""
+    out = []
+    for i in range(len(theta)):
+        d = np.zeros(len(theta))
+        d[i] = step
+        out.append((np.asarray(f(theta + d)) - np.asarray(f(theta - d))) / (2 * step))
+    return np.array(out)
+
+
+def dispersion(minus_log_likelihoods, quantity, theta):
+    """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
+    theta = np.asarray(theta, dtype=float)
+    scores = gradient(minus_log_likelihoods, theta)
+    fields = scores.shape[1]
+    if fields < LEAST_FIELDS:
+        return 1.0
+    information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)
+    g = gradient(quantity, theta)
+    try:
+        a = np.linalg.solve(0.5 * (information + information.T), g)
+    except np.linalg.LinAlgError:
+        return 1.0
+    model, robust = g @ a, np.sum((a @ scores) ** 2) * fields / (fields - 1)
+    return float(max(1.0, robust / model)) if np.isfinite([model, robust]).all() and model > 0 else 1.0
+
+
+def drop(fields, c=1.0, level=0.95):
+    """Fall of the log-likelihood at the ends of the interval."""
+    quantile = stats.t.ppf(0.5 + level / 2, fields - 1) if fields >= LEAST_FIELDS else stats.norm.ppf(0.5 + level / 2)
+    return 0.5 * c * quantile ** 2
+
+
+def interval(minus_log_likelihood, best, rest, fall, first):
+    """(low, high) of a quantity: where min over rest of minus_log_likelihood(q, rest) has risen by `fall` above its value at q = best.
+
+    first: first step away from best. An end that is not found is infinite.
+    """
+    least = minus_log_likelihood(best, rest)
+    def rise(q, start):
+        # impossible values are very unlikely ones: the search takes differences
+        found = optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400})
+        return found.fun - least - fall, found.x
+    ends = []
+    for sign in (-1, 1):
+        inner, outer, start = best, best, np.asarray(rest, dtype=float)
+        step, value = first, -fall
+        for _ in range(STEPS):
+            outer = inner + sign * step
+            value, found = rise(outer, start)
+            if value > 0 or not np.isfinite(value):
+                break
+            inner, start, step = outer, found, 1.6 * step
+        if value <= 0:
+            ends.append(sign * np.inf)
+            continue
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (inner + outer)
+            value, found = rise(middle, start)
+            if value > 0 or not np.isfinite(value):
+                outer = middle
+            else:
+                inner, start = middle, found
+        ends.append(0.5 * (inner + outer))
+    return ends[0], ends[1]

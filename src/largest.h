@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+// What one input may ask for at most: every limit of size, in one place.
+//
+// A case of twenty lines can ask for more memory, disk or time than any machine has, and a damaged or hostile file for more than that. Whatever
+// grows with a number of an input is held against a limit here before it is begun, and refused with key, value, limit and remedy. The limits are
+// choices, far above what is simulated today and below what would exhaust a large machine. `bergtow --list-keys` prints them.
+#ifndef BT_LARGEST_H
+#define BT_LARGEST_H
+
+#include <stdio.h>
+
+#include "bergtow/case.h"
+
+enum {
+    BT_MOST_TEXT_BYTES = 16 << 20,     ///< a case or study file
+    BT_MOST_TABLE_BYTES = 64 << 20,    ///< a CSV table
+    BT_MOST_OUTLINE_BYTES = 1 << 30,   ///< a GeoJSON file
+    BT_TREE_DEPTH = 16,                ///< nesting of a case or study
+    BT_TREE_NODES = 2000000,           ///< values of one file
+    BT_TREE_MAP = 256,                 ///< entries of one map
+    BT_MAX_TEXT = 4096,                ///< bytes of a text value
+    BT_MAX_FLOES_BY_HAND = 10000,      ///< entries of the list `floes:`
+    BT_MOST_POINTS = 10000,            ///< points of a list such as tow.waypoints
+    BT_MOST_VALUES = 10000,            ///< values of one parameter of a study
+    BT_MOST_COMPLAINTS = 200,          ///< errors of one case that are told
+    BT_MOST_FLOES = 20000000,          ///< about 40 GB; also keeps bt_idx far from its limit
+    BT_MOST_STEPS = 100000000,         ///< the summary keeps 64 bytes of each
+    BT_MOST_FRAMES = 1000000,
+    BT_MOST_ROWS = 2000000,            ///< of a CSV table
+    BT_MOST_RING = 10000,              ///< vertices of one outline before it is simplified or refused
+    BT_MOST_LISTS = 40000000,          ///< `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes while it is read
+};
+
+static const double BT_MOST_RESULT_BYTES = 20e12;  ///< series and frames
+static const double BT_MOST_CORE_SECONDS = 1e10;   ///< estimated work of a run: 300 years of a core
+
+/// A line for each limit.
+void bt_largest_print(FILE *out);
+
+#endif

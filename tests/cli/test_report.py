@@ -1,0 +1,433 @@
+# SPDX-License-Identifier: MIT
+"""The report of a run in a real browser: what it says, what it shows, and that it needs nothing but itself."""
+import base64
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from selenium.webdriver import ActionChains, Keys
+from selenium.webdriver.support.ui import Select
+
+from browser import browser, complaints, opened, until
+from harness import TOW, changed, run
+
+POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
+sys.path.insert(0, str(POSTPROC))
+
+import replay as replay_data  # noqa: E402
+import report  # noqa: E402
+import report_case  # noqa: E402
+import report_run  # noqa: E402
+import style  # noqa: E402
+from bergtow_read import Run  # noqa: E402
+
+HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
+CASE = changed(TOW, run__title=HOSTILE, ice__concentration=0.7, reference__mean_force=3.0, reference__source="<b>nobody</b>", output__window_start=8)
+#: in the map's frame, within a window that goes along, on a line that breaks
+MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2}, run__duration=60,
+                 tow={"mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000, "line": {"breaking_load": 1e6}})
+
+
+def script(*arguments):
+    return subprocess.run(["/usr/bin/python3", str(POSTPROC / "report.py"), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+
+
+def page_without_pictures(folder, path, monkeypatch, *arguments):
+    """A page made in this process; drawing its pictures would take most of the time."""
+    monkeypatch.setattr(report_run, "pictures", lambda _: [])
+    report.main([str(folder), "-o", str(path), *arguments])
+    return path
+
+
+@pytest.fixture(scope="module")
+def chrome(tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as driver:
+        yield driver
+
+
+@pytest.fixture(scope="module")
+def tow(tmp_path_factory):
+    """A run, and its page as the script writes it."""
+    r = run(tmp_path_factory.mktemp("tow"), CASE)
+    result = script(r.dir)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith(str(r.dir / "report.html"))
+    return r
+
+
+@pytest.fixture(scope="module")
+def alone(tow, tmp_path_factory):
+    """The page, copied to where nothing else is."""
+    return shutil.copy(tow.dir / "report.html", tmp_path_factory.mktemp("elsewhere") / "page.html")
+
+
+def js(driver, code, *arguments):
+    return driver.execute_script(code, *arguments)
+
+
+def ready(driver, path):
+    requests = opened(driver, path)
+    until(lambda: js(driver, "return window.bergtow !== undefined && bergtow.ready"))
+    return requests
+
+
+def seek(driver, frame):
+    """Go to a frame and wait until it is drawn."""
+    driver.execute_async_script("const done = arguments[1]; bergtow.seek(arguments[0]); requestAnimationFrame(() => requestAnimationFrame(done))", frame)
+
+
+@pytest.fixture
+def page(chrome, alone):
+    """The page in its first state."""
+    chrome.requests = ready(chrome, alone)
+    yield chrome
+    assert complaints(chrome) == []
+
+
+def shown(driver, n):
+    return np.array(js(driver, f"return [...Array({n}).keys()].map((i) => bergtow.pose(i))"))
+
+
+def text(driver, selector):
+    return [e.text for e in driver.find_elements("css selector", selector)]
+
+
+# ---- the page
+
+def test_needs_nothing_but_itself(page, alone):
+    assert [r for r in page.requests if not r.startswith("data:")] == [alone.resolve().as_uri()]
+    assert all(js(page, "return [...document.images].map((i) => i.complete && i.naturalWidth > 300)"))
+    assert len(page.find_elements("tag name", "img")) == 6
+    # What it cannot do: ask the network.
+    blocked = page.execute_async_script("const done = arguments[0]; fetch('http://127.0.0.1:9/').then(() => done('reached'), (e) => done(e.name))")
+    assert blocked == "TypeError" and any("Content Security Policy" in c for c in complaints(page))
+
+
+def test_text_of_the_case_stays_text(page):
+    assert js(page, "return window.hacked") is None
+    assert text(page, "h1") == [HOSTILE] and page.title.startswith(HOSTILE)
+    assert page.find_elements("css selector", "b") == []
+    assert any("<b>nobody</b>" in t for t in text(page, "#numbers td"))
+
+
+def test_says_the_numbers_of_the_run(page, tow):
+    s = tow.summary
+    body = page.find_element("tag name", "main").text
+    mean, se = s["mean_ice_resistance_n"], s["mean_ice_resistance_se_n"]
+    said = re.search(r"mean ice resistance\n([\d.]+) ± ([\d.]+) N\n95 % interval ([-\d.]+) to ([-\d.]+) N", body)
+    assert np.allclose([float(v) for v in said.groups()], [mean, se, mean - 1.96 * se, mean + 1.96 * se], rtol=0.03, atol=0.051 * se)
+    assert text(page, ".warning li") == s["warnings"] and len(s["warnings"]) > 0
+    rows = {r.find_element("tag name", "th").text: r.text for r in page.find_elements("css selector", "#estimates tbody tr")}
+    names = {"Lichey–Hellmer 2001": "lichey_hellmer", "Marchenko, compaction": "marchenko_compaction", "Marchenko, rafting": "marchenko_rafting", "Marchenko, momentum": "marchenko_momentum",
+             "dilute limit": "dilute_limit", "open-water drag": "open_water_drag"}
+    assert set(rows) == set(names)
+    for label, name in names.items():
+        e = s["estimates"][name]
+        assert float(re.search(r" ([\d.]+) N\b", rows[label])[1]) == pytest.approx(e["force_n"], rel=0.006)
+        assert ("yes:" if e["valid"] else "no:") in rows[label]
+    assert s["state_hash"] in body and s["impacts"]["conversion"] in body and "measured mean force (reference)" in body
+    assert style.short(mean / 3.0) in text(page, "#numbers td")
+
+
+def test_fits_a_narrow_window_and_a_dark_one(page):
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+    try:
+        assert js(page, "return document.documentElement.scrollWidth") <= 380
+        paper = [int(v) for v in re.findall(r"\d+", js(page, "return getComputedStyle(document.body).backgroundColor"))[:3]]
+        ink = [int(v) for v in re.findall(r"\d+", js(page, "return getComputedStyle(document.body).color"))[:3]]
+        assert max(paper) < 60 and min(ink) > 200
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+# ---- the replay
+
+def test_poses_and_values_are_those_of_the_file(page, tow):
+    pose, body, force, speed, time = (tow.dataset(f"frames/{n}") for n in ("pose", "body_pose", "contact_force", "speed", "time"))
+    n, last = pose.shape[1], len(time) - 1
+    quantum = np.ptp(pose[:, :, :2].reshape(-1, 2), axis=0) / 65535
+    for frame in (0, 1, last // 2, last):
+        seek(page, frame)
+        assert js(page, "return bergtow.time") == pytest.approx(time[frame], abs=1e-9)
+        error = shown(page, n) - pose[frame]
+        assert np.all(np.abs(error[:, :2]) <= 0.5001 * quantum)
+        assert np.abs((error[:, 2] + np.pi) % (2 * np.pi) - np.pi).max() <= np.pi / 65536 * 1.001
+        assert np.allclose(js(page, "return bergtow.body(0)"), body[frame, 0], atol=1e-12)
+        for kind, values in (("force", force[frame]), ("speed", speed[frame, :n])):
+            got = np.array(js(page, f"return [...Array({n}).keys()].map((i) => bergtow.value('{kind}', i))"))
+            assert np.all(np.abs(got - values) <= 2e-5 * np.sqrt(np.maximum(got, values) * {"force": force, "speed": speed}[kind].max()) + 1e-9)
+    assert force.max() > 0
+    seek(page, last // 2 + 0.25)
+    between = 0.75 * pose[last // 2] + 0.25 * pose[last // 2 + 1]
+    assert np.all(np.abs(shown(page, n)[:, :2] - between[:, :2]) <= 0.5001 * quantum) and np.ptp(pose[last // 2:last // 2 + 2], axis=0).max() > 3 * quantum.max()
+    page.find_element("id", "replay-smooth").click()
+    assert np.all(np.abs(shown(page, n)[:, :2] - pose[last // 2, :, :2]) <= 0.5001 * quantum)
+
+
+def test_plays_pauses_and_ends(page):
+    assert js(page, "return [bergtow.playhead, bergtow.playing]") == [0, False]
+    button = page.find_element("id", "replay-play")
+    button.click()
+    until(lambda: js(page, "return bergtow.playhead") > 2)
+    assert js(page, "return bergtow.playing") and "pause" in button.text
+    button.click()
+    held = js(page, "return bergtow.playhead")
+    assert not js(page, "return bergtow.playing")
+    seek(page, held)
+    last = js(page, "return bergtow.frames") - 1
+    assert js(page, "return bergtow.playhead") == held < last
+    field = page.find_element("id", "replay-field")
+    seek(page, last - 3)
+    field.send_keys(" ")
+    until(lambda: js(page, "return bergtow.playhead") == last)
+    assert not js(page, "return bergtow.playing")
+    field.send_keys(Keys.ARROW_LEFT)
+    assert js(page, "return bergtow.playhead") == last - 1
+    field.send_keys(Keys.HOME)
+    assert js(page, "return bergtow.playhead") == 0
+
+
+def test_slider_scrubs(page, tow):
+    slider = page.find_element("id", "replay-time")
+    js(page, "arguments[0].value = 57; arguments[0].dispatchEvent(new Event('input'))", slider)
+    assert js(page, "return bergtow.playhead") == 57
+    assert shown(page, 1)[0, 0] == pytest.approx(tow.dataset("frames/pose")[57, 0, 0], abs=1e-3)
+    until(lambda: text(page, "#replay-now")[0].startswith(f"{tow.dataset('frames/time')[57]:.1f} s"))
+
+
+def pixel(driver, i):
+    """Colour in the middle of a floe."""
+    return js(driver, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth, at = bergtow.screen(arguments[0]);
+                         return [...c.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data].slice(0, 3)""", i)
+
+
+def test_colours_by_speed_and_by_force(page, tow):
+    speed, force, pose, body = (tow.dataset(f"frames/{n}") for n in ("speed", "contact_force", "pose", "body_pose"))
+    clear = np.hypot(*(pose[:, :, :2] - body[:, :1, :2]).transpose(2, 0, 1)) > 2.5  # no body, line, arrow or track above the floe
+    clear &= np.abs(pose[:, :, 1] - body[:, :1, 1]) > 1.5
+    frame, floe = np.unravel_index(np.argmax(np.where(clear, force, -1)), force.shape)
+    still = int(np.argmax(clear[frame] & (force[frame] == 0)))
+    top = np.percentile(force[force > 0], 99)
+    seek(page, int(frame))
+    want = 255 * np.array(style.SPEED_MAP(min(1, speed[frame, floe] / 0.13))[:3])
+    assert np.abs(np.array(pixel(page, int(floe))) - want).max() < 9
+    Select(page.find_element("id", "replay-colour")).select_by_visible_text("contact force")
+    seek(page, int(frame))
+    shade = np.array(pixel(page, int(floe)))
+    assert js(page, "return bergtow.colour") == "force" and text(page, "#replay-bar-label")[0].startswith("largest contact force")
+    # Of the limit, a percentile of the frames shown, only its size is known here.
+    shares = np.sqrt(np.minimum(1, force[frame, floe] / (top * np.array([0.7, 0.85, 1, 1.2, 1.5]))))
+    distance = [np.abs(shade - 255 * np.array(style.FORCE_MAP(s)[:3])).max() for s in np.linspace(shares.min() - 0.03, min(1, shares.max() + 0.03), 40)]
+    assert min(distance) < 9 and np.abs(shade - want).max() > 30
+    assert np.abs(np.array(pixel(page, still)) - 255 * np.array(style.FORCE_MAP(0.0)[:3])).max() < 9
+
+
+def test_a_click_on_the_curve_goes_there(page, tow):
+    chart = page.find_element("id", "replay-curve")
+    js(page, "arguments[0].scrollIntoView({block: 'center'})", chart)
+    wide, times = chart.size["width"], []
+    for share in (0.4, 0.8):
+        ActionChains(page).move_to_element_with_offset(chart, int((share - 0.5) * wide), 0).click().perform()
+        times.append(js(page, "return bergtow.time"))
+        seek(page, js(page, "return bergtow.playhead"))
+        columns = js(page, """const c = arguments[0], d = c.getContext('2d').getImageData(0, Math.round(c.height / 2), c.width, 1).data, out = [];
+                              for (let x = 0; x < c.width; x++) if (d[4 * x] > 180 && d[4 * x + 1] < 60 && d[4 * x + 2] > 70 && d[4 * x + 2] < 120) out.push(x * c.clientWidth / c.width); return out""", chart)
+        assert columns and abs(np.mean(columns) - int((share - 0.5) * wide) - wide / 2) < 3
+    # The axis runs from 0 to the end of the run over most of the width.
+    assert 0.85 < (times[1] - times[0]) / (0.4 * tow.summary["sim_time_s"]) < 1.25
+    ActionChains(page).move_to_element_with_offset(chart, int(0.498 * wide), 0).click().perform()
+    assert js(page, "return bergtow.playhead") == js(page, "return bergtow.frames") - 1
+
+
+def test_pointing_at_a_floe_tells_its_values(page, tow):
+    seek(page, 60)
+    field = page.find_element("id", "replay-field")
+    js(page, "arguments[0].scrollIntoView({block: 'center'})", field)
+    pose, force = tow.dataset("frames/pose")[60], tow.dataset("frames/contact_force")[60]
+    floe = int(np.argmax(np.where(pose[:, 0] > 5, force, -1)))
+    x, y = js(page, "return bergtow.screen(arguments[0])", floe)
+    ActionChains(page).move_to_element_with_offset(field, round(x - field.size["width"] / 2), round(y - field.size["height"] / 2)).perform()
+    lines = until(lambda: js(page, "const t = document.getElementById('replay-tip'); return t.hidden ? '' : t.textContent")).split("\n")
+    assert lines[0] == f"floe {floe}" and float(re.search(r"force ([\d.e-]+) N", lines[2])[1]) == pytest.approx(force[floe], rel=0.006)
+
+
+def test_zoom_drag_and_fit(page):
+    field = page.find_element("id", "replay-field")
+    metre, at = js(page, "return bergtow.metre"), np.array(js(page, "return bergtow.screen(5)"))
+    page.find_element("id", "replay-in").click()
+    assert js(page, "return bergtow.metre") == pytest.approx(1.4 * metre)
+    page.find_element("id", "replay-fit").click()
+    assert np.allclose(js(page, "return bergtow.screen(5)"), at, atol=1e-6)
+    ActionChains(page).drag_and_drop_by_offset(field, 40, -25).perform()
+    assert np.allclose(js(page, "return bergtow.screen(5)") - at, [40, -25], atol=1.5)
+
+
+def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
+    r = run(tmp_path, MOVING)
+    ready(chrome, page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch))
+    pose, body, time = (r.dataset(f"frames/{n}") for n in ("pose", "body_pose", "time"))
+    clock, way, window = r.series("time", "body_x", "window_x")
+    frame = len(time) - 2
+    sample = np.searchsorted(clock, time[frame] * (1 + 1e-9), side="right") - 1
+    assert r.summary["moving_window"]["renewed"] > 0 and way[-1] - way[0] > 5
+    for follow in (True, False):
+        seek(chrome, frame)
+        assert js(chrome, "return bergtow.follow") == follow and js(chrome, "return bergtow.body(0)[0]") == pytest.approx(way[sample], abs=1e-6)
+        # A map: x points up, y to the right. Each floe stands at the image within the window; across, at the one nearest to the middle of the view.
+        centre = body[frame, 0, 1] if follow else 0.0
+        north = window[sample] + (pose[frame, :, 0] - window[sample]) % 20 - way[sample]
+        east = centre + (pose[frame, :, 1] - centre + 4) % 8 - 4 - (body[frame, 0, 1] + 4) % 8 + 4
+        at = np.array(js(chrome, f"return [...Array({len(north)}).keys()].map((i) => bergtow.screen(i))")) - js(chrome, "return bergtow.towed()")
+        # A floe within rounding of the seam may stand at either end.
+        inside = (np.abs((pose[frame, :, 0] - window[sample] + 10) % 20 - 10) > 0.01) & (np.abs((pose[frame, :, 1] - centre) % 8 - 4) > 0.01)
+        assert inside.sum() > 0.9 * len(north)
+        assert np.abs(at / js(chrome, "return bergtow.metre") - np.column_stack([east, -north]))[inside].max() < 0.01
+        chrome.find_element("id", "replay-follow").click()
+    assert complaints(chrome) == []
+
+
+def test_leaves_out_frames_and_floes_and_says_so(chrome, tow, tmp_path, monkeypatch):
+    """A page of 0.1 MB, not packed: fewer frames, those floes that the body comes near to, and their own ids."""
+    ready(chrome, page_without_pictures(tow.dir, tmp_path / "page.html", monkeypatch, "--size", "0.1", "--no-compression"))
+    assert sum(len(t) for t in js(chrome, "return ['x', 'y', 'yaw', 'speed', 'force'].map((n) => document.getElementById('replay-' + n).textContent)")) <= 0.101e6
+    pose, body, time = (tow.dataset(f"frames/{n}") for n in ("pose", "body_pose", "time"))
+    frames, floes = js(chrome, "return bergtow.frames"), js(chrome, "return bergtow.floes")
+    assert 30 < frames < len(time) and 10 < floes < pose.shape[1]
+    ids = js(chrome, f"return [...Array({floes}).keys()].map(bergtow.id)")
+    near = np.hypot(*(pose[:, :, :2] - body[:, :1, :2]).transpose(2, 0, 1)).min(axis=0)
+    assert near[ids].max() < np.quantile(near, floes / pose.shape[1] + 0.05)
+    seek(chrome, frames - 1)
+    assert js(chrome, "return bergtow.time") == time[-1]
+    assert np.abs(shown(chrome, floes)[:, :2] - pose[-1, ids, :2]).max() < 1e-3
+    notes = text(chrome, "#replay")[0]
+    assert f"{frames} of the {len(time)} stored frames" in notes and f"{floes} of the {pose.shape[1]} floes" in notes
+    assert complaints(chrome) == []
+
+
+def test_says_when_the_browser_cannot_unpack(chrome, alone):
+    hide = chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.DecompressionStream"})
+    try:
+        opened(chrome, alone)
+        said = until(lambda: text(chrome, "#replay-state.warning"))
+        assert "--no-compression" in said[0]
+    finally:
+        chrome.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", hide)
+
+
+# ---- without a browser
+
+def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
+    """Every section that a run has nothing for is left out; a picture of a line of which nothing is left is drawn."""
+    adrift = run(tmp_path / "adrift", changed(MOVING, domain={"length": 15, "width": 8}, ice__concentration=0.2, run__duration=6, tow__line__breaking_load=10))
+    assert [e["kind"] for e in adrift.summary["events"]] == ["line_broken", "adrift"]
+    assert script(adrift.dir).returncode == 0
+    page = (adrift.dir / "report.html").read_text()
+    assert "<td>line broken</td>" in page and page.count('src="data:image/png') == 6
+    drift = run(tmp_path / "drift", changed(TOW, run__duration=2, body={"shape": "none"}, tow=None, air={"wind_x": 5}))
+    assert script(drift.dir).returncode == 0
+    page = (drift.dir / "report.html").read_text()
+    assert "No body was towed" in page and "<nav" in page and "Estimates" not in page and page.count('src="data:image/png') == 2
+
+
+@pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"), ("truncated", "not readable as HDF5"), ("frames", "/frames/pose")])
+def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, words):
+    folder = tmp_path / "run"
+    if harm != "folder":
+        folder.mkdir()
+        shutil.copy(tow.dir / "result.h5", folder)
+        (folder / "summary.json").write_text(json.dumps(tow.summary))
+        (folder / "report.html").write_text("old")
+    if harm == "summary":
+        (folder / "summary.json").unlink()
+    elif harm == "truncated":
+        (folder / "result.h5").write_bytes((tow.dir / "result.h5").read_bytes()[:5000])
+    elif harm == "frames":
+        with h5py.File(folder / "result.h5", "a") as f:
+            f["frames/pose"][3, 4, 0] = np.nan
+            del f["frames/pose"]
+    result = script(folder)
+    assert result.returncode == 4 and words in result.stderr and str(folder) in result.stderr and "Traceback" not in result.stderr
+    assert harm == "folder" or (folder / "report.html").read_text() == "old"
+    assert sorted(p.name for p in folder.glob("report*")) == ([] if harm == "folder" else ["report.html"])
+
+
+def test_usage():
+    for arguments in (["x", "-o", "page.png"], ["x", "--size", "0"], ["x", "--size", "nan"], []):
+        with pytest.raises(SystemExit) as left:
+            report.main(arguments)
+        assert left.value.code == 2
+
+
+GIVEN = """# Title.
+#
+# ASSUMED: the rest.
+run: {dt: 0.1 s, title: "a # b"}   # Somebody 2001
+ice:
+  size: 1 m           # Yulmetov & Løset 2017
+  thickness: 0.04 m   # assumed: thin
+  friction: 0.05
+  length: 72 m        # from memory
+tow:
+  speed: 0.13 m/s
+  waypoints: [[1, 2], [3, 4]]  # assumed
+"""
+RESOLVED = """run:
+  dt: 0.1 s  # time step [Yulmetov & Løset 2017]
+  title: "a # b"  # one line
+ice:
+  size: 1 m  # size
+  thickness: 0.04 m  # mean floe thickness, assumed
+  friction: 0.05  # friction [Sukhorukov & Løset 2013]
+  length: 72 m  # extent
+  density: 910 kg/m3  # density of the floes [Hunke & Comeau 2011]
+  shake: 15  # displacement, 0 = none, assumed
+  basin: 10 m  # the default is HSVA's large ice tank, from memory
+  sides: 6  # corners, by [[x, y], ...]
+tow:
+  speed: 0.2 m/s  # speed
+  waypoints: [[1, 2], [3, 4]]  # places
+"""
+
+
+class Told:
+    case_text, resolved_text, attributes = GIVEN, RESOLVED, {"command_line": "bergtow run a.yml --set tow.speed=0.2 --set=ice.sides=6 -o 'x y'"}
+
+
+def test_where_each_value_comes_from():
+    values = {v.key: v for v in report_case.values(Told)}
+    kinds = {k: v.kind for k, v in values.items()}
+    assert kinds == {"run.dt": "given", "run.title": "given", "ice.size": "source", "ice.thickness": "assumed", "ice.friction": "given", "ice.length": "memory", "ice.density": "source",
+                     "ice.shake": "assumed", "ice.basin": "memory", "ice.sides": "set", "tow.speed": "set", "tow.waypoints": "assumed"} | {"run.title": kinds["run.title"]}
+    assert values["ice.size"].origin == "Yulmetov & Løset 2017" and values["run.title"].value == "a # b" and values["tow.waypoints"].value == "[[1, 2], [3, 4]]"
+    assert "no source stated" in values["ice.friction"].origin and "Sukhorukov" not in values["ice.friction"].origin
+    assert values["ice.density"].origin == "default: Hunke & Comeau 2011" and values["ice.shake"].origin == "default, assumed" and values["tow.speed"].value == "0.2 m/s"
+    assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
+
+
+def test_every_key_is_labelled(tow):
+    with Run(tow.dir) as r:
+        values = report_case.values(r)
+        assert {v.key for v in values} >= set(r.case) and {v.kind for v in values} <= set(report_case.KINDS)
+        by_key = {v.key: v for v in values}
+        assert by_key["tow.ramp"].kind == "given" and by_key["body.draft"].kind == "assumed" and by_key["ice.density"].kind == "source"
+        assert {key for keys in report_run.KEY_VALUES.values() for key in keys} <= set(by_key)
+
+
+def test_numbers_survive_packing():
+    rng = np.random.default_rng(1)
+    q = rng.integers(0, 65536, (7, 13)).astype(np.uint16)
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(replay_data.pack_frames(q))), np.uint8).reshape(2, 7, 13).astype(np.uint16)
+    assert np.array_equal(np.cumsum(raw[0] + 256 * raw[1], axis=0).astype(np.uint16), q)
+    x = np.array([0.0, 0.1, 9.99999, 5.0])
+    numbers, low, step = replay_data.quantise(x, 0.0, 10.0, 10.0)
+    assert np.abs((low + step * numbers - x + 5) % 10 - 5).max() <= step / 2 and low + step * 65536 == 10.0
+    assert list(replay_data.thinned(10, 4)) == [0, 3, 6, 9] and list(replay_data.thinned(3, 8)) == [0, 1, 2]

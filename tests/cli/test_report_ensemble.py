@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""The report of an ensemble: the numbers of ensemble.py, every member with its doubts, nothing that a browser would complain of."""
+import argparse
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import made_up_ensemble as made_up
+from browser import browser, complaints, opened
+from made_up_ensemble import FAILED, WAITING, member
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import ensemble  # noqa: E402
+import report  # noqa: E402
+import report_ensemble  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
+
+TITLE = "<script>window.hacked = 1</script> study & 50 %"
+JAM = "the towed body stood still for 40 s of 600 s <i>: a jam"
+OPTIONS = report_ensemble.OPTIONS | {"resamples": 20}
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Two concentrations of five fields, one of which failed, one is jammed; one more waits."""
+    rng = np.random.default_rng(5)
+    some = []
+    for c, (concentration, mean) in enumerate([(0.2, 100.0), (0.5, 3000.0)]):
+        for k in range(5):
+            times = np.sort(rng.uniform(1, 599, 60))
+            some.append(member(made_up.ar1(0.6, 600, rng, mean + 4 * k, 10.0), {"ice.concentration": concentration}, c, peaks=(times, rng.exponential(50.0, 60))))
+    some[3] |= {"status": FAILED, "reason": "exit code 5: not <finite>"}
+    some[6] |= {"warnings": [JAM], "summary": {"stalled_windows": 2}}
+    some[9] |= {"status": WAITING}
+    return made_up.write(tmp_path_factory.mktemp("study") / "out", some, title=TITLE)
+
+
+@pytest.fixture(scope="module")
+def page(study, tmp_path_factory):
+    """A browser at the page, which is made in this process with few resamples."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    path = tmp_path_factory.mktemp("elsewhere") / "page.html"
+    report.main([str(study), "-o", str(path)])
+    patch.undo()
+    with browser(tmp_path_factory.mktemp("profile")) as driver:
+        driver.requests = [r for r in opened(driver, path) if not r.startswith("data:")]
+        driver.path = path
+        yield driver
+
+
+def tables(page):
+    """{heading: rows of texts} of the sections."""
+    return page.execute_script("""return Object.fromEntries([...document.querySelectorAll('section')].filter((s) => s.querySelector('h2') && s.querySelector('table')).map((s) =>
+        [s.querySelector('h2').textContent, [...s.querySelectorAll('tr')].map((r) => [...r.cells].map((c) => c.textContent.trim()))]))""")
+
+
+def test_numbers_are_those_of_the_statistics(page, study):
+    s = ensemble.statistics(Ensemble(study), argparse.Namespace(**OPTIONS))
+    found = tables(page)
+    head, *rows = found["Mean ice resistance"]
+    factor = 1000.0 if "kN" in head[2] else 1.0
+    assert [row[0] for row in rows] == ["concentration 0.2", "concentration 0.5"] and [row[1] for row in rows] == ["4 (1 failed)", "4 (1 waiting)"]
+    for row, c in zip(rows, s["conditions"]):
+        assert float(row[2]) * factor == pytest.approx(c["resistance"]["mean"], rel=0.006)
+        assert [float(v) * factor for v in row[3].split(" to ")] == pytest.approx(c["resistance"]["t_95"], rel=0.006)
+    assert rows[1][-1] == "1 J" and rows[0][-1] == "none"
+    estimates = dict(zip(*found["Beside the estimates"][:2]))
+    assert estimates["Lichey–Hellmer"].startswith("80") and "*" in estimates["compaction"]
+    assert {"Distributions", "Extreme peaks", "Members"} <= set(found)
+    cards = [e.text for e in page.find_elements("css selector", ".figures div")]
+    assert len(cards) == 2 and "4 fields" in cards[0] and "concentration 0.2" in cards[0]
+
+
+def test_every_member_stands_there_with_its_doubts(page, study):
+    rows = {row[0]: row for row in tables(page)["Members"][1:]}
+    assert len(rows) == 10
+    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][5] == "jammed" and rows["c001-r001"][5] == "none"
+    details = {d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent") for d in page.find_elements("css selector", "#members details")}
+    assert set(details) == {"c001-r004: failed", "c002-r002: 1 warning"} and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
+    warning = page.find_element("css selector", ".warning").text
+    assert "1 members failed" in warning and "carry warnings" in warning
+    assert "8 finished, 1 failed, 1 waiting" in page.find_element("css selector", "header").text
+
+
+def test_page_stands_alone_and_text_stays_text(page):
+    assert page.requests == [page.path.resolve().as_uri()] and complaints(page) == []
+    assert page.execute_script("return window.hacked") is None and page.find_element("tag name", "h1").text == TITLE
+    assert page.find_elements("css selector", "script, #members i") == []
+    assert page.execute_script("return [...document.images].every((i) => i.complete && i.naturalWidth > 300)") and len(page.find_elements("tag name", "img")) >= 2
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    assert page.execute_script("return document.documentElement.scrollWidth") <= 380
+
+
+def test_members_of_other_builds_and_lost_folders_are_told(study):
+    with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
+        f.attrs["revision"] = "other"
+    e = Ensemble(study)
+    assert "2 builds" in report_ensemble.provenance(e)[1]
+    (study / "members/c001-r002").rename(study / "members/lost")
+    assert "cannot be read" in report_ensemble.told(e, 1)[0]
+    (study / "members/lost").rename(study / "members/c001-r002")
+    with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
+        del f.attrs["revision"]
+    assert report_ensemble.provenance(Ensemble(study))[1] is None
+
+
+def test_an_unusable_ensemble_is_told(tmp_path, capsys, monkeypatch):
+    (tmp_path / "ensemble.h5").write_bytes(b"no")
+    with pytest.raises(report.RunError, match="is no ensemble"):
+        report.main([str(tmp_path)])
+    assert not (tmp_path / "report.html").exists()

@@ -1,0 +1,41 @@
+#!/bin/sh
+# SPDX-License-Identifier: MIT
+# libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; a second word "keep" in place of the seconds puts the smallest set of inputs that
+# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 40 kB. Found inputs stay in build/fuzz/found/NAME; one that breaks
+# something is in build/fuzz/broken/: mend the program and keep the input.
+set -eu
+name=$1 what=${2:-60}
+build=build/fuzz found=build/fuzz/found/$name kept=tests/fuzz/corpus/$name
+[ -x $build/fuzz_"$name" ] || { echo "$build/fuzz_$name is missing; run: make CONFIG=fuzz $build/fuzz_$name"; exit 1; }
+mkdir -p "$found" "$kept" $build/broken
+export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 OMP_NUM_THREADS=1
+export LSAN_OPTIONS=suppressions=tests/lsan.supp:print_suppressions=0
+
+# Words of the input: keys, choices, units.
+words=$build/words.dict
+case $name in
+case | setup | study)
+    # In the list of keys a name is cut from the text after it by a blank.
+    build/release/bergtow --list-keys | awk '$1 ~ /^[a-z][a-z_0-9.]*$/ {n = split($1, p, "."); print p[n] ": "; print $1; for (i = 3; i < 9; i++) if ($i ~ /^[a-z]+$/) print $i}' | sort -u |
+        awk '{print "\"" $0 "\""}' >$words
+    printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' 'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>$words ;;
+outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame '[[0,0],[9,0],[0,9]]' null 1e308 >$words ;;
+table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >$words ;;
+*) printf '"%s"\n' '\x00' >$words ;;
+esac
+
+if [ "$what" = keep ]; then
+    merged=$(mktemp -d)
+    $build/fuzz_"$name" -merge=1 -max_len=2000 "$merged" "$kept" "$found" >$build/merge.log 2>&1
+    total=0
+    find "$merged" -type f -printf '%s %p\n' | sort -n | while read -r size path; do
+        total=$((total + size))
+        [ $total -lt 40000 ] || break
+        cp "$path" "$kept"/
+    done
+    rm -rf "$merged"
+    du -sb "$kept"
+else
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=20 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
+        -print_final_stats=1 "$found" "$kept" </dev/null
+fi

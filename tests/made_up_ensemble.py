@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""An ensemble's folder with numbers of the test's own, of the layout that src/ensemble_file.c writes."""
+import json
+
+import h5py
+import numpy as np
+
+FINISHED, FAILED, WAITING = 1, 2, 0
+UNITS = {"ice.concentration": "1", "tow.speed": "m/s", "ice.thickness": "m", "ice.friction": "1"}
+ESTIMATES = {"lichey_hellmer": 80.0, "marchenko_compaction": 5.0, "marchenko_rafting": 40.0, "marchenko_momentum": 160.0, "dilute_limit": 20.0, "open_water_drag": 300.0}
+TEXT = h5py.string_dtype()
+
+
+def member(series, parameters, condition, **changes):
+    """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N)."""
+    return {"series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5, "status": FINISHED, "reason": "", "warnings": [],
+            "peaks": None, "hours": len(series) / 3600, "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None} | changes
+
+
+def numbers(m):
+    """Nested numbers of summary.json."""
+    x, start = m["series"], m["start"]
+    steady = x[np.arange(1, len(x) + 1) >= start]
+    estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"} for name, f in m["estimates"].items()}
+    return {"mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "stalled_windows": 0, "concentration": 0.5,
+            "window": {"start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0, "correlation_time_s": 1.0},
+            "impacts": {"from_s": 0.0, "hours": m["hours"]}, "estimates": estimates} | m.get("summary", {})
+
+
+def flat(nested, prefix=""):
+    for key, value in nested.items():
+        name = f"{prefix}_{key}" if prefix else key
+        if isinstance(value, dict):
+            yield from flat(value, name)
+        elif isinstance(value, (int, float, np.number)):
+            yield name, float(value)
+
+
+def write_member(folder, m):
+    """summary.json and a result.h5 with the collisions."""
+    folder.mkdir(parents=True, exist_ok=True)
+    nested = numbers(m)
+    nested["window"]["warning"] = m["window_warning"]
+    nested["estimates"] |= {"curves": {"concentration": [0.0, 0.5, 1.0], "valid_range": {k: [0.0, 1.0] for k in m["estimates"]}, **{k: [0.0, f, 2 * f] for k, f in m["estimates"].items()}},
+                            "thickness_m": 1.0, "width_m": 2.0, "speed_along_m_s": 0.1, "length_scale": 1.0}
+    (folder / "summary.json").write_text(json.dumps(nested | {"title": "made up", "warnings": m["warnings"], "stopped": None}))
+    with h5py.File(folder / "result.h5", "w") as f:
+        f["case"] = f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
+        times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
+        f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
+        f["impacts"].attrs["conversion"] = m["conversion"]
+
+
+def write(folder, members, title="made up", sampling="grid"):
+    """DIR/ensemble.h5 and DIR/members/NAME of the members, in the order of their conditions."""
+    folder.mkdir(parents=True, exist_ok=True)
+    repeat, rows = {}, []
+    for m in members:
+        repeat[m["condition"]] = repeat.get(m["condition"], 0) + 1
+        rows.append((m, repeat[m["condition"]], f"c{m['condition'] + 1:03d}-r{repeat[m['condition']]:03d}"))
+    n, longest = len(rows), max(len(m["series"]) for m in members)
+    done = [m["status"] == FINISHED for m in members]
+    with h5py.File(folder / "ensemble.h5", "w") as f:
+        f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
+        f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
+        f["members/status"] = np.array([m["status"] for m in members])
+        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", ["0"] * n), ("reason", [m["reason"] for m in members])):
+            f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
+        for group in ("parameters", "summary"):
+            f.create_group(group)
+        for key in members[0]["parameters"]:
+            values = [m["parameters"][key] for m in members]
+            data = f.create_dataset(f"parameters/{key}", data=values, dtype=TEXT if isinstance(values[0], str) else float)
+            data.attrs["units"], data.attrs["key"] = UNITS.get(key, "1"), key
+        summaries = [dict(flat(numbers(m))) if ok else {} for m, ok in zip(members, done)]
+        for key in dict.fromkeys(k for s in summaries for k in s):
+            f[f"summary/{key}"] = np.array([s.get(key, np.nan) for s in summaries])
+        time, ice = np.full((n, longest), np.nan), np.full((n, longest), np.nan)
+        for i, (m, ok) in enumerate(zip(members, done)):
+            if ok:
+                time[i, :len(m["series"])], ice[i, :len(m["series"])] = np.arange(1, len(m["series"]) + 1), m["series"]
+        for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", ice)):
+            f.create_dataset(f"series/{key}", data=values).attrs["units"] = "s" if key == "time" else "N"
+        f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n")
+        f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(all(m["status"] != WAITING for m in members))
+        f.attrs["n_finished"], f.attrs["n_failed"] = sum(done), sum(m["status"] == FAILED for m in members)
+    for (m, _, name), ok in zip(rows, done):
+        if ok:
+            write_member(folder / "members" / name, m)
+    return folder
+
+
+def ar1(phi, n, rng, mean=0.0, sd=1.0):
+    """A stationary series x_i - mean = phi (x_{i-1} - mean) + noise, of standard deviation sd."""
+    noise = rng.normal(0, np.sqrt(1 - phi * phi), n)
+    x = np.empty(n)
+    last = rng.normal()
+    for i in range(n):
+        last = phi * last + noise[i]
+        x[i] = last
+    return mean + sd * x
