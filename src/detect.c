@@ -281,7 +281,7 @@ double bt_world_overlap(bt_world *w)
                 double gap;
                 int32_t axis = -1;
                 if (!bt_contacts_parts(w, own.pairs[i].a, own.pairs[i].b, own.pairs[i].part, 0, -1, &m, &gap, &axis)) continue;
-                for (int j = 0; j < m.n_points; j++) deepest = bt_max(deepest, -m.p[j].gap);
+                for (int j = 0; j < m.n_points; j++) deepest = bt_max(deepest, 0 - m.p[j].gap);
             }
             free(own.pairs);
         }
