@@ -2,16 +2,24 @@
 // Order of a pass: hem by phases, inner tiles in strips; reasons in order.h.
 #include "order.h"
 
+#include <omp.h>
+#include <stdint.h>
 #include <stdlib.h>
 
 #include "bergtow/tow.h"
 
 #define AHEAD 2   // tiles: what a sweep asks memory for in advance
+
+/// Least tiles of a strip. One thread is fastest with strips as narrow as they may be: three sweeps that follow each other then find most of their
+/// tiles in the second-level cache. Several share the tiles of one phase, and wait for each other after it.
+static bt_idx least_tiles(void)
+{
 #ifdef BT_VALIDATE
-#define STRIP 8   // so that small cases have strips too
+    return 8; // so that small cases have strips too
 #else
-#define STRIP 256 // tiles: a third of a megabyte of velocities, in the second-level cache. From 64 to 512 it matters little
+    return omp_get_max_threads() > 1 ? 32 * omp_get_max_threads() : 1;
 #endif
+}
 
 /// What sorts a tile: hem or strip, then phase; in the hem those at the border first.
 typedef struct {
@@ -49,40 +57,72 @@ static bool has_work(const bt_world *w, bt_idx k)
     return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
-/// Strips: which way they are stacked, and which of them each pair of rows (or columns) begins or continues.
+/// Strips: which way they are stacked, and to which of them each pair of rows (or columns) belongs.
 typedef struct {
-    bool along_x;
+    bool along_x, ring;
     int32_t low;    ///< even
-    bt_idx *of;     ///< [pairs of rows]
-    bt_idx n_pairs, n;
+    bt_idx *of;     ///< [n_pairs]
+    bt_idx *first;  ///< [n] its first pair
+    bt_idx n_pairs, n, large;
 } strips;
 
-static bt_idx strip_of(const strips *s, const bt_tile *tile)
+static bt_idx pair_of(const strips *s, const bt_tile *tile)
 {
     const int32_t skew = s->along_x ? tile->phase : tile->phase >> 1, u = s->along_x ? tile->x : tile->y;
     const bt_idx pair = (u + skew - s->low) / 2;
-    return s->of[pair < s->n_pairs ? pair : s->n_pairs - 1];
+    if (s->ring) return pair % s->n_pairs; // the last row, odd, is the lowest of strip 0
+    return pair < s->n_pairs ? pair : s->n_pairs - 1;
 }
 
-static strips cut_strips(const bt_tiles *t)
+/// Pairs of rows of all tiles that meet floes of the tile of the large bodies, first and last; none when it has no contacts.
+static void span_of_large(const bt_world *w, const strips *s, bt_idx joint[2])
 {
+    const bt_tile *large = &w->tiles->tile[w->tiles->n - 1];
+    const bt_bodies *b = &w->bodies;
+    int32_t low = INT32_MAX, high = INT32_MIN;
+    for (bt_idx j = 0; j < large->n_units; j++) {
+        const bt_idx ends[2] = {large->units[j].a, large->units[j].b};
+        for (int e = 0; e < 2; e++) {
+            if (b->large[ends[e]]) continue;
+            const int32_t u = b->tile[ends[e]][s->along_x ? 0 : 1];
+            low = u < low ? u : low;
+            high = u > high ? u : high;
+        }
+    }
+    joint[0] = 0, joint[1] = -1;
+    if (low > high) return;
+    // Tiles low − 1 to high, each up to three columns farther by its skew; below them one row that may be a seam.
+    const bt_idx first = (low - 2 - s->low) / 2, last = (high + 3 - s->low) / 2;
+    const bool across = s->ring && (low < 3 || last >= s->n_pairs);
+    joint[0] = across || first < 0 ? 0 : first;
+    joint[1] = across || last >= s->n_pairs ? s->n_pairs - 1 : last;
+}
+
+static strips cut_strips(const bt_world *w)
+{
+    const bt_tiles *t = w->tiles;
     // Across a periodic x the first column of a later phase would come before the last of an earlier one.
     strips s = {.along_x = t->wrap_x == 0 && t->n_x > t->n_y};
+    s.ring = !w->domain && !s.along_x && t->wrap_y > 1;
     const int32_t low = s.along_x ? t->low_x : t->low_y, n = s.along_x ? t->n_x : t->n_y;
     s.low = low - (low & 1);
-    s.n_pairs = (low + n - s.low + 1) / 2 + 2;
-    bt_idx *count = bt_alloc((size_t)s.n_pairs, sizeof *count), filled = 0;
+    s.n_pairs = s.ring ? t->wrap_y / 2 : (low + n - s.low + 1) / 2 + 2;
+    bt_idx *count = bt_alloc((size_t)s.n_pairs, sizeof *count), filled = 0, joint[2];
     s.of = bt_alloc((size_t)s.n_pairs, sizeof *s.of);
+    s.first = bt_alloc((size_t)s.n_pairs, sizeof *s.first);
     for (bt_idx k = 0; k < t->n - 1; k++)
-        if (t->tile[k].own && t->tile[k].n_units > 0) count[((s.along_x ? t->tile[k].x : t->tile[k].y) - s.low) / 2]++;
+        if (t->tile[k].own && t->tile[k].n_units > 0) count[pair_of(&s, &t->tile[k])]++;
+    span_of_large(w, &s, joint);
+    const bt_idx least = least_tiles(), width = s.along_x ? 2 : 1; // pairs, see order.h
     for (bt_idx p = 0; p < s.n_pairs; p++) {
-        if (filled >= STRIP) {
-            s.n++;
+        if (filled >= least && p - s.first[s.n] >= width && !(joint[0] < p && p <= joint[1])) {
+            s.first[++s.n] = p;
             filled = 0;
         }
         s.of[p] = s.n;
         filled += count[p];
     }
+    s.large = has_work(w, t->n - 1) ? s.of[joint[1] > 0 ? joint[1] : 0] : -1;
     s.n++;
     free(count);
     return s;
@@ -98,42 +138,80 @@ static void add_run(bt_tiles *t, bt_idx begin, bt_idx end, int send, int receive
     t->run[t->n_runs++] = (bt_run_of_tiles){begin, end, (int8_t)send, (int8_t)receive};
 }
 
-void bt_order_tiles(bt_world *w)
+/// Group of a tile among ranks: the hem by phases, then the strips.
+static bt_idx group_among_ranks(const strips *s, const bt_tile *tile)
 {
-    bt_tiles *t = w->tiles;
-    strips s = cut_strips(t);
-    place *p = bt_alloc((size_t)t->n, sizeof *p);
-    const bt_idx last = HEM_GROUPS + BT_COLOURS * s.n;
-    t->n_units = t->n_order = 0;
-    for (bt_idx k = 0; k < t->n; k++) {
-        const bt_tile *tile = &t->tile[k];
-        if (!has_work(w, k)) continue;
-        t->n_units += tile->n_units;
-        bt_idx group = last;
-        if (k < t->n - 1) {
-            const bool hem = w->domain && tile->depth <= BT_COLOURS - 1 - tile->phase;
-            group = hem ? 2 * tile->phase + !tile->border : HEM_GROUPS + BT_COLOURS * strip_of(&s, tile) + tile->phase;
-        }
-        p[t->n_order++] = (place){group, k};
-    }
-    qsort(p, (size_t)t->n_order, sizeof *p, by_group);
-    free(s.of);
+    const bool hem = tile->depth <= BT_COLOURS - 1 - tile->phase;
+    return hem ? 2 * tile->phase + !tile->border : HEM_GROUPS + BT_COLOURS * s->of[pair_of(s, tile)] + tile->phase;
+}
 
+static void list_runs(bt_tiles *t, const place *p, bt_idx last)
+{
     t->n_runs = 0;
     bt_idx begin = 0;
     for (bt_idx group = 0; group <= last; group++) {
         bt_idx end = begin;
         while (end < t->n_order && p[end].group == group) end++;
-        const bool hem = w->domain && group < HEM_GROUPS;
+        const bool hem = group < HEM_GROUPS;
         int send = hem && group % 2 == 0 ? group / 2 : -1, receive = hem && group % 2 == 1 && group / 2 < BT_COLOURS - 1 ? group / 2 : -1;
-        if (w->domain && group == last - 1) receive = BT_COLOURS - 1;
-        if (w->domain && group == last) send = receive = BT_COLOURS;
+        if (group == last - 1) receive = BT_COLOURS - 1;
+        if (group == last) send = receive = BT_COLOURS;
         add_run(t, begin, end, send, receive);
         begin = end;
     }
+}
+
+/// Group of a tile on one rank: strip, phase, seam first.
+static bt_idx group_alone(const strips *s, const bt_tile *tile)
+{
+    const bt_idx pair = pair_of(s, tile), strip = s->of[pair];
+    const bool seam = tile->phase >= BT_COLOURS / 2 && pair == s->first[strip];
+    return 2 * (BT_COLOURS * strip + tile->phase) + !seam;
+}
+
+static void list_strips(bt_tiles *t, const strips *s, const place *p)
+{
+    if (s->n > t->cap_strips) {
+        t->cap_strips = 2 * s->n;
+        t->strip = bt_realloc(t->strip, (size_t)t->cap_strips, sizeof *t->strip);
+    }
+    t->n_strips = s->n;
+    t->large_after = s->large;
+    t->ring = s->ring;
+    bt_idx at = 0;
+    for (bt_idx k = 0; k < s->n; k++)
+        for (bt_idx c = 0; c < BT_COLOURS; c++) {
+            bt_strip *strip = &t->strip[k];
+            const bt_idx group = 2 * (BT_COLOURS * k + c);
+            strip->begin[c] = at;
+            while (at < t->n_order && p[at].group == group) at++;
+            strip->seam[c] = at;
+            while (at < t->n_order && p[at].group == group + 1) at++;
+            strip->end[c] = at;
+        }
+}
+
+void bt_order_tiles(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    strips s = cut_strips(w);
+    place *p = bt_alloc((size_t)t->n, sizeof *p);
+    const bt_idx last = w->domain ? HEM_GROUPS + BT_COLOURS * s.n : 2 * BT_COLOURS * s.n;
+    t->n_units = t->n_order = 0;
+    for (bt_idx k = 0; k < t->n; k++) {
+        const bt_tile *tile = &t->tile[k];
+        if (!has_work(w, k)) continue;
+        t->n_units += tile->n_units;
+        p[t->n_order++] = (place){k == t->n - 1 ? last : w->domain ? group_among_ranks(&s, tile) : group_alone(&s, tile), k};
+    }
+    qsort(p, (size_t)t->n_order, sizeof *p, by_group);
+    if (w->domain) list_runs(t, p, last);
+    else list_strips(t, &s, p);
     for (bt_idx i = 0; i < t->n_order; i++) {
         t->order[i] = p[i].tile;
         t->tile[p[i].tile].ahead = i + AHEAD < t->n_order ? p[i + AHEAD].tile : -1;
     }
+    free(s.of);
+    free(s.first);
     free(p);
 }

@@ -23,10 +23,23 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from);
 /// Work on one tile. Only the bodies of its block, its units and *t may be changed.
 typedef void bt_visit(bt_world *w, bt_idx tile, const void *context, bt_totals *t);
 
+/// A pass: work on every tile, and what it adds up.
+typedef struct bt_pass {
+    bt_visit *visit;
+    const void *context;
+    bt_totals *totals;
+    bool looks;           ///< it changes no velocity: nothing for other ranks
+} bt_pass;
+
+enum { BT_MAX_TURN = 6, BT_PLAIN_TURN = 3 }; ///< passes of a turn, and those of plain sweeps
+
 /// Visit the tiles of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at once by threads and
 /// ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date on all ranks, while tiles that nobody
 /// waits for are still worked on. Collective.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
+
+/// n passes in turn, with the results of n calls of bt_phases_run; on one rank they follow each other through the field (order.h). Collective.
+void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged);
 
 /// Visit the tiles in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);

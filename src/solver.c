@@ -41,14 +41,25 @@ static bt_tow *line_of(const bt_world *w, bt_idx tile)
     return tile == w->tiles->n - 1 && bt_tow_has_line(w->tow) ? w->tow : NULL;
 }
 
-// --- velocities from impulses ----------------------------------------------------------------------------------------
+// --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
+
+/// What a new geometry, or a bound, no longer allows of the impulses of the last step.
+static void clamp_impulses(bt_tile *tile)
+{
+    for (bt_idx i = 0; i < tile->n_units; i++) {
+        bt_unit *u = &tile->units[i];
+        for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
+        u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+    }
+}
 
 static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    (void)context;
-    const bt_tile *tile = &w->tiles->tile[k];
+    const bool warm = *(const bool *)context; // impulses are those of the last step
+    bt_tile *tile = &w->tiles->tile[k];
     bt_vel *v = w->bodies.vel;
     const bt_inv *inv = w->bodies.inv;
+    if (warm) clamp_impulses(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
         const double total = u->ln[0] + u->ln[1];
@@ -59,27 +70,15 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
         bt_store(&v[u->a], inv[u->a], &va);
         bt_store(&v[u->b], inv[u->b], &vb);
     }
-    const bt_tow *line = line_of(w, k);
-    if (line) bt_tow_apply(line, &v[bt_world_towed(w)], inv[bt_world_towed(w)]);
+    bt_tow *line = line_of(w, k);
+    if (!line) return;
+    bt_vel *towed = &v[bt_world_towed(w)];
+    const bt_inv by = inv[bt_world_towed(w)];
+    bt_tow_apply(line, towed, by);
+    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first sweep. So
+    // the line has its exact update in every step, not only in steps with sweeps.
+    if (warm) bt_tow_update(line, towed, by);
 }
-
-/// U* + M⁻¹ Jᵀ λ from scratch: what increments have rounded away does not build up. True when some impulse is not zero.
-static bool velocities_from_impulses(bt_world *w)
-{
-    const bt_tiles *ts = w->tiles;
-    bt_bodies *b = &w->bodies;
-#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
-    for (bt_idx k = 0; k < ts->n; k++) {
-        const bt_tile *tile = &ts->tile[k];
-        if (k < ts->n - 1 && !ts->awake[k]) continue;
-        memcpy(b->vel + tile->first, b->vel_free + tile->first, (size_t)(tile->end - tile->first) * sizeof *b->vel);
-    }
-    bt_totals t = {0};
-    bt_phases_run(w, apply_impulses, NULL, b->vel, &t);
-    return t.most > 0;
-}
-
-// --- residual --------------------------------------------------------------------------------------------------------
 
 static void add_residual(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
@@ -103,17 +102,50 @@ static void add_residual(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_sum_add(&t->sum[1], (double)rows);
 }
 
+/// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
+/// at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound.
+static double scale_of_squares(const bt_world *w)
+{
+    const double tolerance = w->par.tolerance;
+    return tolerance > 0 ? exp2(20 - ceil(2 * log2(tolerance))) : 0x1p60;
+}
+
+/// Collective. The largest residual from the totals of all tiles, m/s; root mean square into *rms.
+static double residual_of(bt_world *w, bt_totals *t, double *rms)
+{
+    bt_domain_reduce(w, t);
+    const double rows = bt_sum_value(&t->sum[1]);
+    w->solver->rows = (int64_t)rows;
+    if (rms) *rms = rows > 0 ? sqrt(bt_sum_value(&t->sum[0]) / scale_of_squares(w) / rows) : 0;
+    return t->most;
+}
+
 double bt_solver_residual(bt_world *w, double *rms)
 {
-    // Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
-    // at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound.
-    const double tolerance = w->par.tolerance, scale = tolerance > 0 ? exp2(20 - ceil(2 * log2(tolerance))) : 0x1p60;
+    const double scale = scale_of_squares(w);
     bt_totals t = {.n_sums = 2};
     bt_phases_any_order(w, add_residual, &scale, &t);
-    bt_domain_reduce(w, &t);
-    const double rows = bt_sum_value(&t.sum[1]);
-    if (rms) *rms = rows > 0 ? sqrt(bt_sum_value(&t.sum[0]) / scale / rows) : 0;
-    return t.most;
+    return residual_of(w, &t, rms);
+}
+
+/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up, and their residual. True when some
+/// impulse on this rank is not zero.
+static bool velocities_from_impulses(bt_world *w, bool warm)
+{
+    const bt_tiles *ts = w->tiles;
+    bt_bodies *b = &w->bodies;
+#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
+    for (bt_idx k = 0; k < ts->n; k++) {
+        const bt_tile *tile = &ts->tile[k];
+        if (k < ts->n - 1 && !ts->awake[k]) continue;
+        memcpy(b->vel + tile->first, b->vel_free + tile->first, (size_t)(tile->end - tile->first) * sizeof *b->vel);
+    }
+    const double scale = scale_of_squares(w);
+    bt_totals applied = {0}, left = {.n_sums = 2};
+    const bt_pass pass[2] = {{apply_impulses, &warm, &applied, false}, {add_residual, &scale, &left, true}};
+    bt_phases_turn(w, pass, 2, b->vel);
+    w->stats.residual = residual_of(w, &left, &w->stats.residual_rms);
+    return applied.most > 0;
 }
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
@@ -172,12 +204,24 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     if (x != few) free(x);
 }
 
-/// One sweep; returns the largest update, m/s.
-static double sweep(bt_world *w, const sweep_order *o, bt_totals *t)
+/// n sweeps; returns the largest update of the last, m/s, whose totals are in t[n − 1].
+static double sweep(bt_world *w, const sweep_order *o, int n, bt_totals *t)
 {
-    bt_phases_run(w, sweep_tile, o, w->bodies.vel, t);
-    bt_domain_reduce(w, t);
-    return t->most;
+    bt_pass pass[BT_MAX_TURN];
+    for (int q = 0; q < n; q++) pass[q] = (bt_pass){sweep_tile, &o[q], &t[q], false};
+    bt_phases_turn(w, pass, n, w->bodies.vel);
+    bt_domain_reduce(w, &t[n - 1]);
+    return t[n - 1].most;
+}
+
+/// Sweeps until the next look at what they change. In a large field, all that come before the next move: they share the traffic of memory
+/// (order.h), and two sweeps too many at the end are cheaper than looking after each. The rows are those of all ranks.
+static int turn_length(const bt_world *w, int64_t left)
+{
+    const bt_solver *s = w->solver;
+    if (w->par.turn_rows == 0 || s->rows < w->par.turn_rows) return 1;
+    const int64_t n = w->par.plain_sweeps ? BT_PLAIN_TURN : bt_anderson_period(s->anderson), most = left < BT_MAX_TURN ? left : BT_MAX_TURN;
+    return (int)(n < most ? n : most);
 }
 
 static void reserve_history(bt_world *w)
@@ -204,29 +248,14 @@ static bt_anderson_verdict accelerate(bt_world *w, const bt_totals *t)
     return verdict;
 }
 
-/// What a new geometry, or a bound, no longer allows of the impulses of the last step.
-static void clamp_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
-{
-    (void)context, (void)t;
-    bt_tile *tile = &w->tiles->tile[k];
-    for (bt_idx i = 0; i < tile->n_units; i++) {
-        bt_unit *u = &tile->units[i];
-        for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
-        u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
-    }
-}
-
 /// Start from the impulses of the step before. True when there are any.
 static bool warm_start(bt_world *w)
 {
-    bt_phases_any_order(w, clamp_impulses, NULL, &(bt_totals){0});
     bt_tow *line = w->tiles->tile[w->tiles->n - 1].own ? line_of(w, w->tiles->n - 1) : NULL;
     if (line) bt_tow_warm_start(line, w->par.warm_start);
-    const bool pressed = velocities_from_impulses(w);
-    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first sweep. So
-    // the line has its exact update in every step, not only in steps with sweeps.
-    if (line) bt_tow_update(line, &w->bodies.vel[bt_world_towed(w)], w->bodies.inv[bt_world_towed(w)]);
-    return pressed;
+    double pressed = velocities_from_impulses(w, true);
+    bt_domain_maxima(w, &pressed, 1);
+    return pressed > 0;
 }
 
 static void store(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -242,12 +271,10 @@ static void sweep_to_tolerance(bt_world *w)
     const double tolerance = w->par.tolerance;
     const int64_t limit = st->sweeps + w->par.max_sweeps;
     const int64_t times = w->par.inner_sweeps > 1 ? w->par.inner_sweeps : 1;
-    double pressed = warm_start(w);
-    bt_domain_maxima(w, &pressed, 1);
-    st->residual = bt_solver_residual(w, &st->residual_rms);
+    const bool pressed = warm_start(w);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
-    if (pressed > 0 && st->residual <= tolerance) {
-        sweep(w, &(sweep_order){.move = BT_ANDERSON_STAY, .times = times}, &(bt_totals){0});
+    if (pressed && st->residual <= tolerance) {
+        sweep(w, &(sweep_order){.move = BT_ANDERSON_STAY, .times = times}, 1, &(bt_totals){0});
         st->sweeps++;
         st->residual = bt_solver_residual(w, &st->residual_rms);
     }
@@ -255,17 +282,22 @@ static void sweep_to_tolerance(bt_world *w)
     if (st->residual > tolerance && !w->par.plain_sweeps) reserve_history(w);
     bt_anderson_verdict move = BT_ANDERSON_STAY;
     while (st->residual > tolerance && st->sweeps < limit) {
-        bt_totals t = {0};
-        const bool record = !w->par.plain_sweeps && bt_anderson_begin(a, &t);
-        const double change = sweep(w, &(sweep_order){record ? a : NULL, move, times << a->effort}, &t);
+        const int n = turn_length(w, limit - st->sweeps);
+        bt_totals t[BT_MAX_TURN] = {{.n_sums = 0}};
+        sweep_order o[BT_MAX_TURN];
+        bool record = false;
+        for (int q = 0; q < n; q++) {
+            record = !w->par.plain_sweeps && bt_anderson_begin(a, &t[q]);
+            o[q] = (sweep_order){record ? a : NULL, q == 0 ? move : BT_ANDERSON_STAY, times << a->effort};
+        }
+        const double change = sweep(w, o, n, t);
         move = BT_ANDERSON_STAY;
-        st->sweeps++;
+        st->sweeps += n;
         if (change <= tolerance || st->sweeps == limit) {
-            velocities_from_impulses(w);
-            st->residual = bt_solver_residual(w, &st->residual_rms);
+            velocities_from_impulses(w, false);
             if (st->residual <= tolerance) break;
         }
-        if (record && st->sweeps < limit) move = accelerate(w, &t);
+        if (record && st->sweeps < limit) move = accelerate(w, &t[n - 1]);
     }
     st->converged = st->residual <= tolerance;
     bt_phases_any_order(w, store, NULL, &(bt_totals){0});

@@ -94,11 +94,16 @@ typedef struct bt_tile {
     bt_idx cap_unit_history, cap_body_history;
 } bt_tile;
 
-/// Tiles of one phase that are done at once, and what is exchanged with other ranks after them.
+/// Among ranks: tiles of one phase that are done at once, and what is exchanged after them.
 typedef struct bt_run_of_tiles {
     bt_idx begin, end;              ///< in the order of the pass
     int8_t send, receive;           ///< phase whose results go out, or come in, after these; −1 = none
 } bt_run_of_tiles;
+
+/// On one rank: tiles that go through the four colours before those of the next strip.
+typedef struct bt_strip {
+    bt_idx begin[BT_COLOURS], seam[BT_COLOURS], end[BT_COLOURS]; ///< in the order of the pass; those before `seam` are of the strip's lowest odd row
+} bt_strip;
 
 enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
 
@@ -127,8 +132,12 @@ typedef struct bt_tiles {
     uint8_t *awake;                 ///< [n] contacts may move the tile's bodies in this step
     bt_idx *order;                  ///< [n_order] tiles of this rank with work, in the order of a pass (src/order.h)
     bt_idx n_order;
-    bt_run_of_tiles *run;           ///< [n_runs] pieces of it whose tiles are done at once
+    bt_run_of_tiles *run;           ///< [n_runs] among ranks: pieces of it whose tiles are done at once
     bt_idx n_runs, cap_runs;
+    bt_strip *strip;                ///< [n_strips] on one rank: the order in strips, the tile of the large bodies apart
+    bt_idx n_strips, cap_strips;
+    bt_idx large_after;             ///< strip after which the tile of the large bodies comes; −1 = it has no work
+    bool ring;                      ///< the last strip lies beside the first
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
     bool calm;                      ///< nothing but contacts moves a floe that drifts with the water
