@@ -69,6 +69,21 @@ static history history_of(const bt_tile *tile)
     return h;
 }
 
+static void fetch(const void *from, size_t bytes)
+{
+    for (size_t k = 0; k < bytes; k += 64) __builtin_prefetch((const char *)from + k);
+}
+
+void bt_anderson_fetch(const bt_tile *tile)
+{
+    if (tile->n_units == 0) return;
+    const history h = history_of(tile);
+    const size_t n = 3 * (size_t)tile->n_units;
+    fetch(h.f, n * sizeof *h.f);
+    fetch(h.g, n * sizeof *h.g);
+    for (int j = 0; j < DEPTH; j++) fetch(h.df[j], n * sizeof *h.df[j]);
+}
+
 static void add(const bt_anderson *a, bt_totals *t, int k, double x) { bt_sum_add(&t->sum[k], x * a->scale); }
 
 static int columns(const bt_anderson *a) { return a->depth < DEPTH ? a->depth + 1 : DEPTH; }

@@ -83,6 +83,9 @@ bool bt_anderson_begin(bt_anderson *a, bt_totals *t);
 /// Room in a tile for the histories of its units and bodies.
 void bt_anderson_reserve(bt_tile *tile, bool units);
 
+/// Before the sweep of a tile: ask memory for its history, which is there when the sweep is done.
+void bt_anderson_fetch(const bt_tile *tile);
+
 /// After the sweep of a tile: x [n_units][3] are its impulses before it, and scratch after; weight [n_units][3] is scratch. Adds the
 /// tile's part of the scalar products to *t.
 void bt_anderson_collect(const bt_anderson *a, bt_tile *tile, double *x, double *weight, bt_totals *t);

@@ -177,6 +177,7 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     double few[6 * ON_STACK], *x = few;
     if (o->move != BT_ANDERSON_STAY && tile->n_units > 0) bt_anderson_move_units(w->solver->anderson, o->move, tile);
     if (o->record) {
+        bt_anderson_fetch(tile);
         if (tile->n_units > ON_STACK) x = bt_alloc(6 * (size_t)tile->n_units, sizeof *x);
         for (bt_idx i = 0; i < tile->n_units; i++) {
             x[3 * i] = tile->units[i].ln[0];
