@@ -178,7 +178,7 @@ static void make_list(ensemble *e)
             bt_case c;
             bt_errors unheard = {0};
             priced = x->m.condition;
-            cost = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
+            cost = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }
@@ -310,7 +310,7 @@ static bt_status run_member(ensemble *e, entry *x)
     status = bt_comm_agree(e->group, status);
     if (status == BT_OK) {
         bt_case c;
-        status = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &why);
+        status = bt_member_case(e->s, &x->m, &c, &why);
         status = bt_comm_agree(e->group, status);
         const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
