@@ -15,7 +15,7 @@ import stat_fit
 import stat_mean
 import stat_sensitivity
 from bergtow_read import RunError
-from ensemble_read import DOUBTS, Ensemble
+from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
 
 import numpy as np
 
@@ -110,16 +110,29 @@ def sensitivity(e, members):
     return {"members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y), "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
 
 
+def nothing_to_count(e, dropped):
+    """Why there are no statistics, and what to do: RunError."""
+    if dropped:
+        return RunError(e.file, "has no member with a mean ice resistance left", "exclude less")
+    if e.behind:
+        return RunError(e.file, f"knows of none of the {len(e.behind)} members that have finished", "run `bergtow ensemble` again: it takes them in")
+    failed = e.reasons(FAILED)
+    name, why = next(iter(failed.items()), (None, None))
+    told = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
+    if np.any(e.status == FINISHED):
+        return RunError(e.file, f"has no member with a mean ice resistance{told}", "tow a body, for longer than output.window_start")
+    return RunError(e.file, f"has no member that has finished{told}", "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
+
+
 def statistics(e, options):
     """The statistics of an ensemble as nested dicts; statistics.json."""
     dropped = e.exclude(options.exclude) if options.exclude else {}
     if not len(e.used):
-        raise RunError(e.file, "has no member with a mean ice resistance" + (" left" if dropped else ""), "run the ensemble further" if not dropped else "exclude less")
+        raise nothing_to_count(e, dropped)
     members = {int(m): member(e, m) for m in e.used}
     conditions = [condition(e, c, members, options) for c in e.conditions()]
-    failed = {e.name[m]: e.reason[m] for m in np.flatnonzero(e.status == 2)}
     return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error, "excluded": dropped, "exclude": sorted(options.exclude),
-            "failed": failed, "members_without_folder": int(e.texts_missing), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
+            "failed": e.reasons(FAILED), "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": int(e.texts_missing), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
             "members": list(members.values())}
 
 

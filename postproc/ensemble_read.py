@@ -70,7 +70,7 @@ class Ensemble:
         if not self.path.is_dir():
             raise RunError(self.path, "no such folder", "give the folder that `bergtow ensemble -o` wrote")
         if not self.file.exists():
-            raise RunError(self.path, "holds no ensemble.h5", "give the folder that `bergtow ensemble -o` wrote, or wait for its first member")
+            raise RunError(self.path, "holds no ensemble.h5", "give the folder that `bergtow ensemble -o` wrote, or run it again")
         try:
             self._read()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
@@ -156,6 +156,15 @@ class Ensemble:
     def doubts(self, m):
         """Kinds of doubt (keys of DOUBTS) about a finished member."""
         return self._doubts.get(int(m), set())
+
+    @cached_property
+    def behind(self):
+        """Members that have finished since ensemble.h5 was made."""
+        return [self.name[m] for m in np.flatnonzero(self.status == WAITING) if (self.folder(m) / "finished").exists()]
+
+    def reasons(self, status):
+        """{name: why} of the members that failed, or of the waiting ones whose process died."""
+        return {self.name[m]: self.reason[m].strip() or "no reason recorded" for m in np.flatnonzero(self.status == status) if self.reason[m] or status == FAILED}
 
     @property
     def texts_missing(self):

@@ -147,21 +147,31 @@ def sensitivity(s, markdown):
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
 
+def counted(n):
+    return f"{n} member{'' if n == 1 else 's'}"
+
+
 def report(s, markdown=False):
     """Everything, section by section."""
     mark = "## " if markdown else ""
-    n = sum(c["members"]["used"] for c in s["conditions"])
-    lines = [f"{mark}{s['title']}", "", f"{n} members in {len(s['conditions'])} conditions" + ("" if s["complete"] else "; the ensemble is not complete") + "."]
-    if s["failed"]:
-        first = next(iter(s["failed"].items()))
-        lines.append(f"{len(s['failed'])} members failed and are in no number; the first: {first[0]}: {first[1].strip()}")
+    n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
+    lines = [f"{mark}{s['title']}", "", (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."]
+    waiting = sum(c["members"]["waiting"] for c in s["conditions"])
+    if waiting:
+        lines.append(f"The ensemble is not complete: {counted(waiting)} to come, and in no number. The longest are run first, so conditions have unlike numbers of fields.")
+    if s["behind"]:
+        lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in.")
+    for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
+        if s[kind]:
+            name, why = next(iter(s[kind].items()))
+            lines.append(f"{counted(len(s[kind]))} {told}; the first: {name}: {why}")
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " + ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
     if s["members_without_folder"]:
-        lines.append(f"{s['members_without_folder']} members have no folder here: their warnings are known by numbers alone, their peaks not at all.")
+        lines.append(f"{counted(s['members_without_folder'])} {'has' if s['members_without_folder'] == 1 else 'have'} no folder here: their warnings are known by numbers alone, their peaks not at all.")
     heavy = [c["label"] for c in s["conditions"] if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")

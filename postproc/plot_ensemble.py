@@ -16,7 +16,7 @@ import stat_extreme
 import stat_mean
 import style
 from bergtow_read import RunError
-from ensemble import extremes, member, sensitivity
+from ensemble import extremes, member, nothing_to_count, sensitivity
 from ensemble_read import DOUBTS, Ensemble, short_key
 
 import matplotlib.pyplot as plt
@@ -405,10 +405,11 @@ def main(argv=None):
     a = p.parse_args(argv)
     a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0], None, None, None, 1
     e = Ensemble(a.folder)
-    for name, kinds in (e.exclude(a.exclude) if a.exclude else {}).items():
+    dropped = e.exclude(a.exclude) if a.exclude else {}
+    for name, kinds in dropped.items():
         print(f"left out: {name} ({', '.join(kinds)})")
     if not len(e.used):
-        raise RunError(e.file, "has no member with a mean ice resistance", "run the ensemble further, or exclude less")
+        raise nothing_to_count(e, dropped)
     drawn = pictures(e, a)
     if not drawn:
         raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")

@@ -63,7 +63,7 @@ def main(argv=None):
     if not 0.1 <= a.size <= 1000:
         p.error("--size: choose 0.1 to 1000 MB")
     path = command.output(p, a, "report.html", (".html", ".htm"))
-    if (Path(a.run) / "ensemble.h5").exists():
+    if any((Path(a.run) / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):  # the second alone: it has only just begun
         import report_ensemble  # and with it the statistics, which a run has no need of
         write(render("ensemble.html", report_ensemble.context(a.run)), path)
         return

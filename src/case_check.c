@@ -25,7 +25,8 @@ typedef struct bt_check {
 void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256])
 {
     const char *path = c->path ? c->path : "case";
-    if (o && o->set) snprintf(out, 256, "--set %.240s", o->set);
+    if (o && o->set && o->place) snprintf(out, 256, "%.120s%.130s", o->place, o->set);
+    else if (o && o->set) snprintf(out, 256, "--set %.240s", o->set);
     else if (o && o->line > 0) snprintf(out, 256, "%.160s:%d: %s", path, o->line, key);
     else snprintf(out, 256, "%.160s: %s", path, key);
 }

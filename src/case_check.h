@@ -9,6 +9,7 @@
 typedef struct bt_origin {
     int line;        ///< in the case file; 0 = default or override
     const char *set; ///< the override "key=value", or NULL
+    const char *place; ///< where that stands, "FILE:LINE: ", or NULL: in the command line
     bool faulty;     ///< refused; the member holds the default
 } bt_origin;
 
@@ -16,7 +17,7 @@ typedef struct bt_origin {
 /// names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
 bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
 
-/// "FILE:LINE: KEY", "FILE: KEY" or "--set KEY=VALUE": how a message about a key begins. Truncated to the buffer.
+/// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated to the buffer.
 void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
 
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.

@@ -189,11 +189,11 @@ static void read_floes(reader *r)
     }
 }
 
-static void read_override(reader *r, const char *set)
+static void read_override(reader *r, const char *set, const char *place)
 {
     const char *equals = strchr(set, '=');
     if (!equals || equals == set) {
-        bt_errors_add(r->err, "--set %.80s: is not key=value; write --set ice.concentration=0.5", set);
+        bt_errors_add(r->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ", set, place ? "" : "--set ");
         return;
     }
     char name[96], where[256], why[BT_WHY], buffer[64];
@@ -201,7 +201,7 @@ static void read_override(reader *r, const char *set)
     while (n && set[n - 1] == ' ') n--;
     snprintf(name, sizeof name, "%.*s", n < 90 ? (int)n : 90, set);
     const char *value = equals + 1 + strspn(equals + 1, " ");
-    snprintf(where, sizeof where, "--set %.200s", set);
+    bt_case_locate(r->c, &(bt_origin){.set = set, .place = place}, name, where);
     int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
@@ -212,6 +212,7 @@ static void read_override(reader *r, const char *set)
         return;
     }
     r->from[k].set = set;
+    r->from[k].place = place;
     r->from[k].line = 0;
     if (bt_case_keys[k].type != BT_KEY_POINTS) {
         r->from[k].faulty = !bt_value_read(&bt_case_keys[k], r->c, value, true, why);
@@ -233,7 +234,7 @@ static void begin_case(bt_case *c, const char *path)
 }
 
 /// The text of c into its values.
-static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, int n, bt_errors *err)
+static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
     const char *path = c->path;
@@ -248,7 +249,7 @@ static bt_status read_text(bt_case *c, size_t size, const char *const *overrides
     reader r = {.c = c, .err = err, .from = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_origin)),
                 .given = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_node *))};
     walk(&r, root, "");
-    for (int i = 0; i < n; i++) read_override(&r, overrides[i]);
+    for (int i = 0; i < n; i++) read_override(&r, overrides[i], place ? place[i] : NULL);
     read_given(&r);
     read_floes(&r);
     size_t in_file = err->n;
@@ -262,10 +263,15 @@ static bt_status read_text(bt_case *c, size_t size, const char *const *overrides
 
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err)
 {
+    return bt_case_read_placed(c, path, overrides, NULL, n, err);
+}
+
+bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place, int n, bt_errors *err)
+{
     size_t size;
     begin_case(c, path);
     const bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
-    return status == BT_OK ? read_text(c, size, overrides, n, err) : status;
+    return status == BT_OK ? read_text(c, size, overrides, place, n, err) : status;
 }
 
 static void keep_table(bt_table *t, const bt_table *from)
@@ -282,7 +288,7 @@ bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, cons
     c->text = strdup(text);
     keep_table(&c->water.table, current);
     keep_table(&c->air.table, wind);
-    return read_text(c, strlen(text), NULL, 0, err);
+    return read_text(c, strlen(text), NULL, NULL, 0, err);
 }
 
 void bt_case_free(bt_case *c)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// bergtow check: validates a case and prints the numbers that follow from it.
+// bergtow check: validates a case and prints the numbers that follow from it. Of a study: cmd_check_study.c.
 //
 // Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full scale) and
 // much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
@@ -10,6 +10,7 @@
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
+#include "cmd_check.h"
 #include "cost.h"
 
 #include <inttypes.h>
@@ -54,18 +55,14 @@ static const struct argp_option check_options[] = {
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
-                                       .doc = "Validate a case and print the numbers that follow from it. Nothing is computed or written."};
+static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml|STUDY.yml", .children = children,
+                                       .doc = "Validate a case and print the numbers that follow from it; or a study, with the case of each of its conditions. Nothing is computed or written."};
 
 static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
 
-typedef struct {
-    double count, size, thickness, concentration; // number, mean diameter m, mean thickness m, area fraction
-} ice_numbers;
-
-static ice_numbers ice_of_case(const bt_case *c)
+static bt_check_ice ice_of_case(const bt_case *c)
 {
-    ice_numbers n = {.count = bt_case_expected_floes(c) + c->n_floes, .size = c->ice.size, .thickness = c->ice.thickness, .concentration = c->ice.concentration};
+    bt_check_ice n = {.count = bt_case_expected_floes(c) + c->n_floes, .size = c->ice.size, .thickness = c->ice.thickness, .concentration = c->ice.concentration};
     if (c->ice.size_law == BT_SIZE_POWER) {
         double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
         n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) / ((pow(lo, -a) - pow(hi, -a)) / a);
@@ -73,9 +70,9 @@ static ice_numbers ice_of_case(const bt_case *c)
     return n;
 }
 
-static ice_numbers ice_of_field(const bt_case *c, const bt_field *f)
+static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)
 {
-    ice_numbers n = {.count = f->n + c->n_floes, .concentration = f->concentration};
+    bt_check_ice n = {.count = f->n + c->n_floes, .concentration = f->concentration};
     for (bt_idx i = 0; i < f->n; i++) {
         n.size += sqrt(4 * f->area[i] / BT_PI) / f->n;
         n.thickness += f->thickness[i] / f->n;
@@ -83,7 +80,23 @@ static ice_numbers ice_of_field(const bt_case *c, const bt_field *f)
     return n;
 }
 
-static void print_ice(const bt_case *c, const ice_numbers *n)
+bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f) { return c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c); }
+
+bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
+{
+    bt_check_step s = {.longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5, .pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size};
+    s.size = s.pieces ? c->lead.floe_size : n->size;
+    s.passed = n->count < 1 ? 0 : c->run.dt * bt_case_reference_speed(c) / s.size;
+    s.contact = c->run.dt <= s.longest;
+    s.floes = s.passed <= 0.1;
+    return s;
+}
+
+double bt_check_seconds(const bt_case *c, const bt_check_ice *n) { return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration); }
+
+bt_status bt_check_read_ice(const bt_case *c, bt_field *f, bt_errors *err) { return c->ice.field || c->ice.outlines ? bt_field_load(c, f, err) : BT_OK; }
+
+static void print_ice(const bt_case *c, const bt_check_ice *n)
 {
     printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
@@ -147,7 +160,7 @@ static void print_body(const bt_case *c)
 }
 
 /// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.
-static void print_crushing(const bt_case *c, const ice_numbers *n)
+static void print_crushing(const bt_case *c, const bt_check_ice *n)
 {
     if (!(c->ice.crushing_pressure > 0) || n->count < 1) return;
     const double line = c->ice.crushing_pressure * n->thickness;
@@ -193,23 +206,20 @@ static void print_environment(const bt_case *c)
     }
 }
 
-static void print_step(const bt_case *c, const ice_numbers *n)
+static void print_step(const bt_case *c, const bt_check_ice *n)
 {
     double speed = bt_case_reference_speed(c), dt = c->run.dt;
     printf("steps                %" PRId64 " of %g s = %g s\n", bt_case_steps(c), dt, c->run.duration);
     printf("reference speed      %.4g m/s, contact law solved to %.3g m/s\n", speed, speed * c->solver.tolerance);
-    double longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5;
-    printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(dt <= longest));
+    const bt_check_step s = bt_check_step_of(c, n);
+    printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, s.longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(s.contact));
     if (n->count < 1) return;
-    const bool pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size;
-    const double size = pieces ? c->lead.floe_size : n->size, passed = dt * speed / size;
-    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", passed, pieces ? "pieces of the lead" : "floe sizes", size / speed, verdict(passed <= 0.1));
+    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed, s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, verdict(s.floes));
 }
 
-static void print_cost(const bt_case *c, const ice_numbers *n)
+static void print_cost(const bt_case *c, const bt_check_ice *n)
 {
-    const double per_step = bt_cost_floe_step(n->concentration);
-    double seconds = n->count * (double)bt_case_steps(c) * per_step;
+    const double per_step = bt_cost_floe_step(n->concentration), seconds = bt_check_seconds(c, n);
     double frames = c->run.duration / c->output.frame_interval;
     printf("memory               about %.3g MB\n", bt_cost_memory(c, n->count, 1, 1) / 1e6);
     printf("frames               %.0f, about %.3g MB on disk\n", floor(frames) + 1, frames * n->count * 32 / 1e6);
@@ -218,7 +228,7 @@ static void print_cost(const bt_case *c, const ice_numbers *n)
 
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
-    const ice_numbers n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    const bt_check_ice n = bt_check_ice_of(c, f);
     printf("%s: valid\n", path);
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
@@ -244,6 +254,15 @@ static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
     return BT_OK;
 }
 
+// What changes one case says nothing of which of a study's it changes.
+static bt_status check_study(const options *o, bt_errors *err)
+{
+    if (o->file.n_set == 0 && !(o->scale > 0)) return bt_check_study(o->file.path, err);
+    bt_errors_add(err, "%s: is a study, and %s is for a case; %s", o->file.path, o->scale > 0 ? "--scale" : "--set",
+                  o->scale > 0 ? "scale its base case, and give that as `base`" : "write what holds for all its members under `set` in the file");
+    return BT_ERR_USAGE;
+}
+
 int bt_cmd_check(int argc, char **argv)
 {
     options o = {0};
@@ -251,9 +270,14 @@ int bt_cmd_check(int argc, char **argv)
     bt_case c;
     bt_field f;
     bt_errors err = {0};
+    if (bt_check_is_study(o.file.path)) {
+        const bt_status status = check_study(&o, &err);
+        free(o.file.set);
+        return bt_cmd_end(&bt_comm_alone, status, &err);
+    }
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && (c.ice.field || c.ice.outlines)) status = bt_field_load(&c, &f, &err);
+    if (status == BT_OK) status = bt_check_read_ice(&c, &f, &err);
     if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
     else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
     bt_field_free(&f);

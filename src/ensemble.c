@@ -10,17 +10,20 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "bergtow/checkpoint.h"
 #include "bergtow/run.h"
 #include "cost.h"
+#include "ensemble_member.h"
 #include "fileio.h"
 #include "json.h"
 
-#define GATHER_SECONDS 10.0 // wall time between two looks at ensemble.h5
+// Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
+#define GATHER_SECONDS 1.0
+#define GATHER_SHARE 0.05
+enum { MOST_TOLD = 10 };    // failed members that are told one by one
 
 typedef struct {
     bt_member m;
@@ -38,7 +41,9 @@ typedef struct {
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
     int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
-    double began, gathered;
+    int alone;          ///< descriptor held by the one group that may work on members that look hopeless, −1 = not this one
+    int64_t lost;       ///< members whose failure could not be recorded
+    double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
     bt_errors *err;
 } ensemble;
 
@@ -48,78 +53,6 @@ static void on_signal(int number) { told = number; }
 static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
 enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
-// --- files of a member -----------------------------------------------------------------------------------------------
-
-static bool there(const char *folder, const char *name)
-{
-    char *path = bt_file_join(folder, name);
-    const bool yes = access(path, F_OK) == 0;
-    free(path);
-    return yes;
-}
-
-bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
-{
-    if (why) *why = NULL;
-    if (code) *code = 0;
-    if (there(folder, "finished")) return BT_MEMBER_FINISHED;
-    if (!there(folder, "failed.txt")) return BT_MEMBER_WAITING;
-    char *path = bt_file_join(folder, "failed.txt"), *text;
-    size_t size;
-    bt_errors none = {0};
-    if (bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
-        char *rest = strchr(text, '\n');
-        if (code) *code = (int)strtol(text, NULL, 10);
-        if (why && rest) *why = strdup(rest + 1);
-    }
-    free(text);
-    free(path);
-    bt_errors_free(&none);
-    return BT_MEMBER_FAILED;
-}
-
-static int open_in(const char *folder, const char *name, int flags)
-{
-    char *path = bt_file_join(folder, name);
-    const int fd = open(path, flags | O_CLOEXEC, 0666);
-    free(path);
-    return fd;
-}
-
-/// Lock of an open file: the system lifts it when the process ends.
-static bool take_lock(int fd, bool wait)
-{
-    struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
-}
-
-/// Starts of a member that had no end, one byte each, since it last came on: one that has written a checkpoint since is no hopeless one.
-static int count_attempts(const char *folder)
-{
-    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
-    struct stat st, last;
-    int n = stat(path, &st) == 0 ? (int)st.st_size : 0;
-    if (n > 0 && stat(checkpoint, &last) == 0 && last.st_mtime > st.st_mtime) n = 0;
-    free(path);
-    free(checkpoint);
-    return n;
-}
-
-static void note_attempt(const char *folder)
-{
-    const int fd = open_in(folder, "attempts", O_WRONLY | O_CREAT | O_APPEND);
-    if (fd < 0) return;
-    if (write(fd, ".", 1) == 1) fsync(fd);
-    close(fd);
-}
-
-static void forget_attempts(const char *folder)
-{
-    char *path = bt_file_join(folder, "attempts");
-    unlink(path);
-    free(path);
-}
-
 /// One line of the journal, in one write: lines of several processes do not mix.
 static void journal(const ensemble *e, const char *event, const bt_member *m, double wall, int code)
 {
@@ -128,33 +61,21 @@ static void journal(const ensemble *e, const char *event, const bt_member *m, do
     char line[256];
     const int n = snprintf(line, sizeof line, "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": %.3f, \"exit_code\": %d}\n",
                            (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), wall, code);
-    const int fd = open_in(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
+    const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
     close(fd);
 }
 
-static bt_status record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
-{
-    char *text = NULL, *path = bt_file_join(folder, "failed.txt");
-    size_t size;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) abort();
-    fprintf(out, "%d\n", (int)code);
-    for (size_t i = 0; i < why->n; i++) fprintf(out, "%s\n", why->text[i]);
-    fclose(out);
-    const bt_status status = bt_file_write(path, text, err);
-    free(text);
-    free(path);
-    return status;
-}
-
 // --- the list --------------------------------------------------------------------------------------------------------
+
+static bool suspect(const entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }
 
 static int by_cost(const void *a, const void *b)
 {
     const entry *p = a, *q = b;
-    if ((p->attempts > 0) != (q->attempts > 0)) return p->attempts > 0 ? 1 : -1; // those whose process died come last
+    const int doubt[2] = {(p->attempts > 0) + suspect(p), (q->attempts > 0) + suspect(q)};
+    if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // those whose process died come last
     if (p->cost != q->cost) return p->cost > q->cost ? -1 : 1;
     return strcmp(p->m.name, q->m.name);
 }
@@ -178,12 +99,12 @@ static void make_list(ensemble *e)
             bt_case c;
             bt_errors unheard = {0};
             priced = x->m.condition;
-            cost = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
+            cost = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }
         x->cost = cost;
-        x->attempts = count_attempts(x->folder);
+        x->attempts = bt_member_attempts(x->folder);
         look(x);
         if (x->settled) {
             e->before++;
@@ -200,8 +121,8 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
     if (!text) return BT_ERR_CASE;
     char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"), *copy = bt_file_join(o->dir, "study.yml");
     bt_status status = bt_file_make_dir(members, err);
-    const int fd = status == BT_OK ? open_in(o->dir, "lock", O_RDWR | O_CREAT) : -1;
-    if (fd >= 0) take_lock(fd, true); // calls that begin together
+    const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
+    if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
     if (status == BT_OK && access(path, F_OK) == 0) {
         char *before;
         size_t size;
@@ -225,39 +146,6 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
 
 // --- dealing ---------------------------------------------------------------------------------------------------------
 
-/// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
-static int64_t claim(ensemble *e)
-{
-    for (int64_t i = 0; i < e->n; i++) {
-        entry *x = &e->list[i];
-        look(x);
-        if (x->settled) continue;
-        bt_errors why = {0};
-        if (bt_file_make_dir(x->folder, &why) != BT_OK) {
-            if (e->err->n < 8) for (size_t k = 0; k < why.n; k++) bt_errors_add(e->err, "%s", why.text[k]);
-            bt_errors_free(&why);
-            return -2;
-        }
-        const int fd = open_in(x->folder, "lock", O_RDWR | O_CREAT);
-        if (fd < 0) {
-            bt_file_fail(x->folder, "make a lock in the folder", errno, e->err);
-            return -2;
-        }
-        if (!take_lock(fd, false)) { // somebody is at it
-            close(fd);
-            continue;
-        }
-        look(x); // it may have been finished between the look and the lock
-        if (x->settled) {
-            close(fd);
-            continue;
-        }
-        e->lock = fd;
-        return i;
-    }
-    return -1;
-}
-
 static void say(const ensemble *e, const entry *x, bt_status status, double wall)
 {
     if (e->o->quiet) return;
@@ -279,6 +167,66 @@ static void say(const ensemble *e, const entry *x, bt_status status, double wall
     fflush(stdout);
 }
 
+/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is told of at the end, and is tried again by the next call.
+static void settle_failed(ensemble *e, entry *x, bt_status status, const bt_errors *why)
+{
+    bt_errors unrecorded = {0};
+    x->settled = true;
+    if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < MOST_TOLD)
+        bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again", x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
+    bt_errors_free(&unrecorded);
+}
+
+/// A suspect that is run beside another member takes that with it when it ends the program, and again at every call, until both are given up.
+/// So one at a time is run, once nothing else is left to begin.
+static bool may_take_suspects(ensemble *e)
+{
+    if (e->alone >= 0) return true;
+    const int fd = bt_member_open(e->o->dir, "suspects.lock", O_RDWR | O_CREAT);
+    if (fd < 0) return true; // better than never
+    if (bt_member_take_lock(fd, false)) e->alone = fd;
+    else close(fd);
+    return e->alone >= 0;
+}
+
+/// Make the folder of a member and take its lock; −1: somebody is at it, or it has failed by that.
+static int lock_member(ensemble *e, entry *x)
+{
+    bt_errors why = {0};
+    bt_status status = bt_file_make_dir(x->folder, &why);
+    const int fd = status == BT_OK ? bt_member_open(x->folder, "lock", O_RDWR | O_CREAT) : -1;
+    if (status == BT_OK && fd < 0) status = bt_file_fail(x->folder, "make a lock in the folder", errno, &why);
+    if (status != BT_OK) {
+        settle_failed(e, x, status, &why);
+        journal(e, "failed", &x->m, 0, (int)status);
+        say(e, x, status, 0);
+    }
+    bt_errors_free(&why);
+    if (fd < 0 || bt_member_take_lock(fd, false)) return fd;
+    close(fd);
+    return -1;
+}
+
+/// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
+static int64_t claim(ensemble *e)
+{
+    for (int64_t i = 0; i < e->n; i++) {
+        entry *x = &e->list[i];
+        look(x);
+        if (x->settled || (suspect(x) && !may_take_suspects(e))) continue;
+        const int fd = lock_member(e, x);
+        if (fd < 0) continue;
+        look(x); // it may have been finished between the look and the lock
+        if (x->settled) {
+            close(fd);
+            continue;
+        }
+        e->lock = fd;
+        return i;
+    }
+    return -1;
+}
+
 /// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts anew.
 static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_run_options *o, bt_errors *why)
 {
@@ -292,6 +240,22 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_r
     return bt_run(group, c, o, why);
 }
 
+/// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as errors, which are told at the end.
+static bt_status gather(ensemble *e, bool wait)
+{
+    bt_status status = BT_OK;
+    bt_errors unheard = {0};
+    const double t0 = bt_clock();
+    const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
+    if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
+    else if (fd >= 0 && bt_member_take_lock(fd, wait)) status = bt_ensemble_gather(e->s, e->o->dir, wait ? e->err : &unheard);
+    if (fd >= 0) close(fd);
+    bt_errors_free(&unheard);
+    e->gathered = bt_clock();
+    e->gathering = e->gathered - t0;
+    return status;
+}
+
 static bt_status run_member(ensemble *e, entry *x)
 {
     const bool first = e->group->rank == 0;
@@ -303,14 +267,15 @@ static bt_status run_member(ensemble *e, entry *x)
         status = BT_ERR_NUMERIC;
     }
     if (first) {
-        if (x->attempts == 0) forget_attempts(x->folder);
-        if (x->attempts < BT_MAX_ATTEMPTS) note_attempt(x->folder);
+        if (x->attempts == 0) bt_member_forget_attempts(x->folder);
+        if (x->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(x->folder);
+        if (x->attempts > 0) gather(e, false); // its process may die again, and the file should say so
         journal(e, "start", &x->m, 0, 0);
     }
     status = bt_comm_agree(e->group, status);
     if (status == BT_OK) {
         bt_case c;
-        status = bt_case_read(&c, e->s->base, (const char *const *)x->m.set, x->m.n_set, &why);
+        status = bt_member_case(e->s, &x->m, &c, &why);
         status = bt_comm_agree(e->group, status);
         const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
@@ -319,35 +284,19 @@ static bt_status run_member(ensemble *e, entry *x)
     bt_comm_errors(e->group, &why);
     if (first) {
         const double wall = bt_clock() - t0;
-        forget_attempts(x->folder);
+        bt_member_forget_attempts(x->folder);
         if (status == BT_OK) {
             char *done = bt_file_join(x->folder, "finished");
             status = bt_file_write(done, "", &why);
             free(done);
             if (status == BT_OK) bt_checkpoint_remove(x->folder);
         }
-        if (status != BT_OK && status != BT_ERR_SIGNAL) {
-            bt_errors unheard = {0};
-            // Where not even that can be written (a full disk) the member stays open, and the next call tries it again.
-            if (record_failure(x->folder, status, &why, &unheard) != BT_OK) x->settled = true;
-            bt_errors_free(&unheard);
-        }
+        if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
         journal(e, status == BT_OK ? "finished" : status == BT_ERR_SIGNAL ? "stopped" : "failed", &x->m, wall, (int)status);
         if (status != BT_ERR_SIGNAL) say(e, x, status, wall);
     }
     bt_errors_free(&why);
     return status;
-}
-
-static void gather_now_and_then(ensemble *e)
-{
-    if (bt_clock() - e->gathered < GATHER_SECONDS) return;
-    const int fd = open_in(e->o->dir, "lock", O_RDWR | O_CREAT);
-    bt_errors unheard = {0}; // at the end it is done aloud
-    if (fd >= 0 && take_lock(fd, false)) bt_ensemble_gather(e->s, e->o->dir, &unheard);
-    if (fd >= 0) close(fd);
-    bt_errors_free(&unheard);
-    e->gathered = bt_clock();
 }
 
 static bt_status work(ensemble *e)
@@ -357,12 +306,11 @@ static bt_status work(ensemble *e)
         if (stop) return BT_ERR_SIGNAL;
         int64_t i = e->group->rank == 0 ? claim(e) : 0;
         bt_comm_bcast(e->group, &i, sizeof i);
-        if (i == -1) return BT_OK;
-        if (i < -1) return BT_ERR_IO;
+        if (i == -1) return e->lost > 0 ? BT_ERR_IO : BT_OK;
         const bt_status status = run_member(e, &e->list[i]);
         if (e->group->rank == 0) {
             close(e->lock);
-            if (status != BT_ERR_SIGNAL) gather_now_and_then(e);
+            if (status != BT_ERR_SIGNAL && bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE)) gather(e, false);
         }
         if (status == BT_ERR_SIGNAL) return status;
     }
@@ -371,7 +319,7 @@ static bt_status work(ensemble *e)
 /// What became of the members: the worst status of the failed, each with its first reason.
 static bt_status tell_end(const ensemble *e, bt_status status, bt_errors *err)
 {
-    int64_t count[3] = {0};
+    int64_t count[3] = {0}, at_work = 0;
     bt_status worst = status;
     for (int64_t m = 0; m < e->n; m++) {
         bt_member member;
@@ -381,18 +329,20 @@ static bt_status tell_end(const ensemble *e, bt_status status, bt_errors *err)
         int code;
         const bt_member_state state = bt_ensemble_state(folder, &code, &why);
         count[state]++;
+        at_work += state == BT_MEMBER_WAITING && bt_member_held(folder);
+        if (state == BT_MEMBER_FINISHED && bt_checkpoint_there(folder)) bt_checkpoint_remove(folder); // killed between the two
         if (state == BT_MEMBER_FAILED) {
             if (why) why[strcspn(why, "\n")] = 0;
-            if (count[BT_MEMBER_FAILED] <= 10) bt_errors_add(err, "member %s failed (%d): %s", member.name, code, why ? why : "no reason recorded");
+            if (count[BT_MEMBER_FAILED] <= MOST_TOLD) bt_errors_add(err, "member %s failed (%d): %s", member.name, code, why ? why : "no reason recorded");
             if (worst == BT_OK) worst = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
         }
         free(why);
         free(folder);
         bt_member_free(&member);
     }
-    if (count[BT_MEMBER_FAILED] > 10) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", count[BT_MEMBER_FAILED] - 10, e->o->dir);
+    if (count[BT_MEMBER_FAILED] > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", count[BT_MEMBER_FAILED] - MOST_TOLD, e->o->dir);
     if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", count[BT_MEMBER_WAITING]);
-    else if (count[BT_MEMBER_WAITING] && !e->o->quiet) printf("%" PRId64 " members are being worked on by other processes\n", count[BT_MEMBER_WAITING]);
+    else if (at_work && !e->o->quiet) printf("%" PRId64 " members are being worked on by other processes\n", at_work);
     if (!e->o->quiet) printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left; %s/ensemble.h5\n", count[BT_MEMBER_FINISHED], count[BT_MEMBER_FAILED], count[BT_MEMBER_WAITING], e->o->dir);
     return worst;
 }
@@ -401,9 +351,7 @@ static bt_status tell_end(const ensemble *e, bt_status status, bt_errors *err)
 static void forget_failures(const ensemble *e)
 {
     for (int64_t i = 0; i < e->n; i++) {
-        char *path = bt_file_join(e->list[i].folder, "failed.txt");
-        unlink(path);
-        free(path);
+        bt_member_forget_failure(e->list[i].folder);
         e->list[i].settled = false;
     }
 }
@@ -422,7 +370,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
     const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
-    ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks};
+    ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks, .alone = -1};
     e.threads = o->threads > 0 ? o->threads : (int)bt_max(1, (double)(sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here));
     make_list(&e);
     if (o->retry && comm->rank == 0) forget_failures(&e);
@@ -433,16 +381,18 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
                e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
         fflush(stdout);
     }
+    if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
     struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal};
     sigemptyset(&act.sa_mask);
     told = 0;
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
     if (!idle) status = work(&e);
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
+    if (e.alone >= 0) close(e.alone);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
     if (comm->rank == 0) {
-        const bt_status gathered = bt_ensemble_gather(s, o->dir, err);
+        const bt_status gathered = gather(&e, true);
         status = tell_end(&e, status, err);
         if (status == BT_OK) status = gathered;
     }

@@ -2,7 +2,7 @@
 // ensemble.h5: one row a member, gathered from the members' folders.
 //
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
-//     /members/name, state_hash, reason [M]              texts, "" where there is none
+//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, or that a waiting member's process died
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or machine; nested ones as A_B; NaN where
 //                                                        there is none
@@ -287,7 +287,7 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_errors *err)
     table t = {0};
     fill(&t, s, dir);
     char *path = bt_file_join(dir, "ensemble.h5"), *part = NULL;
-    if (asprintf(&part, "%s.%ld.tmp", path, (long)getpid()) < 0) abort();
+    if (asprintf(&part, "%s.tmp", path) < 0) abort();
     bt_h5 h;
     bt_status status = bt_h5_create(&h, part, err);
     if (status == BT_OK) {

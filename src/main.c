@@ -19,7 +19,7 @@ static const struct {
     bool parallel; ///< all ranks take part; otherwise rank 0 alone
 } commands[] = {
     {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
-    {"check", "validate a case and print the numbers that follow from it", bt_cmd_check, false},
+    {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false},
     {"field", "make the ice field of a case only", bt_cmd_field, false},
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble, true},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},

@@ -48,6 +48,8 @@ static char *print(const char *fmt, ...)
     return text;
 }
 
+static char *place_of(const bt_study *s, int line) { return print("%s:%d: ", s->path, line); }
+
 static bool scalar(const reader *r, const bt_node *node, int line, const char *name)
 {
     if (node->kind == BT_NODE_SCALAR) return true;
@@ -102,19 +104,22 @@ static bool check_value(const reader *r, int line, const char *name, int key, co
     return good;
 }
 
-/// A map of keys and values into a list "key=value".
-static void read_set(const reader *r, const bt_node *map, int line, const char *where, char ***set, int *n)
+/// A map of keys and values into a list "key=value", and where each stands.
+static void read_set(const reader *r, const bt_node *map, int line, const char *where, char ***set, char ***at, int *n)
 {
     if (map->kind != BT_NODE_MAP) {
         COMPLAIN(r, line, "%s: needs keys with values; write %s: {run.duration: 600 s}", where, where);
         return;
     }
     *set = bt_alloc((size_t)map->n, sizeof **set);
+    *at = bt_alloc((size_t)map->n, sizeof **at);
     for (int i = 0; i < map->n; i++) {
         char prefix[96];
         snprintf(prefix, sizeof prefix, "%.80s: ", where);
         const int key = find_key(r, map->key_line[i], prefix, map->key[i]);
-        if (key >= 0 && check_value(r, map->key_line[i], map->key[i], key, map->item[i])) (*set)[(*n)++] = print("%s=%s", map->key[i], map->item[i]->text);
+        if (key < 0 || !check_value(r, map->key_line[i], map->key[i], key, map->item[i])) continue;
+        (*at)[*n] = place_of(r->s, map->key_line[i]);
+        (*set)[(*n)++] = print("%s=%s", map->key[i], map->item[i]->text);
     }
 }
 
@@ -208,7 +213,7 @@ static bt_study_parameter *add_parameter(const reader *r, int line, const char *
         return NULL;
     }
     bt_study_parameter *p = &s->parameter[s->n_parameters++];
-    *p = (bt_study_parameter){.name = strdup(name), .key = key};
+    *p = (bt_study_parameter){.name = strdup(name), .at = place_of(s, line), .key = key};
     return p;
 }
 
@@ -246,7 +251,7 @@ static void read_variants(const reader *r, const bt_node *map, int line)
         snprintf(where, sizeof where, "variants: %.60s", map->key[i]);
         v->name = strdup(map->key[i]);
         p->value[p->n++] = strdup(v->name);
-        read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->n_set);
+        read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
 }
 
@@ -270,7 +275,7 @@ static void read_with(const reader *r, const bt_node *map, int line)
         if (!known) COMPLAIN(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list", where);
         bt_study_variant *v = &s->with[s->n_with++];
         v->name = strdup(map->key[i]);
-        read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->n_set);
+        read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
 }
 
@@ -360,7 +365,7 @@ static void read_entries(const reader *r, const bt_node *root)
     } else if (!node) {
         bt_errors_add(r->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml", s->path);
     }
-    if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->n_set);
+    if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->set_at, &s->n_set);
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
     if ((node = entry(root, "with", &line))) read_with(r, node, line);
@@ -402,6 +407,7 @@ static void free_sets(bt_study_variant *v, int n)
     for (int i = 0; i < n; i++) {
         free(v[i].name);
         free_texts(v[i].set, v[i].n_set);
+        free_texts(v[i].at, v[i].n_set);
     }
     free(v);
 }
@@ -410,12 +416,14 @@ void bt_study_free(bt_study *s)
 {
     for (int i = 0; i < s->n_parameters; i++) {
         free(s->parameter[i].name);
+        free(s->parameter[i].at);
         free(s->parameter[i].stratum);
         free_texts(s->parameter[i].value, s->parameter[i].n);
     }
     free_sets(s->variant, s->n_variants);
     free_sets(s->with, s->n_with);
     free_texts(s->set, s->n_set);
+    free_texts(s->set_at, s->n_set);
     free(s->path);
     free(s->text);
     free(s->title);
@@ -443,6 +451,12 @@ static char *value_in(const bt_study *s, int p, int64_t c)
     return strdup(q->value[c % q->n]);
 }
 
+static void add_override(bt_member *m, char *set, const char *at)
+{
+    m->at[m->n_set] = at;
+    m->set[m->n_set++] = set;
+}
+
 void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
 {
     *out = (bt_member){.condition = m / s->repeats, .repeat = m % s->repeats};
@@ -454,32 +468,45 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
     for (int i = 0; i < s->n_variants; i++) most += s->variant[i].n_set;
     for (int i = 0; i < s->n_with; i++) most += s->with[i].n_set;
     out->set = bt_alloc((size_t)most, sizeof *out->set);
-    for (int i = 0; i < s->n_set; i++) out->set[out->n_set++] = strdup(s->set[i]);
+    out->at = bt_alloc((size_t)most, sizeof *out->at);
+    for (int i = 0; i < s->n_set; i++) add_override(out, strdup(s->set[i]), s->set_at[i]);
     for (int p = 0; p < s->n_parameters; p++) {
         out->value[p] = value_in(s, p, out->condition);
         if (s->parameter[p].key >= 0) {
-            char *given = out->set[out->n_set++] = print("%s=%s", s->parameter[p].name, out->value[p]);
+            char *given = print("%s=%s", s->parameter[p].name, out->value[p]);
+            add_override(out, given, s->parameter[p].at);
             for (int i = 0; i < s->n_with; i++)
-                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++) out->set[out->n_set++] = strdup(s->with[i].set[k]);
+                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++) add_override(out, strdup(s->with[i].set[k]), s->with[i].at[k]);
             continue;
         }
         for (int i = 0; i < s->n_variants; i++)
-            for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++) out->set[out->n_set++] = strdup(s->variant[i].set[k]);
+            for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++) add_override(out, strdup(s->variant[i].set[k]), s->variant[i].at[k]);
     }
-    out->set[out->n_set++] = print("ice.seed=%" PRId64, out->seed);
+    add_override(out, print("ice.seed=%" PRId64, out->seed), NULL);
 }
 
 void bt_member_free(bt_member *m)
 {
     free_texts(m->set, m->n_set);
+    free(m->at);
     for (int i = 0; i < BT_MAX_PARAMETERS; i++) free(m->value[i]);
     *m = (bt_member){0};
+}
+
+bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err)
+{
+    return bt_case_read_placed(c, s->base, (const char *const *)m->set, m->at, m->n_set, err);
+}
+
+bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err)
+{
+    return bt_case_read_placed(c, s->base, (const char *const *)s->set, (const char *const *)s->set_at, s->n_set, err);
 }
 
 char *bt_study_resolved(const bt_study *s, bt_errors *err)
 {
     bt_case c;
-    const bt_status status = bt_case_read(&c, s->base, (const char *const *)s->set, s->n_set, err);
+    const bt_status status = bt_study_base_case(s, &c, err);
     char *base = status == BT_OK ? bt_case_resolved(&c) : NULL, *text = NULL;
     bt_case_free(&c);
     if (!base) return NULL;

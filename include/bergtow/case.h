@@ -233,6 +233,9 @@ typedef struct bt_case {
 /// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
 
+/// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of "--set ".
+bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place, int n, bt_errors *err);
+
 /// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file is read.
 bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err);
 

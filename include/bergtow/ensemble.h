@@ -3,7 +3,7 @@
 //
 // Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it
 // holds a file `finished` (the last thing written: a run that was stopped has a summary too), failed when it holds failed.txt (first line: exit
-// code; then the reasons), and else waits. DIR/journal.jsonl has a line
+// code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line
 // for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
 // order, ranks, or how often the ensemble was stopped.
 //
@@ -12,14 +12,19 @@
 // each takes the next member that is neither finished, failed nor locked, the longest first by an estimate. (Tried in thought and left: a
 // counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it on every network.)
 // A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are removed. One whose process died is tried again after
-// all others, and given up after some attempts without a checkpoint between them, so that it cannot stop the rest.
+// all others, and given up after some attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies takes all others
+// with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members are run one at a time, so that only
+// the one at fault goes on to the limit. (Not from the first on: a job that ends with its time limit leaves as many such members as it had groups.)
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 
 #include "bergtow/comm.h"
 #include "bergtow/study.h"
 
-enum { BT_MAX_ATTEMPTS = 20 }; ///< of a member whose process dies each time
+enum {
+    BT_MAX_ATTEMPTS = 20,     ///< of a member whose process dies each time
+    BT_SUSPECT_ATTEMPTS = 10, ///< from here on it is run while no other of its kind is
+};
 
 typedef struct bt_ensemble_options {
     const char *dir;
@@ -35,10 +40,11 @@ typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_memb
 /// asks for more ranks than there are), BT_ERR_IO, BT_ERR_SIGNAL (the call resumes); the worst status of a failed member when all others are done.
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
 
-/// State of a member by its files. why: text of failed.txt without its first line, to be freed by the caller, may be NULL; *code: its first line.
+/// State of a member by its files. why: text of failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
+/// NULL; *code: the first line.
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
 
-/// Make DIR/ensemble.h5 from the members' files. Errors: BT_ERR_IO.
+/// Make DIR/ensemble.h5 from the members' files; the caller holds DIR/lock. Errors: BT_ERR_IO.
 bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_errors *err);
 
 #endif

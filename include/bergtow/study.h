@@ -33,6 +33,7 @@ enum { BT_MAX_PARAMETERS = 32, BT_MAX_MEMBERS = 100000 };
 /// What is varied. A value is the text that --set takes.
 typedef struct bt_study_parameter {
     char *name;          ///< case key, or "variant"
+    char *at;            ///< where it stands, "FILE:LINE: "
     int key;             ///< index into the keys of a case, −1 = the variants
     bool continuous;     ///< a range: a Latin hypercube draws from all of it
     bool logarithmic;
@@ -45,6 +46,7 @@ typedef struct bt_study_parameter {
 typedef struct bt_study_variant {
     char *name;
     char **set;          ///< [n_set] "key=value"
+    char **at;           ///< [n_set] where each stands
     int n_set;
 } bt_study_variant;
 
@@ -54,6 +56,7 @@ typedef struct bt_study {
     char *base_name;     ///< as written
     char *base;          ///< path of the base case
     char **set;          ///< [n_set] "key=value"
+    char **set_at;       ///< [n_set] where each stands, "FILE:LINE: "
     int n_set;
     bt_study_parameter parameter[BT_MAX_PARAMETERS];
     int n_parameters;
@@ -74,6 +77,7 @@ typedef struct bt_member {
     int64_t seed;              ///< ice.seed
     int n_set;
     char **set;                ///< [n_set] overrides of the base
+    const char **at;           ///< [n_set] where each stands in the study, "FILE:LINE: ", or NULL; texts of the study
     char *value[BT_MAX_PARAMETERS]; ///< text of each parameter
 } bt_member;
 
@@ -86,6 +90,12 @@ static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_condit
 /// Member m of 0 ... n − 1: repeats of condition 0 first, then those of condition 1. Release with bt_member_free.
 void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
 void bt_member_free(bt_member *m);
+
+/// The case of a member: the base with its overrides; messages name where in the study these stand. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err);
+
+/// The base with `set` alone.
+bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
 
 /// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base case resolved. Two
 /// studies with the same text have the same members. Caller frees. NULL with a message when the base cannot be read.

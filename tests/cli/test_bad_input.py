@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Bad input from a user's hand: each kind must end with its exit code and a message that names it and says what to do."""
 import os
-import pathlib
 import subprocess
 
 import pytest
 
 BERGTOW = os.path.abspath(os.environ.get("BERGTOW", "build/release/bergtow"))
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 DONE, USAGE, CASE, IO = 0, 2, 3, 4
 
 # A small case that is done at once, for the kinds of bad input that need the rest to be good.
@@ -285,10 +283,3 @@ def test_set(folder, kind):
 def test_help(folder, arguments, fragment):
     result = call(*arguments, cwd=folder)
     assert result.returncode == DONE and fragment in result.stdout and not result.stderr
-
-
-@pytest.mark.parametrize("case", sorted(p for p in (ROOT / "cases").rglob("*.yml") if p.parent.name != "studies"), ids=lambda p: p.name)
-def test_shipped_cases_are_valid(folder, case):
-    result = call("check", case, cwd=folder)
-    assert result.returncode == DONE, result.stderr
-    assert b"TOO LARGE" not in result.stdout

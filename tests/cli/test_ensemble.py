@@ -136,6 +136,7 @@ def test_one_member_fails_and_the_rest_complete(tmp_path):
     result = ensemble(tmp_path)
     assert result.returncode == CASE
     assert "member c002-r001 failed (3)" in result.stderr and "output.window_start" in result.stderr
+    assert call("check", "study.yml", cwd=tmp_path).stderr.replace(" (condition 2: run.duration 3)", "").strip().removeprefix("bergtow: ") in result.stderr  # told beforehand, too
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert list(f["members/status"][()]) == [1, 2, 1] and f.attrs["complete"] == 1
         assert "output.window_start" in f["members/reason"].asstr()[1]

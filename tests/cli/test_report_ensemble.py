@@ -83,7 +83,7 @@ def test_every_member_stands_there_with_its_doubts(page, study):
     details = {d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent") for d in page.find_elements("css selector", "#members details")}
     assert set(details) == {"c001-r004: failed", "c002-r002: 1 warning"} and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
     warning = page.find_element("css selector", ".warning").text
-    assert "1 members failed" in warning and "carry warnings" in warning
+    assert "1 member failed" in warning and "not complete: 1 member to come" in warning and "carry warnings" in warning
     assert "8 finished, 1 failed, 1 waiting" in page.find_element("css selector", "header").text
 
 
@@ -107,6 +107,39 @@ def test_members_of_other_builds_and_lost_folders_are_told(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
     assert report_ensemble.provenance(Ensemble(study))[1] is None
+
+
+def test_a_half_finished_ensemble(tmp_path, monkeypatch):
+    """Conditions without a field, a member whose process died, one that has finished since the file was made: all told, none a fault of the page."""
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    rng = np.random.default_rng(6)
+    some = [member(made_up.ar1(0.6, 600, rng, 100.0, 10.0), {"ice.concentration": c}, k) | {"status": made_up.FINISHED if k == 0 else WAITING} for k, c in enumerate((0.2, 0.5, 0.8)) for _ in range(3)]
+    some[4] |= {"reason": "its process died in 1 attempt"}
+    folder = made_up.write(tmp_path / "half", some)
+    (folder / "members/c002-r001").mkdir(exist_ok=True)
+    (folder / "members/c002-r001/finished").write_text("")
+    report.main([str(folder)])
+    text = (folder / "report.html").read_text()
+    for part in ("3 of 9 members in 3 conditions.", "not complete: 6 members to come", "1 member of these finished after ensemble.h5 was made", "1 member whose process died; the first: c002-r002: its process died in 1 attempt",
+                 "0 (3 waiting)", "<code>c002-r002</code>: waiting", "3 finished, 0 failed, 6 waiting"):
+        assert part in text, part
+    assert text.count("no field finished") == 2
+
+
+@pytest.mark.parametrize("status, behind, told", [(WAITING, False, "has no member that has finished; run the ensemble further"), (WAITING, True, "knows of none of the 1 members that have finished; run `bergtow ensemble`"),
+                                                  (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; mend the study")])
+def test_nothing_has_finished(tmp_path, status, behind, told):
+    folder = made_up.write(tmp_path / "out", [member(np.ones(600), {"ice.concentration": 0.5}, 0) | {"status": status, "reason": "it is wrong\n" if status == FAILED else ""} for _ in range(2)])
+    (folder / "members/c001-r001").mkdir(parents=True)
+    if behind:
+        (folder / "members/c001-r001/finished").write_text("")
+    with pytest.raises(report.RunError) as error:
+        report.main([str(folder)])
+    assert told in str(error.value)
+    (folder / "ensemble.h5").unlink()
+    (folder / "study.resolved.yml").write_text("seed: 1\n")
+    with pytest.raises(report.RunError, match="holds no ensemble.h5; .*run it again"):
+        report.main([str(folder)])
 
 
 def test_an_unusable_ensemble_is_told(tmp_path, capsys, monkeypatch):

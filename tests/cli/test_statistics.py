@@ -150,7 +150,7 @@ def test_what_is_refused(tmp_path, plain, capsys):
         Ensemble(tmp_path)
     waiting = made_up.write(tmp_path / "w", [made_up.member([1.0] * 30, {}, 0, status=made_up.WAITING)])
     for main in (ensemble.main, plot_ensemble.main):
-        with pytest.raises(RunError, match="no member with a mean"):
+        with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
             main([str(waiting)])
     mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
     ensemble.main([str(mixed)])

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: MIT
+"""What a member can die of: a bad value, a full disk, a dead rank. It is named, up to the report, and the rest complete."""
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from html import unescape
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CASE, DONE, IO, NUMERIC, TOW, call, changed, differing, write_case
+from resuming import children, started
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import report  # noqa: E402
+import report_ensemble  # noqa: E402
+
+BASE = changed(TOW, run__duration=20, output__window_start=5)
+CONDITIONS = {"base": "base.yml", "parameters": {"tow.speed": [0.1, 0.15, 0.2]}}
+
+
+def prepare(folder, study=CONDITIONS):
+    write_case(folder, BASE, "base.yml")
+    (folder / "study.yml").write_text(json.dumps(study, indent=1))
+    return folder
+
+
+def ensemble(folder, *more):
+    return call("ensemble", "study.yml", "-o", "all", "--threads", 1, *more, cwd=folder)
+
+
+def journal(folder):
+    path = folder / "all/journal.jsonl"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+@pytest.fixture
+def page(monkeypatch):
+    """The report of an ensemble as texts: its warnings, and the rows and remarks of its members."""
+    monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 2})
+    monkeypatch.setattr(report_ensemble, "pictures", lambda *_: [])
+
+    def made(folder):
+        report.main([str(folder / "all")])
+        text = unescape((folder / "all/report.html").read_text())
+        rows = {name: re.sub(r"<[^>]*>", " ", rest) for name, rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text, re.S)}
+        told = {name: re.sub(r"<[^>]*>", "", rest).strip() for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)}
+        return text.split('<section class="figures"')[0], rows, told
+    return made
+
+
+def statuses(folder):
+    with h5py.File(folder / "all/ensemble.h5") as f:
+        return dict(zip(f["members/name"].asstr()[()], f["members/status"][()].tolist()))
+
+
+def test_a_bad_value(tmp_path, page):
+    """What only the whole case shows, and what only the setting up does."""
+    prepare(tmp_path, {"base": "base.yml", "variants": {"good": {}, "short": {"run.duration": 3}, "lost": {"ice.field": "none.h5"}, "slow": {"tow.speed": 0.05}}})
+    result = ensemble(tmp_path)
+    assert result.returncode in (CASE, IO) and "2 members finished, 2 failed, 0 left" in result.stdout
+    warnings, rows, told = page(tmp_path)
+    assert "2 members failed" in warnings and "c002-r001: " in warnings and "not complete" not in warnings
+    assert [re.search("finished|failed|waiting", rows[f"c00{k}-r001"])[0] for k in (1, 2, 3, 4)] == ["finished", "failed", "failed", "finished"]
+    assert told["c002-r001"].startswith("failed") and "output.window_start" in told["c002-r001"] and "none.h5" in told["c003-r001"]
+
+
+@pytest.fixture
+def tmpfs():
+    """Mounts small file systems, and takes them away."""
+    places = []
+
+    def mount(place, size):
+        place.mkdir(parents=True, exist_ok=True)
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place], capture_output=True, text=True)
+        if done.returncode != 0:
+            pytest.skip(f"no small file system can be mounted here: {done.stderr.strip() or 'not root'}")
+        places.append(place)
+    yield mount
+    for place in reversed(places):
+        subprocess.run(["umount", place], check=True)
+
+
+@pytest.fixture(scope="module")
+def quiet(tmp_path_factory):
+    folder = prepare(tmp_path_factory.mktemp("quiet"))
+    assert ensemble(folder).returncode == DONE
+    return folder
+
+
+@pytest.mark.parametrize("size", ["4k", "64k"])
+def test_a_full_disk_of_one_member(quiet, tmp_path, tmpfs, page, size):
+    """4 kB are full before the run begins, and take no record of the failure either; 64 kB become full within it."""
+    prepare(tmp_path)
+    bad = tmp_path / "all/members/c002-r001"
+    tmpfs(bad, size)
+    (bad / "there").write_bytes(b"x" * (4096 if size == "4k" else 100))
+    result = ensemble(tmp_path)
+    assert result.returncode == IO and "member c002-r001 failed (4)" in result.stderr and "No space left" in result.stderr and "2 members finished, 1 failed" in result.stdout
+    assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
+    warnings, rows, told = page(tmp_path)
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "No space left" in told["c002-r001"] and "failed" in rows["c002-r001"] and "finished" in rows["c003-r001"]
+    subprocess.run(["mount", "-o", "remount,size=64m", bad], check=True)
+    before = len(journal(tmp_path))
+    assert ensemble(tmp_path).returncode == IO and len(journal(tmp_path)) == before
+    assert ensemble(tmp_path, "--retry-failed").returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == [] and not list(tmp_path.glob("all/members/*.txt"))
+
+
+def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
+    """Not even the failure can be recorded: it is told, and the next call, with room, needs no word."""
+    prepare(tmp_path)
+    tmpfs(tmp_path / "all/members", "16k")
+    (tmp_path / "all/members/there").write_bytes(b"x" * 16384)
+    result = ensemble(tmp_path)
+    assert result.returncode == IO and re.search(r"member c003-r001 failed \(4\): .*No space left.*; nor could that be recorded", result.stderr) and "worked on by other" not in result.stdout
+    assert {j["member"] for j in journal(tmp_path) if j["event"] == "failed"} == {"c001-r001", "c002-r001", "c003-r001"} and statuses(tmp_path)["c003-r001"] == 0
+    subprocess.run(["mount", "-o", "remount,size=64m", tmp_path / "all/members"], check=True)
+    assert ensemble(tmp_path).returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+
+def test_a_folder_that_cannot_be_made(quiet, tmp_path):
+    prepare(tmp_path)
+    (tmp_path / "all/members").mkdir(parents=True)
+    (tmp_path / "all/members/c002-r001").write_text("in the way")
+    result = ensemble(tmp_path)
+    assert result.returncode == IO and "member c002-r001 failed (4)" in result.stderr and statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
+    (tmp_path / "all/members/c002-r001").unlink()
+    assert ensemble(tmp_path, "--retry-failed").returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
+
+
+LONG = {"base": "base.yml", "variants": {"short": {"run.duration": 6}, "long": {"run.duration": "200 s", "tow.speed": 0.04}, "slow": {"run.duration": 6, "tow.speed": 0.05}}}
+
+
+def with_a_dead_rank(folder, member, all_of_them=False):
+    """A call on two ranks. Whichever begins the member is killed, and the launcher ends the other; all_of_them: as some launchers do it, at once, without a word."""
+    known, p = len(journal(folder)), started(2, "ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=folder)
+    while p.poll() is None:
+        for line in journal(folder)[known:]:
+            known += 1
+            if line["event"] == "start" and line["member"] == member:
+                time.sleep(0.3 if all_of_them else 0)  # the other has begun something
+                for process in children(p.pid) if all_of_them else [line["pid"]]:
+                    os.kill(process, signal.SIGKILL)
+        time.sleep(0.005)
+    p.communicate(timeout=60)
+    return p.returncode
+
+
+def died(folder, member):
+    return len((folder / "all/members" / member / "attempts").read_text())
+
+
+def test_a_dead_rank(tmp_path, page):
+    prepare(tmp_path, LONG | {"ranks": 2})
+    assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == 1
+    assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == 2
+    # the rest came first; and what the file says of the one that ended the program is as new as the file
+    assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 0, "c003-r001": 1}
+    warnings, rows, told = page(tmp_path)
+    assert "1 member whose process died; the first: c002-r001: its process died in 1 attempt" in warnings and "waiting" in rows["c002-r001"] and "its process died" in told["c002-r001"]
+    (tmp_path / "all/members/c002-r001/attempts").write_text("." * 18)  # those between the third and the eighteenth would be alike
+    for attempts in 19, 20:
+        assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == attempts
+    assert with_a_dead_rank(tmp_path, "none") == NUMERIC
+    assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
+    warnings, rows, told = page(tmp_path)
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "died in each of 20 attempts" in told["c002-r001"] and "failed" in rows["c002-r001"]
+
+
+def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_path):
+    """Two members that each had their process die nineteen times: one of them does nothing wrong."""
+    prepare(tmp_path, LONG | {"repeats": 2})
+    assert ensemble(tmp_path, "-q").returncode == DONE
+    with h5py.File(tmp_path / "all/ensemble.h5") as f:
+        whole = f["summary/mean_ice_resistance_n"][()]
+    bad, good = (tmp_path / "all/members" / name for name in ("c002-r001", "c002-r002"))
+    for member in bad, good:
+        (member / "finished").unlink()
+        (member / "attempts").write_text("." * 19)
+    assert with_a_dead_rank(tmp_path, bad.name, all_of_them=True) not in (DONE, IO)
+    assert died(tmp_path, bad.name) == 20 and died(tmp_path, good.name) == 19
+    assert with_a_dead_rank(tmp_path, "none") == NUMERIC
+    assert statuses(tmp_path) == {f"c00{c}-r00{r}": 2 if (c, r) == (2, 1) else 1 for c in (1, 2, 3) for r in (1, 2)}
+    with h5py.File(tmp_path / "all/ensemble.h5") as f:
+        assert np.array_equal(f["summary/mean_ice_resistance_n"][()], np.where(np.arange(6) == 2, np.nan, whole), equal_nan=True)
