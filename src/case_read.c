@@ -234,15 +234,24 @@ static void begin_case(bt_case *c, const char *path)
 }
 
 /// The text of c into its values.
+static bool has_key(const bt_node *map, const char *key)
+{
+    bool found = false;
+    for (int i = 0; i < map->n && !found; i++) found = !strcmp(map->key[i], key);
+    return found;
+}
+
 static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
     const char *path = c->path;
     bt_node *root = bt_tree_parse(c->text, size, path, err);
-    if (root && root->kind == BT_NODE_MAP && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
-    else if (root && root->kind != BT_NODE_MAP) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
-                      path, root->kind == BT_NODE_LIST ? "list" : "single text");
-    if (!root || root->kind != BT_NODE_MAP || !root->n) {
+    const char *kind = root && root->kind == BT_NODE_LIST ? "list" : "single text";
+    const bool is_map = root && root->kind == BT_NODE_MAP, study = is_map && has_key(root, "base");
+    if (root && !is_map) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/", path, kind);
+    else if (study) bt_errors_add(err, "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with `bergtow check`", path);
+    else if (is_map && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
+    if (!is_map || study || !root->n) {
         bt_tree_free(root);
         return BT_ERR_CASE;
     }

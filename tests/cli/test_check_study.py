@@ -135,6 +135,15 @@ def test_options_of_a_case_are_refused(tmp_path):
     assert "is a study, and --scale is for a case" in checked(tmp_path, STUDY, USAGE, "--scale", "30")[0]
 
 
+@pytest.mark.parametrize("command", ["run", "field", "estimate"])
+def test_what_is_for_cases_says_that_this_is_a_study(tmp_path, command):
+    write_case(tmp_path, BASE, "base.yml")
+    (tmp_path / "study.yml").write_text(json.dumps(STUDY))
+    result = call(command, "study.yml", "-o", "out", cwd=tmp_path) if command != "estimate" else call(command, "study.yml", cwd=tmp_path)
+    assert result.returncode == CASE, result.stderr
+    assert "study.yml: is a study" in result.stderr and "bergtow ensemble" in result.stderr and len(result.stderr.splitlines()) == 1
+
+
 def test_a_case_in_a_pipe_is_still_read(tmp_path):
     path = write_case(tmp_path, BASE)
     result = call("check", "/dev/stdin", input=path.read_text())
