@@ -15,11 +15,11 @@ from resuming import children, started
 FLOES, STEPS = 30000, 20000
 CASE = {
     "run": {"dt": 1, "duration": STEPS},
-    "domain": {"frame": "geographic", "length": 10000, "width": 4500, "ends": "moving", "sides": "periodic"},
-    "ice": {"concentration": 0.5, "size": 31, "thickness": 0.5},
+    "domain": {"frame": "geographic", "length": 9000, "width": 4500, "ends": "moving", "sides": "periodic"},
+    "ice": {"concentration": 0.6, "size": 31, "thickness": 0.5, "thickness_law": "lognormal"},
     "body": {"length": 80, "draft": 30},
-    "tow": {"mode": "line", "speed": 0.8, "ramp": 60, "line_length": 200},
-    "output": {"sample_every": 10, "frame_interval": 2000, "checkpoint_steps": 1000, "checkpoint_wall": 0, "progress": "5 s"},
+    "tow": {"mode": "line", "speed": 0.8, "ramp": 600, "line_length": 200, "line": {"type": "dyneema", "diameter": "150 mm"}},
+    "output": {"sample_every": 10, "frame_interval": 2000, "checkpoint_steps": 1000, "checkpoint_wall": 0, "progress": "1 s"},
 }
 WARM_UP = 0.1  # of the steps: first checkpoints, room of lists
 MOST_GROWTH = 0.03 # of the memory of a rank; the summary keeps 64 bytes of each step, 0.3 to 1 % here
