@@ -158,9 +158,11 @@ report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DI
 	$(PYTHON) postproc/report.py $(RUN)
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
-test: deps ## every test: units, known answers, same bits, command line
+test: deps ## every test: units, known answers, same bits, command line, short runs under the sanitizers
 	@$(AGAIN) all tests
 	@$(AGAIN) CONFIG=validate all
+	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
+	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
 test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time step, tolerance cut tenfold
@@ -192,7 +194,7 @@ lint: all ## names of external symbols, licence lines, syntax; cppcheck, shellch
 tidy: all ## clang-tidy over the program (minutes)
 	@tests/tidy.sh
 
-asan: ## tests of units and physics, kept hostile input, and runs on threads and ranks under AddressSanitizer and UBSan
+asan: ## tests of units and physics, kept hostile input, and runs on threads and ranks under AddressSanitizer and UBSan; BT_PYTEST=tests/cli for Python tests, too
 	@$(AGAIN) CONFIG=asan all tests
 	@tests/sanitize.sh asan $(TEST_BIN:build/$(CONFIG)/%=build/asan/%)
 
@@ -210,7 +212,7 @@ coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/t
 
 # make fuzz TARGET=case TIME=600
 TIME ?= 60
-fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, values, study, table, outlines or field, TIME in seconds
+fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, values, study, table, outlines, field or checkpoint, TIME in seconds
 	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
 	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 

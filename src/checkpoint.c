@@ -63,7 +63,7 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
     if (status != BT_OK && !first && !second) bt_errors_add(err, "%s: holds no checkpoint; give the folder of a run that was stopped", dir);
     if (status != BT_OK)
         for (size_t k = 0; k < why.n; k++) bt_errors_add(err, "%s", why.text[k]);
-    if (status == BT_OK) s->err = err;
+    if (status == BT_OK) s->err = err, s->faulty = false;
     bt_errors_free(&why);
     free(before);
     return status;
@@ -88,7 +88,9 @@ static void print_item(const bt_item *i)
                                                      [BT_ITEM_U16] = "uint16", [BT_ITEM_U8] = "uint8", [BT_ITEM_TEXT] = "text"};
     printf("%-28s %-8s", i->name, kinds[i->type]);
     if (i->type == BT_ITEM_TEXT) {
-        printf(" %.60s%s", (const char *)i->data, strlen(i->data) > 60 ? " ..." : "");
+        putchar(' ');
+        for (const unsigned char *c = i->data; *c && c < (const unsigned char *)i->data + 60; c++) putchar(*c == '\n' || (*c >= 0x20 && *c != 0x7F) ? *c : '?');
+        if (strlen(i->data) > 60) printf(" ...");
     } else if (i->n * i->width > 6 || i->n == 0) {
         printf(" [%" PRId64 "][%d]", i->n, i->width);
     } else {

@@ -41,13 +41,22 @@ int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k)
     return k < rank ? (int64_t)size[k] : 0;
 }
 
-void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, void *to)
+void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to)
 {
     if (r->status != BT_OK || n == 0) return;
     hsize_t size[H5S_MAX_RANK] = {0}, start[H5S_MAX_RANK] = {0};
     const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
     const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
-    bool good = rank >= 1 && first >= 0 && (hsize_t)(first + n) <= size[0];
+    bool good = rank >= 1 && first >= 0 && n > 0 && (hsize_t)first <= size[0] && (hsize_t)n <= size[0] - (hsize_t)first;
+    // By division: the product of what a file claims may not fit.
+    hsize_t left = (hsize_t)width;
+    bool empty = false;
+    for (int k = 1; k < rank; k++) {
+        empty = empty || size[k] == 0;
+        good = good && (size[k] == 0 || left % size[k] == 0);
+        if (good && size[k] > 0) left /= size[k];
+    }
+    good = good && empty == (width == 0) && (empty || left == 1);
     if (good) {
         start[0] = (hsize_t)first;
         size[0] = (hsize_t)n;

@@ -210,7 +210,7 @@ static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
         char path[64];
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        bt_h5_read(old, path, H5T_NATIVE_DOUBLE, 0, n, x);
+        bt_h5_read(old, path, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         for (int64_t i = 0; i < n; i++) memcpy((char *)&s->rows[i] + columns[k].offset, &x[i], sizeof *x);
     }
     free(x);
@@ -223,7 +223,11 @@ void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *o
     bt_impact_store then = *s;
     bt_snapshot_take_rows(from, "collisions", state_rows, N_STATE, &then);
     bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
-    if (from->faulty) return;
+    const int64_t there = bt_h5_size(old, "/impacts/time", 0), entries = bt_snapshot_int(from, "record/entries");
+    bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1, "is not the number of steps in the entry under way");
+    bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1, "is not a number of collisions that result.h5 has");
+    bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1, "is not the number of entries");
+    if (from->faulty || old->status != BT_OK) return;
     s->n_merged = then.n_merged;
     load_rows(s, old, then.written);
     const size_t n = (size_t)then.samples_written, width = (size_t)s->n_panels;
@@ -231,8 +235,8 @@ void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *o
         s->cap_samples = s->n_samples = then.samples_written;
         s->forces = bt_realloc(s->forces, n * width, 2 * sizeof *s->forces);
         s->normals = bt_realloc(s->normals, n * width, sizeof *s->normals);
-        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->forces);
-        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->normals);
+        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, s->n_samples, 2 * s->n_panels, s->forces);
+        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->n_panels, s->normals);
     }
     if (old->status == BT_OK) bt_impact_store_write(s);
 }

@@ -74,14 +74,17 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
-static void load_history(bt_history *h, bt_snapshot *s)
+/// n: steps done; each has a value.
+static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
     bt_snapshot_take_rows(s, "history", history_rows, N_HISTORY, h);
+    h->n = h->cap = n;
     for (int k = 0; k < N_COLUMNS; k++) {
         free(*column_of(h, k));
-        *column_of(h, k) = bt_snapshot_copy(s, columns[k].name, BT_ITEM_F64, 1, &h->n);
-        h->cap = h->n;
+        *column_of(h, k) = bt_snapshot_copy(s, columns[k].name, BT_ITEM_F64, 1, &n);
+        bt_snapshot_want(s, n == h->n, columns[k].name, -1, "has not a value for each step");
     }
+    if (s->faulty) h->n = 0;
 }
 
 /// Entries 0 up to n of all series.
@@ -90,7 +93,7 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < bt_n_series_fields && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series_fields[k].name);
-        bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, x);
+        bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
@@ -102,13 +105,13 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
 static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bodies, double *time, bt_frame_row *rows)
 {
     double *x = bt_alloc((size_t)n_bodies, 3 * sizeof *x);
-    bt_h5_read(old, "/frames/time", H5T_NATIVE_DOUBLE, k, 1, time);
-    bt_h5_read(old, "/frames/pose", H5T_NATIVE_DOUBLE, k, 1, x);
-    bt_h5_read(old, "/frames/body_pose", H5T_NATIVE_DOUBLE, k, 1, x + 3 * (size_t)n_floes);
+    bt_h5_read(old, "/frames/time", H5T_NATIVE_DOUBLE, k, 1, 1, time);
+    bt_h5_read(old, "/frames/pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)n_floes, x);
+    bt_h5_read(old, "/frames/body_pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)(n_bodies - n_floes), x + 3 * (size_t)n_floes);
     for (bt_idx i = 0; i < n_bodies; i++) rows[i] = (bt_frame_row){.x = x[3 * (size_t)i], .y = x[3 * (size_t)i + 1], .yaw = x[3 * (size_t)i + 2]};
-    bt_h5_read(old, "/frames/contact_force", H5T_NATIVE_DOUBLE, k, 1, x);
+    bt_h5_read(old, "/frames/contact_force", H5T_NATIVE_DOUBLE, k, 1, n_floes, x);
     for (bt_idx i = 0; i < n_floes; i++) rows[i].contact_force = x[i];
-    bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, x);
+    bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, n_bodies, x);
     for (bt_idx i = 0; i < n_bodies; i++) rows[i].speed = x[i];
     free(x);
 }
@@ -157,17 +160,19 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
 {
     const bool first = r->comm->rank == 0;
     r->h5.err = err;
-    const int64_t entries = bt_snapshot_int(s, "record/entries"), frames = bt_snapshot_int(s, "record/frames");
+    const int64_t entries = bt_snapshot_int(s, "record/entries"), frames = bt_snapshot_int(s, "record/frames"), step = bt_snapshot_int(s, "world/step");
+    const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
+    bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1, "does not fit the number of steps");
     if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series_fields, 1, &r->merged);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
-        load_history(&r->history, s);
-        if (entries > 0 || frames > 0) bt_h5_open(&old, path, BT_SEAL_RESULT, err);
-        check_counts(&old, entries, frames, r->frames.n_floes);
-        if (old.status == BT_OK) load_series(r, &old, entries);
-        if (old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
+        load_history(&r->history, s, step);
+        if (!s->faulty) bt_h5_open(&old, path, BT_SEAL_RESULT, err);
+        if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
+        if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
+        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);
         bt_record_events(r, e, err);
     }
     bt_status status = bt_comm_agree(r->comm, s->faulty ? BT_ERR_CASE : first && old.status != BT_OK ? old.status : r->h5.status);

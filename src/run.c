@@ -31,8 +31,6 @@
 #include "revision.h"
 #include "run_parts.h"
 
-#define FRAMES_BY_DEFAULT 200
-
 typedef bt_running run;
 
 /// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it. lead: on rank 0.
@@ -147,7 +145,7 @@ static void measure_memory(run *r)
 /// A frame at the first step at or after each multiple of the interval, and at the end.
 static bt_status frame_if_due(run *r, double time, bt_errors *err)
 {
-    const double interval = r->c->output.frame_interval > 0 ? r->c->output.frame_interval : r->c->run.duration / FRAMES_BY_DEFAULT;
+    const double interval = bt_running_frame_interval(r->c);
     const bool due = time >= (double)r->frames_due * interval * (1 - 1e-12), whole = r->w->step == bt_case_steps(r->c);
     if (!due && r->w->step != r->end_step) return BT_OK;
     while ((double)r->frames_due * interval * (1 - 1e-12) <= time) r->frames_due++;
@@ -423,11 +421,14 @@ static bt_status start_again(const bt_comm *comm, const bt_run_options *o, doubl
 /// What the user should know of the checkpoint that is taken.
 static void tell(const bt_snapshot *s, const char *said)
 {
-    if (said) fprintf(stderr, "bergtow: warning: %s\n", said);
+    bt_errors warnings = {0};
+    if (said) bt_errors_add(&warnings, "warning: %s", said);
     const bt_item *i = bt_snapshot_find(s, "about/revision");
-    if (i && strcmp(i->data, BT_REVISION))
-        fprintf(stderr, "bergtow: warning: %s was written by revision %s of the program, and this is %s: the run may go on otherwise than it would have\n", s->path, (const char *)i->data,
-                BT_REVISION);
+    if (i && i->type == BT_ITEM_TEXT && strcmp(i->data, BT_REVISION))
+        bt_errors_add(&warnings, "warning: %s was written by revision %s of the program, and this is %s: the run may go on otherwise than it would have", s->path,
+                      (const char *)i->data, BT_REVISION);
+    bt_errors_print(&warnings);
+    bt_errors_free(&warnings);
 }
 
 static bt_status go_on(const bt_comm *comm, bt_snapshot *s, const bt_run_options *o, double start, bt_errors *err)

@@ -42,6 +42,9 @@ bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err);
 /// Collective. Publish the record and write a checkpoint of this name.
 bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err);
 
+/// Time between frames, s.
+double bt_running_frame_interval(const bt_case *c);
+
 /// The case and the field of a checkpoint. Errors: BT_ERR_CASE.
 bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err);
 bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s);

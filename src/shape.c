@@ -66,7 +66,8 @@ bt_moments bt_shape_moments(int n, const double *v)
     return m;
 }
 
-const char *bt_shape_fault(int n, const double *v)
+/// near: neighbouring vertices coincide, over the extent; angle: a corner turns the wrong way, rad.
+static const char *fault_of(int n, const double *v, double near, double angle)
 {
     if (n < 3) return "it has fewer than 3 vertices";
     if (n > BT_MAX_VERTICES) return "it has more than 128 vertices";
@@ -82,7 +83,7 @@ const char *bt_shape_fault(int n, const double *v)
     double area2 = 0, turned = 0;
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        if (hypot(q[0] - p[0], q[1] - p[1]) <= 1e-9 * extent) return "two neighbouring vertices coincide";
+        if (hypot(q[0] - p[0], q[1] - p[1]) <= near * extent) return "two neighbouring vertices coincide";
         area2 += cross(p[0] - v[0], p[1] - v[1], q[0] - v[0], q[1] - v[1]);
     }
     if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
@@ -93,7 +94,7 @@ const char *bt_shape_fault(int n, const double *v)
         double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
         double turn = atan2(cross(ax, ay, bx, by), ax * bx + ay * by);
         // Collinear vertices are allowed, to round-off; a half turn is a spike.
-        if (turn < -1e-9 || turn > BT_PI - 1e-9) reflex = true;
+        if (turn < -angle || turn > BT_PI - 1e-9) reflex = true;
         turned += turn;
     }
     if (reflex) return "it is not convex";
@@ -101,6 +102,10 @@ const char *bt_shape_fault(int n, const double *v)
     if (fabs(turned - 2 * BT_PI) > 1e-6) return "its edges cross each other";
     return NULL;
 }
+
+const char *bt_shape_fault(int n, const double *v) { return fault_of(n, v, 1e-9, 1e-9); }
+
+bool bt_shape_broken(int n, const double *v) { return fault_of(n, v, 1e-12, 1e-6) != NULL; }
 
 bt_moments bt_shape_centre(int n, double *v)
 {

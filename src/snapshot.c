@@ -68,11 +68,29 @@ static void complain(bt_snapshot *s, const char *name, const char *what)
     s->faulty = true;
 }
 
+void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what)
+{
+    if (good) return;
+    char where[32] = "";
+    if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
+    if (!s->faulty && s->err)
+        bt_errors_add(s->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew", s->path ? s->path : "checkpoint", name, where, what);
+    s->faulty = true;
+}
+
+static bool yes_and_no(const bt_item *i)
+{
+    for (int64_t k = 0; k < i->n * i->width; k++)
+        if (((const uint8_t *)i->data)[k] > 1) return false;
+    return true;
+}
+
 static const bt_item *demand(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width)
 {
     const bt_item *i = bt_snapshot_find(s, name);
     if (!i) complain(s, name, "is missing");
     else if (i->type != type || i->width != width || (n >= 0 && i->n != n)) complain(s, name, "has another shape than expected");
+    else if (type == BT_ITEM_U8 && !yes_and_no(i)) bt_snapshot_want(s, false, name, -1, "holds more than 0 and 1");
     else return i;
     return NULL;
 }

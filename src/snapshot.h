@@ -9,6 +9,7 @@
 
 #include "bergtow/comm.h"
 
+/// U8 is for yes and no alone: it is taken as a bool, for which other values are undefined.
 typedef enum { BT_ITEM_F64, BT_ITEM_I64, BT_ITEM_I32, BT_ITEM_U32, BT_ITEM_U16, BT_ITEM_U8, BT_ITEM_TEXT, BT_ITEM_TYPES } bt_item_type;
 
 typedef struct bt_item {
@@ -52,6 +53,8 @@ const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name);
 int64_t bt_snapshot_rows(bt_snapshot *s, const char *name);
 /// Copy an array that must be there with this type and shape; otherwise complain, and leave `to`.
 void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to);
+/// Complain unless good: what the array holds, in its row (from 0; -1: as a whole), is what no run leaves; `what` completes "/name, row 3, ...".
+void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what);
 const char *bt_snapshot_text(bt_snapshot *s, const char *name); ///< "" and a complaint when it is missing
 int64_t bt_snapshot_int(bt_snapshot *s, const char *name);
 double bt_snapshot_real(bt_snapshot *s, const char *name);

@@ -51,6 +51,8 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *e
     return status == BT_OK ? bt_seal_write(path, BT_SEAL_CHECKPOINT, err) : status;
 }
 
+enum { MOST_COLUMNS = 1000 };
+
 /// Type and shape of a dataset; false for what this program does not write.
 static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
 {
@@ -61,6 +63,9 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     *n = (int64_t)size[0];
     *width = (int)size[1];
     const size_t bytes = H5Tget_size(t);
+    // What it claims to be must be there: nothing this program writes is stored in another way than whole.
+    const hsize_t stored = H5Dget_storage_size(d), numbers = bytes > 0 ? stored / bytes : 0;
+    good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS && (size[0] == 0 ? stored == 0 : stored == numbers * bytes && numbers % size[1] == 0 && numbers / size[1] == size[0]);
     switch (H5Tget_class(t)) {
     case H5T_FLOAT: *type = BT_ITEM_F64, good = good && bytes == 8; break;
     case H5T_INTEGER: {
@@ -69,7 +74,7 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
         good = good && bytes == bt_item_size(*type);
         break;
     }
-    case H5T_STRING: *type = BT_ITEM_TEXT, *n = (int64_t)bytes, *width = 1, good = good && rank == 0; break;
+    case H5T_STRING: *type = BT_ITEM_TEXT, *n = (int64_t)bytes, *width = 1, good = good && rank == 0 && !H5Tis_variable_str(t); break;
     default: good = false;
     }
     H5Tclose(t);
@@ -77,10 +82,16 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     return good;
 }
 
+/// A text that ends where its array does, and nowhere before.
+static bool is_text(const char *text, int64_t n) { return memchr(text, 0, (size_t)n) == text + n - 1; }
+
+/// Names stand in messages: only what this program writes.
+static bool is_name(const char *name) { return name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_/")] == 0; }
+
 static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
-    (void)info;
     bt_snapshot *s = data;
+    if (info->type != H5L_TYPE_HARD) return -1; // a link to another file has no seal
     const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
     herr_t result = o < 0 ? -1 : 0;
     if (o >= 0 && H5Iget_type(o) == H5I_DATASET) {
@@ -89,12 +100,13 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
         int width;
         char full[160];
         const ssize_t length = H5Iget_name(o, full, sizeof full);
-        if (length < 2 || length >= (ssize_t)sizeof full || !describe(o, &type, &n, &width)) {
+        if (length < 2 || length >= (ssize_t)sizeof full || !is_name(full) || !describe(o, &type, &n, &width)) {
             result = -1;
         } else {
             void *to = bt_snapshot_add(s, full + 1, type, n, width, NULL);
             const hid_t stored = H5Dget_type(o);
             if (n * width > 0 && H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0) result = -1;
+            if (type == BT_ITEM_TEXT && !is_text(to, n)) result = -1;
             H5Tclose(stored);
         }
     }
@@ -104,7 +116,7 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
 
 static herr_t take_group(hid_t file, const char *name, const H5L_info_t *info, void *data)
 {
-    (void)info;
+    if (info->type != H5L_TYPE_HARD) return -1;
     return H5Literate_by_name(file, name, H5_INDEX_NAME, H5_ITER_INC, NULL, take, data, H5P_DEFAULT);
 }
 

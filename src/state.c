@@ -14,6 +14,7 @@
 #include "bergtow/tow.h"
 #include "bergtow/window.h"
 #include "domain.h"
+#include "state_check.h"
 
 #define MEMBER(struct_, label, type_, width_, member) {label, BT_ITEM_##type_, width_, offsetof(struct_, member)}
 #define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
@@ -80,7 +81,13 @@ _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 
 void bt_state_save_stall(const bt_stall *t, bt_snapshot *s) { bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
 void bt_state_load_stall(bt_stall *t, bt_snapshot *s) { bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
 void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s) { bt_snapshot_add_rows(s, "lead", lead_rows, N_OF(lead_rows), l); }
-void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s) { bt_snapshot_take_rows(s, "lead", lead_rows, N_OF(lead_rows), l); }
+void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
+{
+    int32_t mode = 0;
+    bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
+    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead"); // before it is taken as one
+    if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
+}
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
@@ -123,7 +130,7 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
     b->tile[i][1] = r->tile[1];
     b->home[i].copy = r->copy;
     b->home[i].lap = r->lap;
-    b->stirred[i] = (uint8_t)r->stirred;
+    b->stirred[i] = r->stirred != 0;
 }
 
 /// A column of rows of `size` bytes, to or from an array of its own.
@@ -191,7 +198,10 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     int64_t n = w->bodies.n_global;
     assert(w->bodies.n == n); // nothing is dealt yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
-    for (bt_gid g = 0; g < n && !s->faulty; g++) put_row(w, bt_world_index(w, g), &rows[g]);
+    for (bt_gid g = 0; g < n && !s->faulty; g++) {
+        bt_snapshot_want(s, rows[g].stirred == 0 || rows[g].stirred == 1, "bodies/stirred", g, "is neither 0 nor 1");
+        put_row(w, bt_world_index(w, g), &rows[g]);
+    }
     free(rows);
 }
 
@@ -205,7 +215,7 @@ static const bt_state_row trace_columns[] = {
     MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "impulse", F64, 2, ln), MEMBER(bt_trace, "friction", F64, 1, lt), MEMBER(bt_trace, "crushed", U8, 1, scar),
 };
 
-static int by_names(const void *p, const void *q)
+int bt_trace_by_names(const void *p, const void *q)
 {
     const bt_trace *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
@@ -228,7 +238,7 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
     bt_trace *trace = (bt_trace *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
     free(mine);
     if (c->rank == 0) {
-        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, by_names);
+        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_trace_by_names);
         for (int64_t k = 0; k < all; k++) blank(&trace[k]);
         save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
     }
@@ -292,10 +302,12 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     return status;
 }
 
-/// The constants of the step that follow from the case must be those of the checkpoint.
-static bool same_constants(const bt_params *now, const bt_params *then)
+/// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are constants, too.
+static bool same_constants(const bt_params *now, const bt_params *then, bool steady)
 {
-    return now->dt == then->dt && now->x0 == then->x0 && now->y0 == then->y0 && now->period_x == then->period_x && now->period_y == then->period_y &&
+    const bool fluid = now->water_u == then->water_u && now->water_v == then->water_v && now->air_u == then->air_u && now->air_v == then->air_v &&
+                       now->balance_u == then->balance_u && now->balance_v == then->balance_v && now->tilt_ax == then->tilt_ax && now->tilt_ay == then->tilt_ay;
+    return (fluid || !steady) && now->dt == then->dt && now->x0 == then->x0 && now->y0 == then->y0 && now->period_x == then->period_x && now->period_y == then->period_y &&
            now->tolerance == then->tolerance && now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
@@ -317,8 +329,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     w->events.cap = w->events.n;
     int64_t n = -1;
     bt_trace *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
+    if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
-    if (status == BT_OK && !same_constants(&made, &w->par)) {
+    if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
         bt_errors_add(err, "%s: the case it holds makes other constants of the step now; it was written by another version of the program: go on with that one", s->path);
         status = BT_ERR_CASE;
     }
@@ -354,12 +367,17 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
     f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
-    f->n = f->cap = (bt_idx)(n > 0 ? n - 1 : 0);
-    f->cap_vertices = n_vertices;
     double **const arrays[] = {&f->pose, &f->thickness, &f->area};
     static const char *const names[] = {"field/pose", "field/thickness", "field/area"};
     for (int k = 0; k < 3; k++) {
-        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &n);
-        s->faulty = s->faulty || n != f->n;
+        int64_t rows = 0;
+        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
+        bt_snapshot_want(s, rows == n - 1, names[k], -1, "has not a row for each floe");
     }
+    if (!s->faulty) f->n = f->cap = (bt_idx)(n - 1);
+    f->cap_vertices = n_vertices;
+    bt_state_check_field(f, n, n_vertices, s);
+    if (!s->faulty) return;
+    bt_field_free(f); // nothing of it is to be trusted
+    bt_field_init(f);
 }

@@ -117,6 +117,12 @@ bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
     return status;
 }
 
+bool bt_table_row_sound(const bt_table *t, int64_t i)
+{
+    const double *row = t->row + 3 * i;
+    return isfinite(row[0]) && (i == 0 || row[0] > row[-3]) && fabs(row[1]) <= largest_speed && fabs(row[2]) <= largest_speed;
+}
+
 void bt_table_at(const bt_table *t, double time, double v[2])
 {
     const double *row = t->row;

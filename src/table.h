@@ -11,6 +11,9 @@
 bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err);
 void bt_table_free(bt_table *t);
 
+/// Can row i stand in a table: finite, its time after that of the row before, its speed in range?
+bool bt_table_row_sound(const bt_table *t, int64_t i);
+
 /// The velocity at a time, linear between rows, that of the first or last row outside; m/s. The table has a row.
 void bt_table_at(const bt_table *t, double time, double v[2]);
 

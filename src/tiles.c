@@ -372,6 +372,8 @@ static bool adjacent(int32_t p, int32_t q, int32_t n)
     return d <= 1 || n == 1 || (n > 1 && d == n - 1);
 }
 
+bool bt_tiles_adjacent(const bt_tiles *t, const int32_t p[2], const int32_t q[2]) { return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y); }
+
 /// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the margin they had (the
 /// last solution may be one that did not converge). No tile has both in its block, and no rank may hold both.
 static void drop_parted(const bt_world *w, bt_trace *trace, int64_t *n)
@@ -381,7 +383,7 @@ static void drop_parted(const bt_world *w, bt_trace *trace, int64_t *n)
     for (int64_t k = 0; k < *n; k++) {
         const bt_idx i = bt_world_index(w, trace[k].a), j = bt_world_index(w, trace[k].b);
         const bool one_large = b->large[i] || b->large[j];
-        if (one_large || (adjacent(b->tile[i][0], b->tile[j][0], w->tiles->wrap_x) && adjacent(b->tile[i][1], b->tile[j][1], w->tiles->wrap_y))) trace[kept++] = trace[k];
+        if (one_large || bt_tiles_adjacent(w->tiles, b->tile[i], b->tile[j])) trace[kept++] = trace[k];
     }
     *n = kept;
 }

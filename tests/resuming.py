@@ -34,9 +34,9 @@ def command(ranks, *arguments):
     return [*launcher, BERGTOW, *map(str, arguments)]
 
 
-def started(ranks, *arguments, cwd=None):
+def started(ranks, *arguments, cwd=None, stderr=subprocess.PIPE):
     """In a process group of its own, so that all of it can be killed at once."""
-    return subprocess.Popen(command(ranks, *arguments), cwd=cwd, env=environment(OMP_NUM_THREADS=1, **ROOT), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    return subprocess.Popen(command(ranks, *arguments), cwd=cwd, env=environment(OMP_NUM_THREADS=1, **ROOT), stdout=subprocess.PIPE, stderr=stderr, text=True,
                             start_new_session=True)
 
 

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Runs the compiled test programs given as arguments, then the Python tests, and closes with one line of counts.
-# A program that crashes, or prints no count, is a failure of its own.
-passed=0 failed=0
+# Runs the compiled test programs given as arguments, then short runs under the sanitizers, then the Python tests, and closes with one line of counts.
+# A program that crashes, or prints no count, is a failure of its own. A sanitizer that is not installed counts as skipped, and is named.
+passed=0 failed=0 skipped=0
 # Threads that spin at a barrier while another program has the core stop everything on a busy machine; the program itself sees to that in main.c.
 export GOMP_SPINCOUNT="${GOMP_SPINCOUNT:-5000}"
 log=$(mktemp)
@@ -23,6 +23,23 @@ for t in "$@"; do
     if [ "$f" -ne 0 ]; then cat "$log"; fi
 done
 
+for kind in asan tsan valgrind; do
+    corpus=
+    [ $kind != asan ] || corpus=build/asan/tests/fuzz/test_corpus
+    start=$(date +%s)
+    tests/sanitize.sh $kind short $corpus >"$log" 2>&1
+    code=$?
+    p=0 f=0
+    case $code in
+    0) p=1 ;;
+    77) skipped=$((skipped + 1)) ;;
+    *) f=1 ;;
+    esac
+    passed=$((passed + p)) failed=$((failed + f))
+    printf '%-40s %4d passed %4d failed  %3d s\n' "short runs under $kind" $p $f $(($(date +%s) - start))
+    if [ $code -eq 77 ]; then echo "    not run: $(tail -1 "$log")"; elif [ $code -ne 0 ]; then cat "$log"; fi
+done
+
 ${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE tests/cli tests/parallel >"$log" 2>&1
 code=$?
 cat "$log"
@@ -34,5 +51,5 @@ f=$((${f:-0} + ${e:-0}))
 if [ $code -ne 0 ] && [ "$f" -eq 0 ]; then f=1; fi
 passed=$((passed + ${p:-0})) failed=$((failed + f))
 
-echo "$passed passed, $failed failed, ${s:-0} skipped"
+echo "$passed passed, $failed failed, $((skipped + ${s:-0})) skipped"
 [ "$failed" -eq 0 ]

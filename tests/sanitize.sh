@@ -1,11 +1,17 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# sanitize.sh asan|tsan|valgrind PROGRAM...: the test programs given, then short runs of bergtow that go through setting up, towing, writing and
-# reading back, on threads and ranks, each watched. A finding, a wrong exit code or a different state hash ends it with an error.
+# sanitize.sh asan|tsan|valgrind [short] PROGRAM...: the test programs given, then short runs of bergtow that go through setting up, towing, writing, stopping
+# and reading back, on threads and ranks, each watched. A finding, a wrong exit code or a different state hash ends it with an error; exit code 77: a tool
+# is missing. With `short` a part of it, for make test; valgrind then watches the release build. BT_PYTEST names Python tests to run on the build as well (asan).
 # shellcheck disable=SC2086 # commands of several words
 set -u
 kind=$1
 shift
+short=
+if [ "${1:-}" = short ]; then
+    short=1
+    shift
+fi
 bin=build/$kind/bergtow
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
@@ -17,15 +23,17 @@ asan) # A leak of Open MPI is not ours; one of ours is an error. Under mpirun le
     export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 LSAN_OPTIONS=suppressions=$PWD/tests/lsan.supp:print_suppressions=0 ;;
 tsan) # HDF5 and Open MPI are not instrumented: what they do among themselves is not looked at. Archer tells the sanitizer what libomp orders.
     archer=$(find /usr/lib/llvm-14/lib /usr/lib/x86_64-linux-gnu -name libarcher.so 2>/dev/null | head -1)
-    [ -n "$archer" ] || { echo "libarcher.so is missing; run: make deps-dev"; exit 1; }
+    [ -n "$archer" ] || { echo "libarcher.so is missing; run: make deps-dev"; exit 77; }
+    [ -x $bin ] || { echo "$bin is missing (clang-14 makes it); run: make deps-dev"; exit 77; }
     export OMP_TOOL_LIBRARIES="$archer" TSAN_OPTIONS="ignore_noninstrumented_modules=1:halt_on_error=1:exitcode=66" OMP_NUM_THREADS=4 ;;
 valgrind)
-    command -v valgrind >/dev/null || { echo "valgrind is missing; run: make deps-dev"; exit 1; }
+    command -v valgrind >/dev/null || { echo "valgrind is missing; run: make deps-dev"; exit 77; }
     bin=build/debug/bergtow
+    [ -z "$short" ] || bin=build/release/bergtow
     export BERGTOW_STARTED=1
     watch="valgrind -q --error-exitcode=66 --suppressions=tests/valgrind.supp"
     [ ! -f /usr/share/openmpi/openmpi-valgrind.supp ] || watch="$watch --suppressions=/usr/share/openmpi/openmpi-valgrind.supp" ;;
-*) echo "sanitize.sh asan|tsan|valgrind PROGRAM..."; exit 2 ;;
+*) echo "sanitize.sh asan|tsan|valgrind [short] PROGRAM..."; exit 2 ;;
 esac
 
 fail() { echo "$*"; cat "$dir/log"; exit 1; }
@@ -78,22 +86,39 @@ set: {run.duration: 1, output.panels: false}
 parameters: {ice.friction: [0.1, 0.3]}
 CASE
 steps=${STEPS:-20}
-[ "$kind" != valgrind ] || steps=4
+cases='tow window press' teams='1x2 1x4 2x2 3x1'
+[ "$kind" != valgrind ] || steps=4 teams=
+if [ -n "$short" ]; then
+    steps=4
+    case $kind in
+    asan) cases='tow window' teams=2x2 ;;
+    tsan) cases=press teams=1x4 ;;
+    valgrind) steps=2 cases=tow ;;
+    esac
+fi
 
-for c in tow window press; do
+for c in $cases; do
     echo "$c: alone, on threads$([ "$kind" = valgrind ] || echo ', on ranks')"
     want 0 $watch $bin run "$dir/$c.yml" -o "$dir/$c-1" --threads 1 --steps $steps
     first=$(hash_of "$dir/$c-1")
     [ -n "$first" ] || fail "$c: no state hash"
-    [ "$kind" != valgrind ] || continue
-    for how in '1 2' '1 4' '2 2' '3 1'; do
-        ranks=${how% *} threads=${how#* }
+    for how in $teams; do
+        ranks=${how%x*} threads=${how#*x}
         out=$dir/$c-$ranks-$threads start=
         [ "$ranks" = 1 ] || start="env ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=0 mpirun --oversubscribe -n $ranks"
         want 0 $start $bin run "$dir/$c.yml" -o "$out" --threads "$threads" --steps $steps
         [ "$(hash_of "$out")" = "$first" ] || fail "$c: another state hash on $ranks ranks x $threads threads"
     done
+    echo "$c: stopped half-way, taken up"
+    want 0 $watch $bin run "$dir/$c.yml" -o "$dir/$c-again" --threads 2 --steps $((steps / 2))
+    want 0 $watch $bin resume "$dir/$c-again" --threads 2 --steps $((steps - steps / 2))
+    [ "$(hash_of "$dir/$c-again")" = "$first" ] || fail "$c: another state hash when taken up"
+    want 0 $watch $bin diff "$dir/$c-1" "$dir/$c-again"
 done
+if [ -n "$short" ]; then
+    echo "$kind: nothing found"
+    exit 0
+fi
 echo "fields, estimates, a study, bad input"
 want 0 $watch $bin field "$dir/tow.yml" -o "$dir/f.h5" --set lead.mode=none
 want 0 $watch $bin field "$dir/tow.yml" -o "$dir/f.geojson" --set lead.mode=none
@@ -105,4 +130,11 @@ want 0 $watch $bin ensemble "$dir/study.yml" -o "$dir/study" --threads 1
 want 3 $watch $bin check "$dir/tow.yml" --set ice.size=x --set tow.waypoints=[[1 --set body.shape=shp
 want 3 $watch $bin check "$dir/study.yml"
 want 4 $watch $bin run "$dir/tow.yml" -o "$dir/tow.yml/out"
+if [ -n "${BT_PYTEST:-}" ]; then
+    echo "Python tests: $BT_PYTEST"
+    export BERGTOW="$PWD/$bin" BERGTOW_VALIDATE="$PWD/$bin" ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=0:log_path=$dir/found"
+    "${PYTHON:-/usr/bin/python3}" -m pytest -q -p no:cacheprovider -rfE $BT_PYTEST
+    # Some of them hold time or memory against the release build, and their failure is no finding; what the sanitizer has written is one.
+    ! ls "$dir"/found* >/dev/null 2>&1 || { cat "$dir"/found*; exit 1; }
+fi
 echo "$kind: nothing found"

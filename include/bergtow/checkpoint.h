@@ -36,7 +36,8 @@
 //   bt_domain         not state: which rank owns what steers no bit
 //   random numbers    are keyed by seed, purpose and id (src/rng.h) and used by the field alone: there is no counter
 //
-// That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c).
+// That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c). What no step can leave is refused, under a sound
+// seal too (src/state_check.c).
 #ifndef BERGTOW_CHECKPOINT_H
 #define BERGTOW_CHECKPOINT_H
 

@@ -160,6 +160,9 @@ double bt_tiles_outside(const bt_world *w, bt_idx i);
 /// Coordinates of the tile that owns the contacts between bodies of tiles p and q.
 void bt_tiles_owner(const bt_tiles *t, const int32_t p[2], const int32_t q[2], int32_t out[2]);
 
+/// Are tiles p and q the same or side by side, around periods too?
+bool bt_tiles_adjacent(const bt_tiles *t, const int32_t p[2], const int32_t q[2]);
+
 /// Index of the tile at (x, y), −1 = not here.
 bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y);
 

@@ -11,6 +11,11 @@ mkdir -p "$found" "$kept" $build/broken
 export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 OMP_NUM_THREADS=1
 export LSAN_OPTIONS=suppressions=tests/lsan.supp:print_suppressions=0
 
+# Files that a harness needs beside its input, also after a crash.
+TMPDIR=$(mktemp -d)
+export TMPDIR
+trap 'rm -rf "$TMPDIR"' EXIT
+
 # Words of the input: keys, choices, units.
 words=$build/words.dict
 case $name in
@@ -23,6 +28,8 @@ outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon Mu
 table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >$words ;;
 *) printf '"%s"\n' '\x00' >$words ;;
 esac
+most=4000 slow=100
+[ "$name" != checkpoint ] || most=400 slow=0 # edits of 12 bytes: short inputs do nothing
 
 if [ "$what" = keep ]; then
     merged=$(mktemp -d)
@@ -37,6 +44,6 @@ if [ "$what" = keep ]; then
     rm -rf "$merged"
     du -sb "$kept"
 else
-    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=4000 -dict=$words -artifact_prefix=$build/broken/"$name"- \
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow -dict=$words -artifact_prefix=$build/broken/"$name"- \
         -print_final_stats=1 "$found" "$kept" </dev/null
 fi

@@ -44,6 +44,7 @@ static void study_files(void **state) { (void)state; replay("study", bt_fuzz_stu
 static void tables(void **state) { (void)state; replay("table", bt_fuzz_table, 1); }
 static void outline_files(void **state) { (void)state; replay("outlines", bt_fuzz_outlines, 1); }
 static void field_files(void **state) { (void)state; replay("field", bt_fuzz_field, 1); }
+static void checkpoints(void **state) { (void)state; replay("checkpoint", bt_fuzz_checkpoint, 1); }
 
 int main(void)
 {
@@ -51,6 +52,7 @@ int main(void)
         cmocka_unit_test(case_files),    cmocka_unit_test(worlds_of_cases), cmocka_unit_test(study_files),
         cmocka_unit_test(keys_within_their_ranges),
         cmocka_unit_test(tables),        cmocka_unit_test(outline_files),   cmocka_unit_test(field_files),
+        cmocka_unit_test(checkpoints),
     };
     return cmocka_run_group_tests_name("corpus", tests, NULL, NULL);
 }
