@@ -155,6 +155,7 @@ typedef struct {
     const bt_anderson *record; ///< keep the history of this sweep; NULL: a plain one
     bt_anderson_verdict move;  ///< what is still to be done to the impulses after the last sweep
     int64_t times;             ///< sweeps of a tile in its turn
+    bool far;                  ///< the field is larger than the caches
 } sweep_order;
 
 /// The next cache lines of the units of a tile that comes later. Memory is read in the order of the units only within a tile, too
@@ -177,7 +178,7 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     double few[6 * ON_STACK], *x = few;
     if (o->move != BT_ANDERSON_STAY && tile->n_units > 0) bt_anderson_move_units(w->solver->anderson, o->move, tile);
     if (o->record) {
-        bt_anderson_fetch(tile);
+        if (o->far) bt_anderson_fetch(tile);
         if (tile->n_units > ON_STACK) x = bt_alloc(6 * (size_t)tile->n_units, sizeof *x);
         for (bt_idx i = 0; i < tile->n_units; i++) {
             x[3 * i] = tile->units[i].ln[0];
@@ -289,7 +290,7 @@ static void sweep_to_tolerance(bt_world *w)
         bool record = false;
         for (int q = 0; q < n; q++) {
             record = !w->par.plain_sweeps && bt_anderson_begin(a, &t[q]);
-            o[q] = (sweep_order){record ? a : NULL, q == 0 ? move : BT_ANDERSON_STAY, times << a->effort};
+            o[q] = (sweep_order){record ? a : NULL, q == 0 ? move : BT_ANDERSON_STAY, times << a->effort, n > 1};
         }
         const double change = sweep(w, o, n, t);
         move = BT_ANDERSON_STAY;
