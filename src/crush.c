@@ -154,7 +154,8 @@ static void inherit(const bt_tile *t, const bt_scar *name, const bt_manifold *m,
 void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     const bt_bodies *s = &w->bodies;
-    bt_unit *u = &t->units[j];
+    const bt_unit *u = &t->units[j];
+    bt_gaps *g = &t->gaps[j];
     bt_limit *l = &t->limits[j];
     *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .scar = -1};
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
@@ -164,9 +165,9 @@ void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
     }
     double gap = INFINITY, approach = 0;
     for (int i = 0; i < m->n_points; i++) {
-        u->gap[i] += l->depth[i];
-        l->place[i] = bt_max(u->gap[i], 0) / dt;
-        gap = bt_min(gap, bt_max(u->gap[i], 0));
+        g->gap[i] += l->depth[i];
+        l->place[i] = bt_max(g->gap[i], 0) / dt;
+        gap = bt_min(gap, bt_max(g->gap[i], 0));
         const double before = bt_normal_velocity(u, i, &s->vel_start[m->a], &s->vel_start[m->b]);
         approach = bt_max(approach, -bt_min(before, bt_normal_velocity(u, i, &s->vel_free[m->a], &s->vel_free[m->b])));
     }
@@ -190,7 +191,7 @@ double bt_crush_overlap(const bt_tile *t)
     // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it alone.
     double deepest = 0;
     for (bt_idx j = 0; j < t->n_units; j++)
-        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->units[j].gap[i]);
+        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);
     return deepest;
 }
 
@@ -221,7 +222,7 @@ static void grow_tile(bt_world *w, bt_idx k, const void *context, bt_totals *tot
         }
         if (deepest == 0) continue;
         totals->most = bt_max(totals->most, deepest);
-        const bt_pair *p = &t->pairs[u->pair];
+        const bt_pair *p = &t->pairs[t->gaps[j].pair];
         bt_scar s = {.a = gid[u->a], .b = gid[u->b], .part = {p->part[0], p->part[1]}, .n = u->n, .depth = {l->depth[0], l->depth[1]}};
         memcpy(s.feature, p->feature, (size_t)u->n * sizeof *s.feature);
         if (l->scar >= 0) t->scars[l->scar] = s;

@@ -95,19 +95,20 @@ static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
     u->lt = before == 0 ? 0 : kept == before ? p->lt : p->lt * (kept / before);
 }
 
-static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u)
+static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u, bt_gaps *g)
 {
     const bt_bodies *b = &w->bodies;
     const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
     const double nx = m->nx, ny = m->ny;
-    *u = (bt_unit){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .pair = pair, .n = m->n_points};
+    *u = (bt_unit){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points};
+    *g = (bt_gaps){.pair = pair};
     for (int i = 0; i < m->n_points; i++) {
         const bt_point *q = &m->p[i];
         u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
         u->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
         u->w[i] = ia.m + ib.m + ia.i * u->ran[i] * u->ran[i] + ib.i * u->rbn[i] * u->rbn[i];
         u->mn[i] = 1 / u->w[i];
-        u->gap[i] = q->gap;
+        g->gap[i] = q->gap;
     }
     u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
     u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
@@ -119,11 +120,11 @@ static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, cons
         u->per_det = det > 1e-9 * u->w[0] * u->w[1] ? 1 / det : 0;
     }
     if (w->par.warm_start) inherit(m, p, u);
-    bt_pack_bias(w, u, 1);
+    bt_pack_bias(w, u, g, 1);
 }
 
 /// Normal bias b of model equation (1).
-static double bias_of(const bt_world *w, const bt_unit *u, int i, double restitution)
+static double bias_of(const bt_world *w, const bt_unit *u, double gap, int i, double restitution)
 {
     const bt_bodies *b = &w->bodies;
     if (restitution > 0) {
@@ -134,16 +135,16 @@ static double bias_of(const bt_world *w, const bt_unit *u, int i, double restitu
         // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
         const double approach = bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
         const double closing = bt_normal_velocity(u, i, &b->vel_free[u->a], &b->vel_free[u->b]);
-        if (approach < -w->par.rest_speed && u->gap[i] + w->par.dt * bt_min(closing, 0) < w->par.slop)
+        if (approach < -w->par.rest_speed && gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
             return restitution * bt_max(approach, bt_min(closing, 0));
     }
-    return bt_max(u->gap[i], 0) / w->par.dt;
+    return bt_max(gap, 0) / w->par.dt;
 }
 
-void bt_pack_bias(const bt_world *w, bt_unit *u, double share)
+void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share)
 {
     const double restitution = share * w->bodies.restitution[u->b];
-    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, i, restitution);
+    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g->gap[i], i, restitution);
 }
 
 void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
@@ -152,7 +153,9 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
     if ((bt_idx)s->n > t->cap_units) {
         t->cap_units = (bt_idx)(s->n + s->n / 4);
         free(t->units);
+        free(t->gaps);
         t->units = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->units);
+        t->gaps = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->gaps);
     }
     t->n_units = (bt_idx)s->n;
     if (s->n == 0) return;
@@ -163,11 +166,12 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
     else memset(s->colour, 0, s->n); // in sequence
     for (size_t i = 0; i < s->n; i++) {
         bt_pair *p = &t->pairs[s->pair[i]];
-        bt_unit *u = &t->units[next[s->colour[i]]++];
-        fill_unit(w, &s->man[i], s->pair[i], p, u);
+        const bt_idx at = next[s->colour[i]]++;
+        bt_unit *u = &t->units[at];
+        fill_unit(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
         if (crush) {
-            bt_crush_fill(w, t, (bt_idx)(u - t->units), p, &s->man[i]);
-            bt_pack_bias(w, u, 1); // the gaps are others now
+            bt_crush_fill(w, t, at, p, &s->man[i]);
+            bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
         p->n_points = u->n;
         for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
@@ -179,7 +183,7 @@ void bt_pack_store(bt_world *w, bt_idx k)
     bt_tile *t = &w->tiles->tile[k];
     for (bt_idx i = 0; i < t->n_units; i++) {
         const bt_unit *u = &t->units[i];
-        bt_pair *p = &t->pairs[u->pair];
+        bt_pair *p = &t->pairs[t->gaps[i].pair];
         p->ln[0] = u->ln[0];
         p->ln[1] = u->ln[1];
         p->lt = u->lt;

@@ -25,8 +25,8 @@ void bt_pack_keep(bt_pack_scratch *s);
 void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s);
 void bt_pack_scratch_free(bt_pack_scratch *s);
 
-/// Normal biases of a unit, `share`: factor on the restitution.
-void bt_pack_bias(const bt_world *w, bt_unit *u, double share);
+/// Normal biases of a unit with these gaps, `share`: factor on the restitution.
+void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share);
 
 /// Impulses and features of the units into the pairs, for the next detection.
 void bt_pack_store(bt_world *w, bt_idx k);

@@ -21,12 +21,13 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
     (void)context;
     bt_tile *tile = &w->tiles->tile[k];
     for (bt_idx j = 0; j < tile->n_units; j++) {
-        bt_unit *u = &tile->units[j];
+        const bt_unit *u = &tile->units[j];
+        bt_gaps *g = &tile->gaps[j];
         for (int i = 0; i < u->n; i++) {
-            u->push[i] = 0;
-            u->after[i] = u->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (tile->limits) u->after[i] += tile->limits[j].grown[i]; // crushed in this step
-            t->most = bt_max(t->most, -u->after[i]);
+            g->push[i] = 0;
+            g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
+            if (tile->limits) g->after[i] += tile->limits[j].grown[i]; // crushed in this step
+            t->most = bt_max(t->most, -g->after[i]);
         }
     }
 }
@@ -38,14 +39,15 @@ static void push_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     bt_vel *d = w->solver->shift;
     const bt_inv *inv = w->bodies.inv;
     for (bt_idx j = 0; j < tile->n_units; j++) {
-        bt_unit *u = &tile->units[j];
+        const bt_unit *u = &tile->units[j];
+        bt_gaps *g = &tile->gaps[j];
         bt_vel da = d[u->a], db = d[u->b];
         bool moved = false;
         for (int i = 0; i < u->n; i++) {
-            const double open = bt_normal_velocity(u, i, &da, &db) + u->after[i] + w->par.slop;
-            const double p = bt_max(0, u->push[i] - open * u->mn[i]), step = p - u->push[i];
+            const double open = bt_normal_velocity(u, i, &da, &db) + g->after[i] + w->par.slop;
+            const double p = bt_max(0, g->push[i] - open * u->mn[i]), step = p - g->push[i];
             if (step == 0) continue;
-            u->push[i] = p;
+            g->push[i] = p;
             moved = true;
             bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
             t->most = bt_max(t->most, fabs(step) * u->w[i]);

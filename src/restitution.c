@@ -60,7 +60,7 @@ bool bt_restitution_begin(bt_world *w)
     if (any == 0) return false;
     // Units of an earlier detection in this step may still have the lowered restitution of its solution.
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; i < ts->tile[k].n_units; i++) bt_pack_bias(w, &ts->tile[k].units[i], 1);
+        for (bt_idx i = 0; i < ts->tile[k].n_units; i++) bt_pack_bias(w, &ts->tile[k].units[i], &ts->tile[k].gaps[i], 1);
 
     if (b->n > s->cap) {
         s->cap = b->n;
@@ -121,7 +121,7 @@ bool bt_restitution_lower(bt_world *w)
         for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
             bt_unit *u = &ts->tile[k].units[j];
             const double share = s->share[island_of(w, u)];
-            if (share < 1) bt_pack_bias(w, u, share);
+            if (share < 1) bt_pack_bias(w, u, &ts->tile[k].gaps[j], share);
         }
     return true;
 }

@@ -19,6 +19,7 @@ static void free_tile(bt_tile *t)
 {
     free(t->pairs);
     free(t->units);
+    free(t->gaps);
     free(t->limits);
     free(t->scars);
     free(t->unit_history);

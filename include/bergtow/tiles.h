@@ -43,7 +43,8 @@ typedef struct bt_pair {
     double reach;        ///< gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
 } bt_pair;
 
-/// One manifold as the sweep sees it. Its two points are on a line along the tangent, so both have the same tangential row.
+/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line along the tangent, so both have the
+/// same tangential row.
 typedef struct bt_unit {
     bt_idx a, b;
     double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
@@ -56,12 +57,17 @@ typedef struct bt_unit {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
+    int32_t n, spare;      ///< points, 1 or 2
+} bt_unit;
+_Static_assert(sizeof(bt_unit) == 192, "three cache lines");
+
+/// What the sweep does not see of it.
+typedef struct bt_gaps {
     double gap[2];         ///< m
     double after[2];       ///< gaps that U2 leaves at the end of the step, m
     double push[2];        ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the tile
-    int32_t n;             ///< points, 1 or 2
-} bt_unit;
+} bt_gaps;
 
 typedef struct bt_tile {
     int32_t x, y;                   ///< coordinates
@@ -82,6 +88,7 @@ typedef struct bt_tile {
     double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
     // contacts of this step
     bt_unit *units;                 ///< [n_units]
+    bt_gaps *gaps;                  ///< [n_units] of the units
     bt_idx n_units, cap_units;
     int64_t n_points;
     double overlap;                 ///< deepest, m

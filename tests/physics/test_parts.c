@@ -210,7 +210,7 @@ static void detect_equals_brute_force_with_parts(void **state)
             for (bt_idx k = 0; k < w->tiles->n; k++)
                 for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
                     const bt_unit *u = &w->tiles->tile[k].units[j];
-                    const double gap = u->n > 1 ? bt_min(u->gap[0], u->gap[1]) : u->gap[0];
+                    const double *gaps = w->tiles->tile[k].gaps[j].gap, gap = u->n > 1 ? bt_min(gaps[0], gaps[1]) : gaps[0];
                     bt_idx at = -1;
                     for (bt_idx l = 0; l < n && at < 0; l++) {
                         const bt_manifold *m = &want[l];

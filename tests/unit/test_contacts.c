@@ -106,8 +106,8 @@ static contact *contacts_of(const bt_world *w, bt_idx *n)
         for (bt_idx j = 0; j < t->n_units; j++) {
             const bt_unit *u = &t->units[j];
             assert_int_equal(bt_tiles_of_pair(w, u->a, u->b), k);
-            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n, u->n > 1 ? bt_min(u->gap[0], u->gap[1]) : u->gap[0],
-                                  t->pairs[u->pair].feature[0]};
+            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n, u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
+                                  t->pairs[t->gaps[j].pair].feature[0]};
         }
     }
     assert_int_equal(*n, w->tiles->n_units);
@@ -250,12 +250,13 @@ static void edge_contact_keeps_its_features(void **state)
         assert_int_equal(w->tiles->n_units, 1);
         const bt_idx k = bt_tiles_of_pair(w, 0, 1);
         bt_unit *u = &w->tiles->tile[k].units[0];
-        bt_pair *pair = &w->tiles->tile[k].pairs[u->pair];
+        const bt_gaps *g = &w->tiles->tile[k].gaps[0];
+        bt_pair *pair = &w->tiles->tile[k].pairs[g->pair];
         assert_int_equal(u->n, 2);
         CHECK_CLOSE(u->nx, 1, 0.02);
         if (s == 0) {
             CHECK_CLOSE(fabs(u->ran[0] - u->ran[1]), 0.7, 1e-12);
-            CHECK_CLOSE(u->gap[0], 0.01, 1e-12);
+            CHECK_CLOSE(g->gap[0], 0.01, 1e-12);
         } else {
             CHECK_CLOSE(u->ln[0], 100 + s - 1, 0);
             CHECK_CLOSE(u->lt, 7 + s - 1, 0);
