@@ -72,13 +72,13 @@ tow: {mode: thrust, speed: 1, ramp: 10, line_length: 40, line: {branches: 2, typ
 water: {latitude: 75, tilt: dynamic, tide: {major: 0.2, minor: 0.1}}
 air: {wind_x: 5}
 CASE
-# Walls that close on dense ice: force chains through many tiles.
+# Walls that close on dense ice: force chains through many tiles, and sweeps that follow each other.
 cat >"$dir/press.yml" <<'CASE'
 run: {dt: 0.1, duration: 2}
 domain: {length: 20, width: 14, ends_closing: 0.1, sides_closing: 0.1}
 ice: {concentration: 0.85, size: 0.9}
 body: {shape: none}
-solver: {max_sweeps: 40}
+solver: {max_sweeps: 40, tile: 2, turn_rows: 1}
 CASE
 cat >"$dir/study.yml" <<'CASE'
 base: tow.yml
@@ -128,7 +128,8 @@ want 0 $watch $bin check "$dir/window.yml" --scale 1/10
 want 0 $watch $bin run "$dir/tow.yml" -o "$dir/dump" --steps 2 --dump-contacts "1:$dir/c.h5"
 want 0 $watch $bin ensemble "$dir/study.yml" -o "$dir/study" --threads 1
 want 3 $watch $bin check "$dir/tow.yml" --set ice.size=x --set tow.waypoints=[[1 --set body.shape=shp
-want 3 $watch $bin check "$dir/study.yml"
+want 0 $watch $bin check "$dir/study.yml"
+want 3 $watch $bin run "$dir/study.yml" -o "$dir/none"
 want 4 $watch $bin run "$dir/tow.yml" -o "$dir/tow.yml/out"
 if [ -n "${BT_PYTEST:-}" ]; then
     echo "Python tests: $BT_PYTEST"
