@@ -44,7 +44,8 @@ want() {
     "$@" >"$dir/log" 2>&1 </dev/null
     got=$?
     [ $got -eq "$code" ] || fail "exit code $got, not $code: $*"
-    ! grep -q 'Sanitizer\|runtime error' "$dir/log" || fail "a finding: $*"
+    # That a flipped bit asks HDF5 for petabytes, and gets none, is a warning.
+    ! grep 'Sanitizer\|runtime error' "$dir/log" | grep -qv 'Sanitizer failed to allocate' || fail "a finding: $*"
 }
 hash_of() { sed -n 's/.*"state_hash": *"\([0-9a-f]*\)".*/\1/p' "$1/summary.json"; }
 
