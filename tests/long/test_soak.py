@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """20,000 steps through 30,000 floes on two ranks, with checkpoints and rebalancing: memory, residual and time a step stay what they were.
 
-A berg on a line in a moving window, so that it always meets fresh ice and the work of a step is stationary: what grows is a fault. What turns this
-red (tried): 64 bytes more kept at each labelling by each floe.
+A berg on a line in a moving window, so that it always meets fresh ice and the work of a step is stationary: what grows is a fault.
 """
 import os
 import time
