@@ -173,7 +173,8 @@ def test_a_second_signal_spoils_nothing(tmp_path, start):
 
 
 def test_a_kill_leaves_what_was_flushed(tmp_path, start):
-    """No handler helps against SIGKILL: the file must open all the same, with series of one length, marked incomplete."""
+    """No handler helps against SIGKILL: the file must open all the same, marked incomplete, and hold what was flushed. Struck within a flush, HDF5 may have
+    announced rows that it had not written yet: they are zero, and come after all that are whole."""
     case = changed(ENDLESS, output__frame_interval=5)
     p = start(case, "--quiet")
     deadline = time.time() + 30
@@ -188,11 +189,12 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     p.communicate(timeout=30)
     assert not (tmp_path / "out/summary.json").exists()
     with h5py.File(tmp_path / "out/result.part.h5") as f:
-        lengths = {d.shape for d in f["series"].values()}
-        assert len(lengths) == 1 and f.attrs["complete"] == 0
-        n = lengths.pop()[0]
-        assert n >= 256
-        np.testing.assert_allclose(f["series/time"][:], 0.1 * np.arange(1, n + 1), rtol=1e-12)
+        assert f.attrs["complete"] == 0
+        t = f["series/time"][:]
+        whole = int(np.argmin(t > 0)) if (t == 0).any() else len(t)
+        assert whole >= 256 and not t[whole:].any()
+        np.testing.assert_allclose(t[:whole], 0.1 * np.arange(1, whole + 1), rtol=1e-12)
+        assert len(t) - whole <= 256 and {len(d) for d in f["series"].values()} <= {whole, len(t)}
 
 
 def test_control_c_on_a_terminal(tmp_path):
