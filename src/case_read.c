@@ -154,8 +154,7 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
         read_value(&bt_floe_keys[k], f, map->item[i], where, r->err);
     }
     for (int k = 0; k < bt_n_floe_keys; k++) {
-        bool found = bt_floe_keys[k].preset;
-        for (int i = 0; i < map->n && !found; i++) found = !strcmp(map->key[i], bt_floe_keys[k].name);
+        const bool found = bt_floe_keys[k].preset || bt_tree_has(map, bt_floe_keys[k].name);
         if (!found) bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->c->path, map->line, item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
     }
     return r->err->n == before;
@@ -234,20 +233,13 @@ static void begin_case(bt_case *c, const char *path)
 }
 
 /// The text of c into its values.
-static bool has_key(const bt_node *map, const char *key)
-{
-    bool found = false;
-    for (int i = 0; i < map->n && !found; i++) found = !strcmp(map->key[i], key);
-    return found;
-}
-
 static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
     const char *path = c->path;
     bt_node *root = bt_tree_parse(c->text, size, path, err);
     const char *kind = root && root->kind == BT_NODE_LIST ? "list" : "single text";
-    const bool is_map = root && root->kind == BT_NODE_MAP, study = is_map && has_key(root, "base");
+    const bool is_map = root && root->kind == BT_NODE_MAP, study = bt_tree_has(root, "base");
     if (root && !is_map) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/", path, kind);
     else if (study) bt_errors_add(err, "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with `bergtow check`", path);
     else if (is_map && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);

@@ -47,7 +47,7 @@ bool bt_check_is_study(const char *path)
     bool found = false;
     if (stat(path, &st) == 0 && S_ISREG(st.st_mode) && bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
         bt_node *root = bt_tree_parse(text, size, path, &unheard);
-        for (int i = 0; root && root->kind == BT_NODE_MAP && i < root->n && !found; i++) found = !strcmp(root->key[i], "base");
+        found = bt_tree_has(root, "base");
         bt_tree_free(root);
     }
     free(text);

@@ -205,3 +205,10 @@ bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *
     }
     return root;
 }
+
+bool bt_tree_has(const bt_node *node, const char *key)
+{
+    for (int i = 0; node && node->kind == BT_NODE_MAP && i < node->n; i++)
+        if (!strcmp(node->key[i], key)) return true;
+    return false;
+}
