@@ -306,7 +306,7 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
     const char *best = NULL;
     // A known last part in the wrong section counts as one edit: run.seed is nearer to ice.seed than to anything else.
     for (int i = 0; i < n; i++) {
-        int d = bt_suggest_distance(name, keys[i].name);
+        int d = bt_suggest_distance(name, keys[i].name, least);
         if (d > 1 && !strcmp(last_part(name), last_part(keys[i].name))) d = 1;
         if (d < least) {
             least = d;
@@ -318,13 +318,13 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
         for (const char *dot = strchr(keys[i].name, '.'); dot; dot = strchr(dot + 1, '.')) {
             char section[64] = {0};
             memcpy(section, keys[i].name, (size_t)(dot - keys[i].name));
-            int d = bt_suggest_distance(name, section);
+            int d = bt_suggest_distance(name, section, least);
             if (d >= least) continue;
             least = d;
             memcpy(buffer, section, sizeof section);
             best = buffer;
         }
-    if (bt_suggest_distance(name, "floes") < least) best = "floes";
+    if (bt_suggest_distance(name, "floes", least) < least) best = "floes";
     return best;
 }
 

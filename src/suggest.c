@@ -12,10 +12,11 @@ static int min3(int a, int b, int c)
     return m < c ? m : c;
 }
 
-int bt_suggest_distance(const char *a, const char *b)
+int bt_suggest_distance(const char *a, const char *b, int enough)
 {
     size_t na = strlen(a), nb = strlen(b);
-    if (na > LONGEST || nb > LONGEST) return LONGEST + 1;
+    // Each byte more is an edit at least.
+    if (na > LONGEST || nb > LONGEST || (na > nb ? na - nb : nb - na) >= (size_t)enough) return LONGEST + 1;
     // d[i][j]: distance between the first i bytes of a and the first j of b
     int d[LONGEST + 1][LONGEST + 1];
     for (size_t i = 0; i <= na; i++) d[i][0] = (int)i;
@@ -41,7 +42,7 @@ const char *bt_suggest(const char *word, const char *const *list)
     const char *best = NULL;
     int least = bt_suggest_limit(word) + 1;
     for (; *list; list++) {
-        int d = bt_suggest_distance(word, *list);
+        int d = bt_suggest_distance(word, *list, least);
         if (d < least) {
             least = d;
             best = *list;

@@ -4,8 +4,8 @@
 #define BERGTOW_SUGGEST_H
 
 /// Edit distance with insertions, deletions, substitutions and swaps of neighbours (optimal string alignment).
-/// Words longer than 63 bytes are at distance 64 from everything.
-int bt_suggest_distance(const char *a, const char *b);
+/// Words longer than 63 bytes, and those whose lengths alone put them `enough` or more apart, are at distance 64.
+int bt_suggest_distance(const char *a, const char *b, int enough);
 
 /// Largest distance at which a suggestion for this word still helps: a third of its length, at least 1.
 int bt_suggest_limit(const char *word);

@@ -17,7 +17,7 @@ export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
 # Words of the input: keys, choices, units.
-words=$build/words.dict
+words=$build/$name.dict
 case $name in
 case | setup | study)
     # In the list of keys a name is cut from the text after it by a blank.
