@@ -11,15 +11,15 @@
 #define GO_BACK 1e12
 #define MAX_GAMMA 1e6
 #define RIDGE 1e-9 // relative to the diagonal: keeps the normal equations solvable when columns nearly repeat
-enum { PERIOD = 3, MAX_REST = 3, STALL = 30, MAX_EFFORT = 5 };
+enum { MAX_REST = 3, STALL = 30, MAX_EFFORT = 5 };
 
 // History of a tile: f and g of the iteration before, [n_units][3]; velocities before, [n_bodies][4] as bt_vel. Columns in single
 // precision: they only point the way, each iterate is swept again, and velocities are formed anew from the impulses at the end.
 enum { UNIT_BYTES = 3 * (2 * sizeof(double) + 2 * DEPTH * sizeof(float)), BODY_BYTES = 4 * (sizeof(double) + DEPTH * sizeof(float)) };
 
-void bt_anderson_start(bt_anderson *a, double energy)
+void bt_anderson_start(bt_anderson *a, double energy, int every)
 {
-    *a = (bt_anderson){.best = INFINITY, .mark = INFINITY, .before = INFINITY, .wait = PERIOD - 1};
+    *a = (bt_anderson){.best = INFINITY, .mark = INFINITY, .before = INFINITY, .every = every, .wait = every - 1};
     // Quantum 2⁻⁶⁴ of the sums: 10⁻¹⁰ of the energy at convergence, so that 10²⁷ times that energy still fits.
     a->scale = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
 }
@@ -207,7 +207,7 @@ static void drop(bt_anderson *a)
 bt_anderson_verdict bt_anderson_decide(bt_anderson *a, const bt_totals *t)
 {
     const double norm = bt_sum_value(&t->sum[0]);
-    a->wait = PERIOD - 1;
+    a->wait = a->every - 1;
     if (a->has_column && (!isfinite(norm) || norm > GO_BACK * a->before)) {
         drop(a);
         a->started = false;

@@ -11,7 +11,7 @@
 #define AHEAD 2   // tiles: what a sweep asks memory for in advance
 
 /// Least tiles of a strip in a field of so many units. Several threads share the tiles of one phase, and wait for each other after it. One thread goes
-/// through a large field fastest in strips as narrow as they may be: three sweeps that follow each other then find most of their tiles in the
+/// through a large field fastest in strips as narrow as they may be: six sweeps that follow each other then find most of their tiles in the
 /// second-level cache. In a small one, where all is there anyway, jumping between colours costs 4 %.
 static bt_idx least_tiles(int64_t n_units)
 {

@@ -9,8 +9,8 @@
 // rows lie one lower than its even ones. Along x each phase lies one column lower than the one before.
 //
 // Turns. Several passes may go through the strips one behind the other: a pass is on strip s while the next is on strip s − 2, done at the same
-// time, for two passes two strips apart have no body in common. So what a sweep has brought into the cache serves the next two
-// as well, and threads meet a third as often. What a body sees is still all of the first pass, then all of the second. Columns lie
+// time, for two passes two strips apart have no body in common. So what a sweep has brought into the cache serves the next ones
+// as well, and threads meet a sixth as often. What a body sees is still all of the first pass, then all of the second. Columns lie
 // askew, so a strip of them is two pairs wide at least; of rows one pair will do. The tile of the large bodies comes after a strip, so all tiles that meet
 // its floes are made one strip.
 //

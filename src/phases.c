@@ -47,7 +47,8 @@ typedef struct {
 enum { LAG = 2 }; // strips between two passes
 
 /// Place of pass q in beat `beat`: strips of its way that it has done, −1 = it does not work now. On a ring it begins with strip LAG q, when the
-/// one before has gone LAG strips beyond that.
+/// one before has gone LAG strips beyond that. A ring of any length will do: while pass q is on the last strip of its way, and on its seam
+/// before the first, the passes behind it are LAG strips and more from both, or have not begun.
 static bt_idx place_of(const bt_tiles *ts, int q, bt_idx beat)
 {
     const bt_idx done = beat - (ts->ring ? 2 * LAG : LAG) * q;
@@ -111,13 +112,11 @@ static void run_alone(bt_world *w, const bt_pass *pass, int n)
 
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged)
 {
-    // On a ring the last pass must not come upon the first from behind.
-    const bool together = !w->domain && (!w->tiles->ring || w->tiles->n_strips >= 2 * LAG * n);
-    for (int q = 0; q < n && !together; q++) {
-        if (w->domain) run_among_ranks(w, &pass[q], pass[q].looks ? NULL : exchanged);
-        else run_alone(w, &pass[q], 1);
+    if (w->domain) {
+        for (int q = 0; q < n; q++) run_among_ranks(w, &pass[q], pass[q].looks ? NULL : exchanged);
+        return;
     }
-    if (together) run_alone(w, pass, n);
+    run_alone(w, pass, n);
 }
 
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)

@@ -31,7 +31,7 @@ typedef struct bt_pass {
     bool looks;           ///< it changes no velocity: nothing for other ranks
 } bt_pass;
 
-enum { BT_MAX_TURN = 6, BT_PLAIN_TURN = 3 }; ///< passes of a turn, and those of plain sweeps
+enum { BT_MAX_TURN = 6 }; ///< passes of a turn
 
 /// Visit the tiles of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at once by threads and
 /// ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date on all ranks, while tiles that nobody

@@ -213,7 +213,7 @@ const bt_key bt_case_keys[] = {
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "sweeps after which a step is left and counted as not converged, assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "3", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
-    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "rows of a step (a normal one a point, one of friction a contact) from which on convergence is looked at every third sweep, not every one; 0 = never"),
+    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "rows of a step (a normal one a point, one of friction a contact) from which on one sweep of six is accelerated and looked at, not one of three and every one; 0 = never"),
     REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false", "sweeps without acceleration, as a reference"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),

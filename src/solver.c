@@ -216,13 +216,15 @@ static double sweep(bt_world *w, const sweep_order *o, int n, bt_totals *t)
     return t[n - 1].most;
 }
 
+/// Does this step have so many rows, those of all ranks, that they do not fit into the caches?
+static bool is_far(const bt_world *w) { return w->par.turn_rows > 0 && w->solver->rows >= w->par.turn_rows; }
+
 /// Sweeps until the next look at what they change. In a large field, all that come before the next move: they share the traffic of memory
-/// (order.h), and two sweeps too many at the end are cheaper than looking after each. The rows are those of all ranks.
+/// (order.h), and some sweeps too many at the end are cheaper than looking after each.
 static int turn_length(const bt_world *w, int64_t left)
 {
-    const bt_solver *s = w->solver;
-    if (w->par.turn_rows == 0 || s->rows < w->par.turn_rows) return 1;
-    const int64_t n = w->par.plain_sweeps ? BT_PLAIN_TURN : bt_anderson_period(s->anderson), most = left < BT_MAX_TURN ? left : BT_MAX_TURN;
+    if (!is_far(w)) return 1;
+    const int64_t n = w->par.plain_sweeps ? BT_MAX_TURN : bt_anderson_period(w->solver->anderson), most = left < BT_MAX_TURN ? left : BT_MAX_TURN;
     return (int)(n < most ? n : most);
 }
 
@@ -280,7 +282,7 @@ static void sweep_to_tolerance(bt_world *w)
         st->sweeps++;
         st->residual = bt_solver_residual(w, &st->residual_rms);
     }
-    bt_anderson_start(a, w->tiles->heaviest * tolerance * tolerance);
+    bt_anderson_start(a, w->tiles->heaviest * tolerance * tolerance, is_far(w) ? BT_ANDERSON_EVERY_FAR : BT_ANDERSON_EVERY);
     if (st->residual > tolerance && !w->par.plain_sweeps) reserve_history(w);
     bt_anderson_verdict move = BT_ANDERSON_STAY;
     while (st->residual > tolerance && st->sweeps < limit) {

@@ -113,7 +113,7 @@ typedef struct bt_params {
     bool warm_start;
     bool plain_sweeps;     ///< no acceleration between the sweeps (reference)
     int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
-    int64_t turn_rows;     ///< from so many rows of the contact problem on, the sweeps between two accelerations follow each other unwatched; 0 = never
+    int64_t turn_rows;     ///< from so many rows of the contact problem on, six sweeps follow each other unwatched from one acceleration to the next; 0 = never
     double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
     int64_t position_sweeps;

@@ -54,7 +54,7 @@ TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
 # Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
 CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
-# Three sweeps that follow each other through the strips of one rank, as in large fields; among ranks one after the other. In a row of columns, with
+# Six sweeps that follow each other through the strips of one rank, as in large fields; among ranks one after the other. In a row of columns, with
 # the berg's tile after one of them, and on a ring of rows.
 TURNS = changed(LINE, solver__turn_rows=1)
 RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal"}, solver__turn_rows=1)

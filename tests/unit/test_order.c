@@ -6,7 +6,7 @@
 #include "phases.h"
 #include "scene.h"
 
-enum { TURN = 3 };
+enum { TURN = BT_MAX_TURN, SEVERAL = 12 }; // strips of a ring on which three passes work at once
 
 /// What passes have done so far.
 typedef struct {
@@ -124,8 +124,8 @@ static void every_body_meets_its_tiles_in_order(void **state)
         for (int n = 1; n <= TURN; n++) assert_sound(w, n);
         assert_int_equal(scenes[f].at_x >= 0, t->large_after >= 0);
         in_a_row += !t->ring && t->n_strips >= 4;
-        on_a_ring += t->ring && t->n_strips >= 4 * TURN;
-        with_large += t->large_after >= 0 && t->n_strips >= (t->ring ? 4 * TURN : 4);
+        on_a_ring += t->ring && t->n_strips >= SEVERAL;
+        with_large += t->large_after >= 0 && t->n_strips >= (t->ring ? SEVERAL : 4);
         bt_world_free(w);
     }
     assert_true(in_a_row >= 6);
@@ -133,8 +133,26 @@ static void every_body_meets_its_tiles_in_order(void **state)
     assert_true(with_large >= 4);
 }
 
+/// Six passes on rings of 1 to 12 strips: the first ends beside where others are under way.
+static void passes_meet_on_a_short_ring_in_order(void **state)
+{
+    (void)state;
+    uint64_t rng = 5;
+    bool seen[SEVERAL + 1] = {false};
+    omp_set_num_threads(4);
+    for (double width = 12; width < 330; width *= 1.12) {
+        bt_world *w = fill(&(scene){30, width, false, true, -1, 0}, &rng);
+        for (int n = 2; n <= TURN; n++) assert_sound(w, n);
+        if (w->tiles->ring && w->tiles->n_strips <= SEVERAL) seen[w->tiles->n_strips] = true;
+        bt_world_free(w);
+    }
+    int lengths = 0;
+    for (int n = 1; n <= SEVERAL; n++) lengths += seen[n];
+    assert_true(lengths >= 8);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
