@@ -124,15 +124,22 @@ static size_t pairs_of_block(const bt_world *w, const bt_tile *t, bt_idx k, doub
     return n;
 }
 
+/// Row or column of tiles at a distance from their corner, m; a body may be farther off than tiles can be counted.
+static int32_t line_at(double distance, double side)
+{
+    const double fence = 1e9;
+    return (int32_t)bt_max(-fence, bt_min(fence, floor(distance / side)));
+}
+
 bt_tile_range bt_pairs_range(const bt_world *w, bt_idx i, double pad)
 {
     const bt_tiles *t = w->tiles;
     double box[N_BOX];
     box_of(&w->bodies, i, box);
-    const double x = box[X] - t->x0, y = box[Y] - t->y0, fence = 1e9;
+    const double x = box[X] - t->x0, y = box[Y] - t->y0;
     bt_tile_range r = {
-        .x0 = (int32_t)bt_max(-fence, floor((x + box[LOW_X] - pad) / t->side_x)), .x1 = (int32_t)bt_min(fence, floor((x + box[HIGH_X] + pad) / t->side_x)),
-        .y0 = (int32_t)bt_max(-fence, floor((y + box[LOW_Y] - pad) / t->side_y)), .y1 = (int32_t)bt_min(fence, floor((y + box[HIGH_Y] + pad) / t->side_y)),
+        .x0 = line_at(x + box[LOW_X] - pad, t->side_x), .x1 = line_at(x + box[HIGH_X] + pad, t->side_x),
+        .y0 = line_at(y + box[LOW_Y] - pad, t->side_y), .y1 = line_at(y + box[HIGH_Y] + pad, t->side_y),
     };
     // Within the tiles there are, and each of them once.
     if (t->wrap_x && r.x1 - r.x0 >= t->wrap_x - 1) r.x0 = 0, r.x1 = t->wrap_x - 1;
