@@ -657,10 +657,11 @@ static void suggestions_are_near_or_absent(void **state)
 {
     (void)state;
     char buffer[64];
-    assert_int_equal(bt_suggest_distance("speed", "sped"), 1);
-    assert_int_equal(bt_suggest_distance("speed", "spede"), 1);
-    assert_int_equal(bt_suggest_distance("kitten", "sitting"), 3);
-    assert_int_equal(bt_suggest_distance("", "abc"), 3);
+    assert_int_equal(bt_suggest_distance("speed", "sped", 9), 1);
+    assert_int_equal(bt_suggest_distance("speed", "spede", 9), 1);
+    assert_int_equal(bt_suggest_distance("kitten", "sitting", 9), 3);
+    assert_int_equal(bt_suggest_distance("", "abc", 9), 3);
+    assert_int_equal(bt_suggest_distance("", "abc", 3), 64);
     static const struct { const char *typed, *meant; } words[] = {{"tow.sped", "tow.speed"}, {"run.seed", "ice.seed"}, {"toww", "tow"}, {"ice.drags.water_form", "ice.drag.water_form"},
                                                                   {"floe", "floes"}, {"ice.darg", "ice.drag"}, {"concentration", "ice.concentration"}};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
