@@ -48,7 +48,8 @@ void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t valu
 void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value);
 
 /// A dataset of rank 1 to 3 that grows along its first dimension from zero; the others are dims[rank − 1].
-/// chunk: entries of the first two dimensions in a chunk. packed: shuffled and deflated. Returns −1 on failure.
+/// chunk: entries of the first two dimensions in a chunk. packed: shuffled and deflated; chunk[0] = 1 then, for a chunk that is written again has
+/// another length, and a kill finds neither the old one nor the new. Returns −1 on failure.
 hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk, bool packed);
 /// Set the length of the first dimension.
 void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length);

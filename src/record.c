@@ -2,9 +2,9 @@
 // What a run leaves behind: result.h5 while it runs, case.resolved.yml before, summary.json and frames.xdmf after it.
 //
 // result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to then, so that a
-// calculation can be watched (a kill within a flush can leave its rows announced and zero: HDF5 writes the extent before the index). Under its final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint
-// (record_resume.c), and at the end the file itself (attribute "complete" of the root: 0 until the run has closed it). The
-// small text files are written under a temporary name and renamed.
+// calculation can be watched; killed within a flush, some series have its length and some that of the last, all rows whole (h5driver.c). Under its
+// final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint (record_resume.c), and at the end the
+// file itself (attribute "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "bergtow/record.h"
 
 #include <math.h>

@@ -173,8 +173,8 @@ def test_a_second_signal_spoils_nothing(tmp_path, start):
 
 
 def test_a_kill_leaves_what_was_flushed(tmp_path, start):
-    """No handler helps against SIGKILL: the file must open all the same, marked incomplete, and hold what was flushed. Struck within a flush, HDF5 may have
-    announced rows that it had not written yet: they are zero, and come after all that are whole."""
+    """No handler helps against SIGKILL: the file must open all the same, marked incomplete, and hold what was flushed, whole. Struck within a flush, some
+    series have the length of this flush, some of the last (unit/test_h5driver.c strikes at every write)."""
     case = changed(ENDLESS, output__frame_interval=5)
     p = start(case, "--quiet")
     deadline = time.time() + 30
@@ -191,10 +191,10 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     with h5py.File(tmp_path / "out/result.part.h5") as f:
         assert f.attrs["complete"] == 0
         t = f["series/time"][:]
-        whole = int(np.argmin(t > 0)) if (t == 0).any() else len(t)
-        assert whole >= 256 and not t[whole:].any()
-        np.testing.assert_allclose(t[:whole], 0.1 * np.arange(1, whole + 1), rtol=1e-12)
-        assert len(t) - whole <= 256 and {len(d) for d in f["series"].values()} <= {whole, len(t)}
+        assert len(t) >= 256
+        np.testing.assert_allclose(t, 0.1 * np.arange(1, len(t) + 1), rtol=1e-12)
+        lengths = {len(d) for d in f["series"].values()}
+        assert len(lengths) <= 2 and max(lengths) - min(lengths) <= 256
 
 
 def test_control_c_on_a_terminal(tmp_path):

@@ -22,11 +22,11 @@ case $name in
 case | setup | study)
     # In the list of keys a name is cut from the text after it by a blank.
     build/release/bergtow --list-keys | awk '$1 ~ /^[a-z][a-z_0-9.]*$/ {n = split($1, p, "."); print p[n] ": "; print $1; for (i = 3; i < 9; i++) if ($i ~ /^[a-z]+$/) print $i}' | sort -u |
-        awk '{print "\"" $0 "\""}' >$words
-    printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' 'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>$words ;;
-outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame '[[0,0],[9,0],[0,9]]' null 1e308 >$words ;;
-table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >$words ;;
-*) printf '"%s"\n' '\x00' >$words ;;
+        awk '{print "\"" $0 "\""}' >"$words"
+    printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' 'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>"$words" ;;
+outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame '[[0,0],[9,0],[0,9]]' null 1e308 >"$words" ;;
+table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >"$words" ;;
+*) printf '"%s"\n' '\x00' >"$words" ;;
 esac
 most=4000 slow=100
 [ "$name" != checkpoint ] || most=400 slow=0 # edits of 12 bytes: short inputs do nothing
@@ -44,6 +44,6 @@ if [ "$what" = keep ]; then
     rm -rf "$merged"
     du -sb "$kept"
 else
-    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow -dict=$words -artifact_prefix=$build/broken/"$name"- \
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow -dict="$words" -artifact_prefix=$build/broken/"$name"- \
         -print_final_stats=1 "$found" "$kept" </dev/null
 fi

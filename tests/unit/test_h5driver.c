@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+// The HDF5 file driver: what a file under way holds when its writer is killed between any two writes.
+#include <errno.h>
+#include <hdf5.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "h5driver.h"
+#include "h5util.h"
+#include "scene.h"
+
+enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 }; // 160 chunks: an index of three nodes, two of which have been divided
+
+static long writes_left = -1; // until the writer dies; −1: it lives
+
+/// In place of the C library's: writes as it does, until the one at which the program is killed.
+ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
+{
+    if (writes_left == 0) _exit(9);
+    if (writes_left > 0) writes_left--;
+    return syscall(SYS_pwrite64, fd, data, n, at);
+}
+
+static double entry(int series, hsize_t row) { return 1 + (double)row + 0.01 * series; }
+
+/// Series and packed tables that grow, flushed after every ROWS rows. Returns the number of writes after the first flush.
+static long write_file(const char *path, long die_after)
+{
+    bt_errors err = {0};
+    bt_h5 h = {0};
+    bt_h5_create_with_room(&h, path, &err);
+    hid_t series[SERIES];
+    char name[32];
+    for (int k = 0; k < SERIES; k++) {
+        snprintf(name, sizeof name, "/series%d", k);
+        series[k] = bt_h5_growing(&h, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){CHUNK, 1}, false);
+        bt_h5_attr_text(&h, name, "description", "grows");
+    }
+    const hid_t table = bt_h5_growing(&h, "/table", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){WIDTH}, (hsize_t[]){1, WIDTH}, true);
+    long used = 0;
+    for (int n = 0; n < FLUSHES; n++) {
+        for (int k = 0; k < SERIES; k++) {
+            double row[ROWS];
+            for (int i = 0; i < ROWS; i++) row[i] = entry(k, (hsize_t)(n * ROWS + i));
+            bt_h5_append(&h, series[k], H5T_NATIVE_DOUBLE, (hsize_t)n * ROWS, ROWS, row);
+        }
+        double cells[WIDTH];
+        for (int i = 0; i < WIDTH; i++) cells[i] = entry(SERIES + i, (hsize_t)n);
+        bt_h5_append(&h, table, H5T_NATIVE_DOUBLE, (hsize_t)n, 1, cells);
+        snprintf(name, sizeof name, "flush %*d", 3 + n % 9, n);
+        bt_h5_attr_text(&h, "/", "note", name);
+        bt_h5_flush(&h);
+        if (n == 0) writes_left = die_after >= 0 ? die_after : 1000000000;
+    }
+    used = 1000000000 - writes_left;
+    writes_left = -1;
+    for (int k = 0; k < SERIES; k++) H5Dclose(series[k]);
+    H5Dclose(table);
+    assert_int_equal(bt_h5_close(&h), BT_OK);
+    bt_errors_free(&err);
+    return used;
+}
+
+/// Rows of a dataset that opens; fails when one of them is not what was written.
+static hsize_t whole_rows(hid_t file, const char *name, int series, int width)
+{
+    const hid_t d = H5Dopen2(file, name, H5P_DEFAULT), space = H5Dget_space(d);
+    hsize_t n[2] = {0};
+    H5Sget_simple_extent_dims(space, n, NULL);
+    double *x = calloc(n[0] * (hsize_t)width + 1, sizeof *x);
+    assert_true(H5Dread(d, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, x) >= 0);
+    for (hsize_t i = 0; i < n[0]; i++)
+        for (int c = 0; c < width; c++)
+            if (x[i * (hsize_t)width + (hsize_t)c] != entry(series + c, i))
+                fail_msg("%s, row %d of %d: %g, not %g", name, (int)i, (int)n[0], x[i * (hsize_t)width + (hsize_t)c], entry(series + c, i));
+    free(x);
+    H5Sclose(space);
+    H5Dclose(d);
+    return n[0];
+}
+
+/// The number in a text that every flush writes anew: in a heap, to which a header leads.
+static int note_of(hid_t file)
+{
+    const hid_t a = H5Aopen(file, "note", H5P_DEFAULT), type = H5Aget_type(a), space = H5Aget_space(a);
+    char *text = NULL;
+    int n = -1;
+    assert_true(H5Aread(a, type, &text) >= 0 && text && sscanf(text, "flush %d", &n) == 1);
+    H5Dvlen_reclaim(type, space, H5P_DEFAULT, &text);
+    H5Sclose(space);
+    H5Tclose(type);
+    H5Aclose(a);
+    return n;
+}
+
+// Red: metadata that are written as HDF5 hands them over, or lowest address first: rows announced before their index is there.
+static void killed_at_any_write_it_holds_whole_rows(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/bt_h5driver_XXXXXX";
+    close(mkstemp(path));
+    const long writes = write_file(path, -1);
+    assert_true(writes > 2 * FLUSHES && writes < 100 * FLUSHES);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    hsize_t last = 0;
+    for (long n = 0; n < writes; n++) {
+        const pid_t child = fork();
+        if (child == 0) {
+            write_file(path, n);
+            _exit(0);
+        }
+        int how;
+        assert_int_equal(waitpid(child, &how, 0), child);
+        assert_true(WIFEXITED(how) && WEXITSTATUS(how) == 9);
+        const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+        if (file < 0) fail_msg("killed at write %ld of %ld: the file does not open", n, writes);
+        hsize_t least = (hsize_t)-1, most = 0;
+        for (int k = 0; k < SERIES; k++) {
+            char name[32];
+            snprintf(name, sizeof name, "/series%d", k);
+            const hsize_t rows = whole_rows(file, name, k, 1);
+            least = rows < least ? rows : least;
+            most = rows > most ? rows : most;
+        }
+        assert_true(note_of(file) % FLUSHES == note_of(file));
+        const hsize_t tables = whole_rows(file, "/table", SERIES, WIDTH);
+        H5Fclose(file);
+        // Of one flush, or of that one and the next.
+        assert_true(least % ROWS == 0 && least >= ROWS && most <= least + ROWS && tables * ROWS >= least && tables * ROWS <= least + ROWS);
+        assert_true(least >= last);
+        last = least;
+    }
+    assert_true(last >= (FLUSHES - 1) * ROWS);
+    unlink(path);
+}
+
+enum { NAMES = 60, OPERATIONS = 4000 };
+
+/// A dataset holds k, k + 1, ..., n of them.
+static void check_series(hid_t file, const char *name, int k, hsize_t n)
+{
+    const hid_t d = H5Dopen2(file, name, H5P_DEFAULT), space = H5Dget_space(d);
+    int *x = calloc(n, sizeof *x);
+    assert_int_equal(H5Sget_simple_extent_npoints(space), n);
+    assert_true(H5Dread(d, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, x) >= 0);
+    for (hsize_t i = 0; i < n; i++) assert_int_equal(x[i], k + (int)i);
+    free(x);
+    H5Sclose(space);
+    H5Dclose(d);
+}
+
+/// Datasets made, extended, read and deleted by turns, with a small cache of metadata, from a seed; flushed now and then.
+static void shuffle(hid_t access, const char *path, uint64_t seed_given, hsize_t length[NAMES])
+{
+    uint64_t seed = seed_given;
+    H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
+    H5Pget_mdc_config(access, &cache);
+    cache.set_initial_size = true;
+    cache.initial_size = cache.min_size = cache.max_size = 4096; // so that metadata leave it before they are flushed, and are read again
+    cache.incr_mode = H5C_incr__off, cache.flash_incr_mode = H5C_flash_incr__off, cache.decr_mode = H5C_decr__off;
+    assert_true(H5Pset_mdc_config(access, &cache) >= 0);
+    const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access), quiet = H5Pcreate(H5P_DATASET_CREATE);
+    assert_true(file >= 0);
+    H5Pset_obj_track_times(quiet, false);
+    H5Pset_chunk(quiet, 1, (hsize_t[]){16});
+    for (int n = 0; n < OPERATIONS; n++) {
+        const int which = (int)(scene_uniform(&seed) * NAMES);
+        const double choice = scene_uniform(&seed);
+        char name[20];
+        snprintf(name, sizeof name, "/d%d", which);
+        if (choice < 0.02 && seed_given % 2 == 1) H5Fflush(file, H5F_SCOPE_LOCAL);
+        if (length[which] == 0) {
+            const hid_t space = H5Screate_simple(1, (hsize_t[]){0}, (hsize_t[]){H5S_UNLIMITED});
+            H5Dclose(H5Dcreate2(file, name, H5T_NATIVE_INT, space, H5P_DEFAULT, quiet, H5P_DEFAULT));
+            H5Sclose(space);
+            length[which] = 1;
+        } else if (choice < 0.25) {
+            H5Ldelete(file, name, H5P_DEFAULT);
+            length[which] = 0;
+            continue;
+        }
+        const hsize_t now = length[which], more = now + (hsize_t)(200 * scene_uniform(&seed));
+        if (now > 1) check_series(file, name, which, now);
+        const hid_t d = H5Dopen2(file, name, H5P_DEFAULT);
+        int *x = calloc(more, sizeof *x);
+        for (hsize_t i = 0; i < more; i++) x[i] = which + (int)i;
+        assert_true(H5Dset_extent(d, &more) >= 0 && H5Dwrite(d, H5T_NATIVE_INT, H5S_ALL, H5S_ALL, H5P_DEFAULT, x) >= 0);
+        length[which] = more;
+        free(x);
+        H5Dclose(d);
+    }
+    for (int k = 0; k < NAMES && seed_given % 2 == 0; k++) { // the file becomes short: much of what waits lies beyond its end
+        char name[20];
+        snprintf(name, sizeof name, "/d%d", k);
+        if (length[k] > 0) H5Ldelete(file, name, H5P_DEFAULT);
+        length[k] = 0;
+    }
+    H5Pclose(quiet);
+    assert_true(H5Fclose(file) >= 0);
+}
+
+// Red: what waits not seen by a read, written over data that took its place, or written beyond the end of the file.
+static void a_file_of_many_changes_is_whole(void **state)
+{
+    (void)state;
+    char ours[] = "/tmp/bt_h5driver_XXXXXX", theirs[] = "/tmp/bt_h5driver_XXXXXX";
+    close(mkstemp(ours));
+    close(mkstemp(theirs));
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        int errnum = 0;
+        hsize_t length[NAMES] = {0}, other[NAMES] = {0};
+        const hid_t access = H5Pcreate(H5P_FILE_ACCESS), plain = H5Pcreate(H5P_FILE_ACCESS);
+        assert_true(bt_h5driver_select(access, &errnum) >= 0);
+        shuffle(access, ours, seed, length);
+        shuffle(plain, theirs, seed, other);
+        assert_int_equal(errnum, 0);
+        H5Pclose(access);
+        H5Pclose(plain);
+        assert_memory_equal(length, other, sizeof length);
+        struct stat a, b;
+        assert_true(stat(ours, &a) == 0 && stat(theirs, &b) == 0);
+        assert_int_equal(a.st_size, b.st_size); // as long as with the library's own driver
+        const hid_t file = H5Fopen(ours, H5F_ACC_RDONLY, H5P_DEFAULT);
+        for (int k = 0; k < NAMES; k++) {
+            char name[20];
+            snprintf(name, sizeof name, "/d%d", k);
+            assert_int_equal(H5Lexists(file, name, H5P_DEFAULT) > 0, length[k] > 0);
+            if (length[k] > 1) check_series(file, name, k, length[k]);
+        }
+        H5Fclose(file);
+    }
+    unlink(ours);
+    unlink(theirs);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows), cmocka_unit_test(a_file_of_many_changes_is_whole)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
