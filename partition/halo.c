@@ -222,7 +222,7 @@ void bt_domain_select(bt_world *w)
     bt_domain *d = w->domain;
     if (!d) return;
     const bt_tiles *t = w->tiles;
-    memset(d->touched, 0, (size_t)w->bodies.n);
+    if (w->bodies.n > 0) memset(d->touched, 0, (size_t)w->bodies.n); // a rank that owns nothing has no array
     for (bt_idx i = 0; i < t->n_order; i++) {
         const bt_tile *tile = &t->tile[t->order[i]];
         if (!tile->border) continue;
