@@ -49,7 +49,8 @@ def _weibull(x):
     top = logs.max()
     def equation(c):
         w = np.exp(c * (logs - top))
-        return np.dot(w, logs) / w.sum() - 1 / c - logs.mean()
+        # Not np.dot: the order in which BLAS adds depends on where in memory the numbers lie, and in one run of forty the last digits differed.
+        return np.sum(w * logs) / w.sum() - 1 / c - logs.mean()
     high = 1.0
     while equation(high) < 0:
         high *= 2
@@ -73,7 +74,7 @@ def gev_moments(x):
     """(location, scale, shape) by L-moments [Hosking, Wallis & Wood 1985, Technometrics 27]: the start of the likelihood's search."""
     x = np.sort(x)
     n, i = len(x), np.arange(len(x))
-    b0, b1, b2 = x.mean(), np.dot(i, x) / (n * (n - 1)), np.dot(i * (i - 1), x) / (n * (n - 1) * (n - 2))
+    b0, b1, b2 = x.mean(), np.sum(i * x) / (n * (n - 1)), np.sum(i * (i - 1) * x) / (n * (n - 1) * (n - 2))
     c = (2 * b1 - b0) / (3 * b2 - b0) - np.log(2) / np.log(3)
     k = np.clip(7.8590 * c + 2.9554 * c * c, -0.6, 0.9)  # k = -shape
     k = k if abs(k) > 1e-6 else 1e-6
@@ -122,7 +123,7 @@ def anderson_darling(x, cdf):
     """A² = -n - sum (2i - 1)/n (ln u_i + ln(1 - u_{n+1-i})) of sorted u = F(x)."""
     u = np.clip(np.sort(cdf(x)), 1e-300, 1 - 1e-16)
     n = len(u)
-    return -n - np.dot(2 * np.arange(1, n + 1) - 1, np.log(u) + np.log1p(-u[::-1])) / n
+    return -n - np.sum((2 * np.arange(1, n + 1) - 1) * (np.log(u) + np.log1p(-u[::-1]))) / n
 
 
 def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):

@@ -54,8 +54,8 @@ def variance_of_mean(d):
     while True:
         n = len(d)
         last = min(n // 2, MAX_LAG)
-        if n < MIN_CORRELATED or not np.dot(d, d) > 0:
-            return np.dot(d, d) / n / max(n - 1, 1), max(n - 1, 1)
+        if n < MIN_CORRELATED or not np.sum(d * d) > 0:
+            return np.sum(d * d) / n / max(n - 1, 1), max(n - 1, 1)
         g = autocovariance(d, last)
         lags = np.arange(1, last + 1)
         c = g[0] + 2 * np.cumsum(g[1:])
@@ -76,7 +76,7 @@ def series_mean(x):
     if np.ptp(x) == 0:
         return SeriesMean(x[0], 0.0, 0.0, 0.5, float(n), n - 1.0, n)
     d = x - x.mean()
-    sd = np.sqrt(np.dot(d, d) / (n - 1))
+    sd = np.sqrt(np.sum(d * d) / (n - 1))
     variance, dof = variance_of_mean(d)
     tau = n * variance / (2 * sd * sd)
     return SeriesMean(x.mean(), sd, np.sqrt(variance), tau, n / (2 * tau), dof, n)
