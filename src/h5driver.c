@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// An HDF5 file driver that keeps the system's first error and never fails a write.
+// An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
 //
 // When a write fails (full disk, quota, file size limit) HDF5 1.10 cannot close the file any more: H5Fclose frees what
 // the file's identifier still points to, and the library's exit handler then crashes, in MPI_Finalize too. So this driver
@@ -10,9 +10,10 @@
 // Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes them in any order, and
 // what a file under way announces may then not be there yet: a reader at that moment, or a kill, found rows of zeros. At the end of a flush
 // come, each run of bytes in one call: the superblock, which must know the length of the file; what is new; old nodes of indices from the
-// lowest address to the highest (a root stays where it was made, and must know the new half of a node before that node gives it up); at last the rest from the highest
-// to the lowest (headers lead to all others). So after each write a dataset has the length of this flush or of the last, and all of its
-// rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those here are of one row (h5util.h).
+// lowest address to the highest (a root stays where it was made, and must know the new half of a node before that node gives it up); at last the
+// rest from the highest to the lowest (headers lead to all others). So after each write a dataset has the length of this flush or of
+// the last, and all of its rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those here
+// are of one row (h5util.h).
 //
 // It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX driver does, and that one reads
 // the files.
@@ -194,7 +195,7 @@ static void put_superblock(driver_file *f)
     const size_t k = page_from(f, f->super);
     if (k == f->n_pages || f->pages[k]->at > f->super || !waits(f->pages[k], (size_t)(f->super - f->pages[k]->at))) return;
     struct stat st;
-    if (!*f->errnum && (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eof && ftruncate(f->fd, (off_t)f->eof) != 0))) *f->errnum = errno;
+    if (!*f->errnum && (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && ftruncate(f->fd, (off_t)f->eoa) != 0))) *f->errnum = errno;
     put_run(f, f->super, f->super_end);
     forget(f, f->super, f->super_end);
 }

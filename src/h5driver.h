@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// An HDF5 file driver that keeps the system's first error and never fails a write.
+// An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
 #ifndef BT_H5DRIVER_H
 #define BT_H5DRIVER_H
 
