@@ -70,8 +70,8 @@ void bt_solver_project(bt_world *w)
     s->shifted = t.most > slop;
     if (!s->shifted) return;
 
-    if (w->bodies.n > s->cap_bodies) {
-        s->cap_bodies = w->bodies.n;
+    if (!s->shift || w->bodies.n > s->cap_bodies) { // a rank may own nothing
+        s->cap_bodies = w->bodies.n > 0 ? w->bodies.n : 1;
         free(s->shift);
         s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
     }
