@@ -107,7 +107,8 @@ static strips cut_strips(const bt_world *w)
     const bt_tiles *t = w->tiles;
     // Across a periodic x the first column of a later phase would come before the last of an earlier one.
     strips s = {.along_x = t->wrap_x == 0 && t->n_x > t->n_y};
-    s.ring = !w->domain && !s.along_x && t->wrap_y > 1;
+    // Without floes there are no tiles to go round, only a count of them that may be huge.
+    s.ring = !w->domain && !s.along_x && t->wrap_y > 1 && t->n_y == t->wrap_y;
     const int32_t low = s.along_x ? t->low_x : t->low_y, n = s.along_x ? t->n_x : t->n_y;
     s.low = low - (low & 1);
     s.n_pairs = s.ring ? t->wrap_y / 2 : (low + n - s.low + 1) / 2 + 2;
