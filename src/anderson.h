@@ -37,13 +37,6 @@
 enum { BT_ANDERSON_EVERY = 3, BT_ANDERSON_EVERY_FAR = 6 }; ///< sweeps from one that is recorded to the next; in large fields
 #define BT_ANDERSON_DEPTH 4 // 6 to 16 need fewer sweeps on smooth problems, but stall on sticking and slipping heavy chains
 
-// History of a tile: f and g of the iteration before, [n_units][3]; velocities before, [n_bodies][4] as bt_vel. Columns in single
-// precision: they only point the way, each iterate is swept again, and velocities are formed anew from the impulses at the end.
-enum {
-    BT_ANDERSON_UNIT_BYTES = 3 * (2 * sizeof(double) + 2 * BT_ANDERSON_DEPTH * sizeof(float)),
-    BT_ANDERSON_BODY_BYTES = 4 * (sizeof(double) + BT_ANDERSON_DEPTH * sizeof(float)),
-};
-
 /// One scalar unknown with its history: a branch of the tow line.
 typedef struct bt_anderson_scalar {
     double f_before, g_before, df[BT_ANDERSON_DEPTH], dg[BT_ANDERSON_DEPTH];
