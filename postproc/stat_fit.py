@@ -49,7 +49,6 @@ def _weibull(x):
     top = logs.max()
     def equation(c):
         w = np.exp(c * (logs - top))
-        # Not np.dot: the order in which BLAS adds depends on where in memory the numbers lie, and in one run of forty the last digits differed.
         return np.sum(w * logs) / w.sum() - 1 / c - logs.mean()
     high = 1.0
     while equation(high) < 0:
@@ -123,7 +122,7 @@ def anderson_darling(x, cdf):
     """A² = -n - sum (2i - 1)/n (ln u_i + ln(1 - u_{n+1-i})) of sorted u = F(x)."""
     u = np.clip(np.sort(cdf(x)), 1e-300, 1 - 1e-16)
     n = len(u)
-    return -n - np.sum((2 * np.arange(1, n + 1) - 1) * (np.log(u) + np.log1p(-u[::-1]))) / n
+    return -n - np.sum((2 * np.arange(1, n + 1) - 1) * (np.log(u) + np.log1p(-u)[::-1])) / n
 
 
 def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
@@ -143,7 +142,9 @@ def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
 def fit(name, x, resamples=RESAMPLES):
     """Fit of one distribution to independent values x; one with `refused` where it makes no sense."""
     make, k, positive = DISTRIBUTIONS[name]
-    x, n = np.asarray(x, dtype=float), len(x)
+    # Contiguous: of a view with strides numpy takes the range to end one stride after the last number. Where the result happens to lie there, it sees an
+    # overlap and calls the scalar log instead of the vector one, whose last bits are others: one run of forty then differed.
+    x, n = np.ascontiguousarray(x, dtype=float), len(x)
     why = (f"{n} values, needs {LEAST}" if n < LEAST else "all values are the same" if np.ptp(x) == 0
            else f"{np.sum(x <= 0)} values are not positive" if positive and x.min() <= 0 else "")
     if why:
