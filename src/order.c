@@ -1,43 +1,40 @@
 // SPDX-License-Identifier: MIT
-// Order of a pass: hem by phases, inner tiles in strips; reasons in order.h.
+// Order of a pass: levels of rows, bands of threads, hem of ranks; reasons in order.h.
 #include "order.h"
 
+#include <assert.h>
 #include <omp.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bergtow/tow.h"
+#include "phases.h"
 
 #define AHEAD 2   // tiles: what a sweep asks memory for in advance
 
-/// Least tiles of a strip in a field of so many units. Several threads share the tiles of one phase, and wait for each other after it. One thread goes
-/// through a large field fastest in strips as narrow as they may be: six sweeps that follow each other then find most of their tiles in the
-/// second-level cache. In a small one, where all is there anyway, jumping between colours costs 4 %.
-static bt_idx least_tiles(int64_t n_units)
+/// Threads that so many units feed.
+static bt_idx count_bands(const bt_world *w, int64_t n_units, bt_idx n_rows)
+{
+    if (w->domain || !BT_MANY(n_units, BT_FEW_UNITS)) return 1;
+    const bt_idx threads = omp_get_max_threads(), most = n_rows / 2; // a row at a border waits for the next band
+    return threads < most ? threads : most > 1 ? most : 1;
+}
+
+/// Least tiles of a level. A large field is swept fastest in levels as low as they may be: six sweeps that follow each other then find most of their
+/// tiles in the second-level cache. In a small one, where all is there anyway, jumping between colours costs 4 %. Threads of a rank among others
+/// share the tiles of one phase, and wait for each other after it.
+static bt_idx least_tiles(const bt_world *w, int64_t n_units, bt_idx n_bands)
 {
 #ifdef BT_VALIDATE
-    (void)n_units;
-    return 8; // so that small cases have strips too
+    (void)w, (void)n_units, (void)n_bands;
+    return 8; // so that small cases have levels too
 #else
     enum { LARGE = 20000, THICK = 256, THREAD = 32 };
-    const bt_idx threads = omp_get_max_threads();
-    return threads > 1 ? THREAD * threads : n_units < LARGE ? THICK : 1;
+    if (w->domain && omp_get_max_threads() > 1) return THREAD * omp_get_max_threads();
+    return n_units < (int64_t)LARGE * n_bands ? THICK : 1;
 #endif
 }
-
-/// What sorts a tile: hem or strip, then phase; in the hem those at the border first.
-typedef struct {
-    bt_idx group, tile;
-} place;
-
-static int by_group(const void *a, const void *b)
-{
-    const place *p = a, *q = b;
-    if (p->group != q->group) return (p->group > q->group) - (p->group < q->group);
-    return (p->tile > q->tile) - (p->tile < q->tile);
-}
-
-enum { HEM_GROUPS = 2 * BT_COLOURS };
 
 void bt_order_measure(bt_tiles *t)
 {
@@ -61,81 +58,162 @@ static bool has_work(const bt_world *w, bt_idx k)
     return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
-/// Strips: which way they are stacked, and to which of them each pair of rows (or columns) belongs.
+/// Rows of tiles, across the longer side of the field.
 typedef struct {
     bool along_x, ring;
-    int32_t low;    ///< even
-    bt_idx *of;     ///< [n_pairs]
-    bt_idx *first;  ///< [n] its first pair
-    bt_idx n_pairs, n, large;
-} strips;
+    bt_idx n;
+    int32_t low;
+    int64_t *units; ///< [n] in tiles of this rank
+    bt_idx *tiles;  ///< [n] with work
+    bt_idx *level;  ///< [n]
+    bt_idx *away;   ///< [n] rows to the nearest where the levels are least
+    bt_idx *band;   ///< [n]
+    bt_idx n_bands, n_levels;
+    bt_idx large;   ///< a row of the level that holds all floes of the tile of the large bodies
+} rows;
 
-static bt_idx pair_of(const strips *s, const bt_tile *tile)
-{
-    const int32_t skew = s->along_x ? tile->phase : tile->phase >> 1, u = s->along_x ? tile->x : tile->y;
-    const bt_idx pair = (u + skew - s->low) / 2;
-    if (s->ring) return pair % s->n_pairs; // the last row, odd, is the lowest of strip 0
-    return pair < s->n_pairs ? pair : s->n_pairs - 1;
-}
+static bt_idx row_of(const rows *r, const int32_t at[2]) { return at[r->along_x ? 0 : 1] - r->low; }
 
-/// Pairs of rows of all tiles that meet floes of the tile of the large bodies, first and last; none when it has no contacts.
-static void span_of_large(const bt_world *w, const strips *s, bt_idx joint[2])
+static bt_idx row_of_tile(const rows *r, const bt_tile *tile) { return row_of(r, (const int32_t[2]){tile->x, tile->y}); }
+
+/// What is to be done in each row; true in met[row] where its tiles may share a floe with that of the large bodies.
+static int64_t count_rows(const bt_world *w, rows *r, bool *met)
 {
-    const bt_tile *large = &w->tiles->tile[w->tiles->n - 1];
-    const bt_bodies *b = &w->bodies;
-    int32_t low = INT32_MAX, high = INT32_MIN;
+    const bt_tiles *t = w->tiles;
+    int64_t n_units = 0;
+    for (bt_idx k = 0; k < t->n - 1; k++) {
+        const bt_tile *tile = &t->tile[k];
+        if (!has_work(w, k)) continue;
+        const bt_idx u = row_of_tile(r, tile);
+        r->tiles[u]++;
+        r->units[u] += tile->n_units;
+        n_units += tile->n_units;
+    }
+    const bt_tile *large = &t->tile[t->n - 1];
     for (bt_idx j = 0; j < large->n_units; j++) {
         const bt_idx ends[2] = {large->units[j].a, large->units[j].b};
         for (int e = 0; e < 2; e++) {
-            if (b->large[ends[e]]) continue;
-            const int32_t u = b->tile[ends[e]][s->along_x ? 0 : 1];
-            low = u < low ? u : low;
-            high = u > high ? u : high;
+            if (w->bodies.large[ends[e]]) continue;
+            const bt_idx u = row_of(r, w->bodies.tile[ends[e]]);
+            met[u] = true;
+            if (u > 0 || r->ring) met[(u + r->n - 1) % r->n] = true;
         }
     }
-    joint[0] = 0, joint[1] = -1;
-    if (low > high) return;
-    // Tiles low − 1 to high, each up to three columns farther by its skew; below them one row that may be a seam.
-    const bt_idx first = (low - 2 - s->low) / 2, last = (high + 3 - s->low) / 2;
-    const bool across = s->ring && (low < 3 || last >= s->n_pairs);
-    joint[0] = across || first < 0 ? 0 : first;
-    joint[1] = across || last >= s->n_pairs ? s->n_pairs - 1 : last;
+    return n_units;
 }
 
-static strips cut_strips(const bt_world *w)
+/// Rows that must have one level with the row after them: all from the first to the last that was met; on a ring, all but the widest gap.
+static void join_met(rows *r, const bool *met, bool *joined)
+{
+    bt_idx first = -1, last = -1, gap_end = -1, widest = 0;
+    for (bt_idx u = 0; u < r->n; u++) {
+        if (!met[u]) continue;
+        if (first < 0) first = u;
+        else if (u - last > widest) widest = u - last, gap_end = u;
+        last = u;
+    }
+    if (first < 0) return;
+    if (r->ring && first + r->n - last < widest) first = gap_end, last = gap_end - widest + r->n;
+    for (bt_idx u = first; u < last; u++) joined[u % r->n] = true;
+    r->large = first;
+}
+
+static void deal_bands(rows *r, int64_t n_units)
+{
+    int64_t before = 0;
+    for (bt_idx u = 0; u < r->n; u++) {
+        r->band[u] = n_units > 0 ? (bt_idx)((before + r->units[u] / 2) * r->n_bands / n_units) : 0;
+        if (r->band[u] >= r->n_bands) r->band[u] = r->n_bands - 1;
+        before += r->units[u];
+    }
+}
+
+/// Distances from the nearest zero, when it is cut[u] (1 if NULL) from row u to the next.
+static void relax(const rows *r, const bool *cut, bt_idx *distance)
+{
+    for (int round = 0; round <= r->ring; round++) {
+        for (bt_idx u = r->ring ? 0 : 1; u < r->n; u++) {
+            const bt_idx before = (u + r->n - 1) % r->n, there = distance[before] + (cut ? cut[before] : 1);
+            if (there < distance[u]) distance[u] = there;
+        }
+        for (bt_idx u = r->n - 1 - !r->ring; u >= 0; u--) {
+            const bt_idx there = distance[(u + 1) % r->n] + (cut ? cut[u] : 1);
+            if (there < distance[u]) distance[u] = there;
+        }
+    }
+}
+
+/// Levels that are least at every other border of bands.
+static void set_levels(rows *r, const bool *joined, bt_idx least)
+{
+    bool *cut = bt_alloc((size_t)r->n, sizeof *cut);
+    bt_idx filled = 0;
+    for (bt_idx u = 0; u < r->n; u++) {
+        filled += r->tiles[u];
+        cut[u] = filled >= least && !joined[u];
+        if (cut[u]) filled = 0;
+        const bool low = u == 0 ? r->n_bands == 1 : r->band[u] != r->band[u - 1] && r->band[u] % 2 == 1;
+        const bool top = u == r->n - 1 && r->n_bands > 1 && r->n_bands % 2 == 1;
+        r->level[u] = low || top ? 0 : r->n;
+        if (low && u > 0) r->level[u - 1] = 0;
+    }
+    memcpy(r->away, r->level, (size_t)r->n * sizeof *r->away);
+    relax(r, NULL, r->away);
+    relax(r, cut, r->level);
+    for (bt_idx u = 0; u < r->n; u++) r->n_levels = r->level[u] >= r->n_levels ? r->level[u] + 1 : r->n_levels;
+    free(cut);
+}
+
+static rows make_rows(const bt_world *w)
 {
     const bt_tiles *t = w->tiles;
-    // Across a periodic x the first column of a later phase would come before the last of an earlier one.
-    strips s = {.along_x = t->wrap_x == 0 && t->n_x > t->n_y};
-    // Without floes there are no tiles to go round, only a count of them that may be huge.
-    s.ring = !w->domain && !s.along_x && t->wrap_y > 1 && t->n_y == t->wrap_y;
-    const int32_t low = s.along_x ? t->low_x : t->low_y, n = s.along_x ? t->n_x : t->n_y;
-    s.low = low - (low & 1);
-    s.n_pairs = s.ring ? t->wrap_y / 2 : (low + n - s.low + 1) / 2 + 2;
-    bt_idx *count = bt_alloc((size_t)s.n_pairs, sizeof *count), filled = 0, joint[2];
-    s.of = bt_alloc((size_t)s.n_pairs, sizeof *s.of);
-    s.first = bt_alloc((size_t)s.n_pairs, sizeof *s.first);
-    int64_t n_units = 0;
-    for (bt_idx k = 0; k < t->n - 1; k++) {
-        if (!t->tile[k].own || t->tile[k].n_units == 0) continue;
-        count[pair_of(&s, &t->tile[k])]++;
-        n_units += t->tile[k].n_units;
-    }
-    span_of_large(w, &s, joint);
-    const bt_idx least = least_tiles(n_units), width = s.along_x ? 2 : 1; // pairs, see order.h
-    for (bt_idx p = 0; p < s.n_pairs; p++) {
-        if (filled >= least && p - s.first[s.n] >= width && !(joint[0] < p && p <= joint[1])) {
-            s.first[++s.n] = p;
-            filled = 0;
-        }
-        s.of[p] = s.n;
-        filled += count[p];
-    }
-    s.large = has_work(w, t->n - 1) ? s.of[joint[1] > 0 ? joint[1] : 0] : -1;
-    s.n++;
-    free(count);
-    return s;
+    rows r = {.along_x = t->n_x > t->n_y};
+    const int32_t wrap = r.along_x ? t->wrap_x : t->wrap_y, n = r.along_x ? t->n_x : t->n_y;
+    r.low = r.along_x ? t->low_x : t->low_y;
+    r.n = n > 0 ? n : 1;
+    r.ring = wrap > 1 && n == wrap;
+    bt_idx **each[] = {&r.tiles, &r.level, &r.away, &r.band};
+    for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_alloc((size_t)r.n, sizeof **each[i]);
+    r.units = bt_alloc((size_t)r.n, sizeof *r.units);
+    bool *met = bt_alloc((size_t)r.n, sizeof *met), *joined = bt_alloc((size_t)r.n, sizeof *joined);
+    const int64_t n_units = count_rows(w, &r, met);
+    join_met(&r, met, joined);
+    r.n_bands = count_bands(w, n_units, r.n);
+    deal_bands(&r, n_units);
+    set_levels(&r, joined, least_tiles(w, n_units, r.n_bands));
+    free(met);
+    free(joined);
+    return r;
 }
+
+static void free_rows(rows *r)
+{
+    void *arrays[] = {r->units, r->tiles, r->level, r->away, r->band};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+}
+
+static bt_idx step_of(const bt_world *w, const rows *r, bt_idx k)
+{
+    const bt_tile *tile = &w->tiles->tile[k];
+    return r->level[k == w->tiles->n - 1 ? r->large : row_of_tile(r, tile)] + tile->phase;
+}
+
+static bt_idx band_of(const bt_world *w, const rows *r, bt_idx k) { return r->band[k == w->tiles->n - 1 ? r->large : row_of_tile(r, &w->tiles->tile[k])]; }
+
+/// Stable: out[] holds in[] by rising key[tile] < n_keys; start[n_keys + 1], if any, where each key begins.
+static void sort_by(bt_idx n, const bt_idx *in, const bt_idx *key, bt_idx n_keys, bt_idx *out, bt_idx *start)
+{
+    bt_idx *at = bt_alloc((size_t)n_keys + 1, sizeof *at);
+    for (bt_idx i = 0; i < n; i++) at[key[in[i]] + 1]++;
+    for (bt_idx g = 0; g < n_keys; g++) at[g + 1] += at[g];
+    if (start) memcpy(start, at, ((size_t)n_keys + 1) * sizeof *start);
+    for (bt_idx i = 0; i < n; i++) out[at[key[in[i]]]++] = in[i];
+    free(at);
+}
+
+enum { HEM_GROUPS = 2 * BT_COLOURS };
+
+// --- among ranks -----------------------------------------------------------------------------------------------------
 
 static void add_run(bt_tiles *t, bt_idx begin, bt_idx end, int send, int receive)
 {
@@ -147,80 +225,151 @@ static void add_run(bt_tiles *t, bt_idx begin, bt_idx end, int send, int receive
     t->run[t->n_runs++] = (bt_run_of_tiles){begin, end, (int8_t)send, (int8_t)receive};
 }
 
-/// Group of a tile among ranks: the hem by phases, then the strips.
-static bt_idx group_among_ranks(const strips *s, const bt_tile *tile)
+/// Group of a tile among ranks: the hem by phases, then by steps, then the large bodies.
+static bt_idx group_of(const bt_world *w, const rows *r, bt_idx k, bt_idx last)
 {
+    const bt_tile *tile = &w->tiles->tile[k];
+    if (k == w->tiles->n - 1) return last;
     const bool hem = tile->depth <= BT_COLOURS - 1 - tile->phase;
-    return hem ? 2 * tile->phase + !tile->border : HEM_GROUPS + BT_COLOURS * s->of[pair_of(s, tile)] + tile->phase;
+    return hem ? 2 * tile->phase + !tile->border : HEM_GROUPS + BT_COLOURS * step_of(w, r, k) + tile->phase;
 }
 
-static void list_runs(bt_tiles *t, const place *p, bt_idx last)
+static void list_runs(bt_tiles *t, const bt_idx *start, bt_idx last)
 {
     t->n_runs = 0;
-    bt_idx begin = 0;
     for (bt_idx group = 0; group <= last; group++) {
-        bt_idx end = begin;
-        while (end < t->n_order && p[end].group == group) end++;
         const bool hem = group < HEM_GROUPS;
         int send = hem && group % 2 == 0 ? group / 2 : -1, receive = hem && group % 2 == 1 && group / 2 < BT_COLOURS - 1 ? group / 2 : -1;
         if (group == last - 1) receive = BT_COLOURS - 1;
         if (group == last) send = receive = BT_COLOURS;
-        add_run(t, begin, end, send, receive);
-        begin = end;
+        add_run(t, start[group], start[group + 1], send, receive);
     }
 }
 
-/// Group of a tile on one rank: strip, phase, seam first.
-static bt_idx group_alone(const strips *s, const bt_tile *tile)
-{
-    const bt_idx pair = pair_of(s, tile), strip = s->of[pair];
-    const bool seam = tile->phase >= BT_COLOURS / 2 && pair == s->first[strip];
-    return 2 * (BT_COLOURS * strip + tile->phase) + !seam;
-}
+// --- on one rank -----------------------------------------------------------------------------------------------------
 
-static void list_strips(bt_tiles *t, const strips *s, const place *p)
+/// near[k]: tile k may share a floe with the tile of the large bodies.
+static void mark_near_large(const bt_world *w, bool *near)
 {
-    if (s->n > t->cap_strips) {
-        t->cap_strips = 2 * s->n;
-        t->strip = bt_realloc(t->strip, (size_t)t->cap_strips, sizeof *t->strip);
-    }
-    t->n_strips = s->n;
-    t->large_after = s->large;
-    t->ring = s->ring;
-    bt_idx at = 0;
-    for (bt_idx k = 0; k < s->n; k++)
-        for (bt_idx c = 0; c < BT_COLOURS; c++) {
-            bt_strip *strip = &t->strip[k];
-            const bt_idx group = 2 * (BT_COLOURS * k + c);
-            strip->begin[c] = at;
-            while (at < t->n_order && p[at].group == group) at++;
-            strip->seam[c] = at;
-            while (at < t->n_order && p[at].group == group + 1) at++;
-            strip->end[c] = at;
+    const bt_tiles *t = w->tiles;
+    const bt_tile *large = &t->tile[t->n - 1];
+    for (bt_idx j = 0; j < large->n_units; j++) {
+        const bt_idx ends[2] = {large->units[j].a, large->units[j].b};
+        for (int e = 0; e < 2; e++) {
+            if (w->bodies.large[ends[e]]) continue;
+            const int32_t *at = w->bodies.tile[ends[e]];
+            for (int c = 0; c < BT_COLOURS; c++) {
+                const bt_idx k = bt_tiles_at(t, at[0] - c % 2, at[1] - c / 2);
+                if (k >= 0) near[k] = true;
+            }
         }
+    }
 }
+
+/// Tiles with work that may share a floe with tile k, itself among them; some may be there twice.
+static int list_neighbours(const bt_world *w, const bool *near, bt_idx k, bt_idx out[10])
+{
+    const bt_tiles *t = w->tiles;
+    const bt_tile *tile = &t->tile[k];
+    int n = 0;
+    for (int32_t dy = -1; dy <= 1; dy++)
+        for (int32_t dx = -1; dx <= 1; dx++) {
+            const bt_idx l = bt_tiles_at(t, tile->x + dx, tile->y + dy);
+            if (l >= 0 && has_work(w, l)) out[n++] = l;
+        }
+    if (near[k] && has_work(w, t->n - 1)) out[n++] = t->n - 1;
+    return n;
+}
+
+/// Make knots of all tiles that share a floe with one of another band, and tie them to each other. band[tile].
+static void tie_knots(const bt_world *w, const bt_idx *band)
+{
+    bt_tiles *t = w->tiles;
+    bt_bands *b = &t->bands;
+    b->n_knots = 0;
+    b->passes = 0;
+    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].knot = -1;
+    if (b->n == 1) return;
+    const bt_idx large = t->n - 1;
+    bool *near = bt_alloc((size_t)t->n, sizeof *near);
+    mark_near_large(w, near);
+    bt_idx n_ties = 0, beside[10];
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_idx k = t->order[i];
+        if (k == large) continue;
+        const int n = list_neighbours(w, near, k, beside);
+        for (int j = 0; j < n; j++) {
+            if (band[beside[j]] == band[k]) continue;
+            if (t->tile[k].knot < 0) t->tile[k].knot = b->n_knots++;
+            if (beside[j] != large) {
+                n_ties++;
+                continue;
+            }
+            if (t->tile[large].knot < 0) t->tile[large].knot = b->n_knots++;
+            n_ties += 2;
+        }
+    }
+    free(b->knot);
+    b->knot = bt_alloc_aligned((size_t)b->n_knots, sizeof *b->knot);
+    b->other = bt_realloc(b->other, (size_t)n_ties, sizeof *b->other);
+    bt_idx at = 0;
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_idx k = t->order[i];
+        if (t->tile[k].knot < 0) continue;
+        bt_knot *knot = &b->knot[t->tile[k].knot];
+        knot->phase = t->tile[k].phase;
+        knot->begin = at;
+        if (k == large) {
+            for (bt_idx l = 0; l < large; l++)
+                if (near[l] && has_work(w, l) && band[l] != band[k]) b->other[at++] = t->tile[l].knot;
+        } else {
+            const int n = list_neighbours(w, near, k, beside);
+            for (int j = 0; j < n; j++)
+                if (band[beside[j]] != band[k]) b->other[at++] = t->tile[beside[j]].knot;
+        }
+        knot->end = at;
+    }
+    assert(at == n_ties);
+    free(near);
+}
+
+// ---------------------------------------------------------------------------------------------------------------------
 
 void bt_order_tiles(bt_world *w)
 {
     bt_tiles *t = w->tiles;
-    strips s = cut_strips(w);
-    place *p = bt_alloc((size_t)t->n, sizeof *p);
-    const bt_idx last = w->domain ? HEM_GROUPS + BT_COLOURS * s.n : 2 * BT_COLOURS * s.n;
+    bt_bands *b = &t->bands;
+    rows r = make_rows(w);
+    b->n = r.n_bands;
+    b->n_steps = r.n_levels + BT_PHASES - 1;
+    const bt_idx last = HEM_GROUPS + BT_COLOURS * b->n_steps, n_keys = w->domain ? last + 1 : b->n * b->n_steps * BT_PHASES;
+    bt_idx *list = bt_alloc((size_t)t->n, sizeof *list), *by_row = bt_alloc((size_t)t->n, sizeof *by_row);
+    bt_idx *key = bt_alloc((size_t)t->n, sizeof *key), *band = bt_alloc((size_t)t->n, sizeof *band);
+    for (bt_idx k = 0; k < t->n; k++) list[k] = k, band[k] = band_of(w, &r, k);
+    b->member = bt_realloc(b->member, (size_t)t->n, sizeof *b->member);
+    b->first = bt_realloc(b->first, (size_t)b->n + 1, sizeof *b->first);
+    sort_by(t->n, list, band, b->n, b->member, b->first);
     t->n_units = t->n_order = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        const bt_tile *tile = &t->tile[k];
         if (!has_work(w, k)) continue;
-        t->n_units += tile->n_units;
-        p[t->n_order++] = (place){k == t->n - 1 ? last : w->domain ? group_among_ranks(&s, tile) : group_alone(&s, tile), k};
+        t->n_units += t->tile[k].n_units;
+        list[t->n_order++] = k;
+        key[k] = k < t->n - 1 ? r.away[row_of_tile(&r, &t->tile[k])] : 0;
     }
-    qsort(p, (size_t)t->n_order, sizeof *p, by_group);
-    if (w->domain) list_runs(t, p, last);
-    else list_strips(t, &s, p);
+    // In each step a thread begins at the border that the next band looks at.
+    sort_by(t->n_order, list, key, r.n, by_row, NULL);
     for (bt_idx i = 0; i < t->n_order; i++) {
-        t->order[i] = p[i].tile;
-        t->tile[p[i].tile].ahead = i + AHEAD < t->n_order ? p[i + AHEAD].tile : -1;
+        const bt_idx k = list[i];
+        key[k] = w->domain ? group_of(w, &r, k, last) : (band[k] * b->n_steps + step_of(w, &r, k)) * BT_PHASES + t->tile[k].phase;
     }
-    free(s.of);
-    free(s.first);
-    free(p);
+    b->start = bt_realloc(b->start, (size_t)n_keys + 1, sizeof *b->start);
+    sort_by(t->n_order, by_row, key, n_keys, t->order, b->start);
+    if (w->domain) list_runs(t, b->start, last);
+    else tie_knots(w, band);
+    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].ahead = i + AHEAD < t->n_order ? t->order[i + AHEAD] : -1;
+    free(list);
+    free(by_row);
+    free(key);
+    free(band);
+    free_rows(&r);
 }

@@ -2,6 +2,10 @@
 // Passes over the active tiles by threads, with the exchange between ranks under way.
 #include "phases.h"
 
+#include <omp.h>
+#include <sched.h>
+#include <stdatomic.h>
+
 #include "bergtow/tiles.h"
 #include "domain.h"
 
@@ -38,76 +42,58 @@ static void run_among_ranks(bt_world *w, const bt_pass *pass, bt_vel *exchanged)
     }
 }
 
-/// Tiles of one pass that are done at the same time as those of the others.
-typedef struct {
-    bt_idx begin, end;
-    int pass;
-} piece;
-
-enum { LAG = 2 }; // strips between two passes
-
-/// Place of pass q in beat `beat`: strips of its way that it has done, −1 = it does not work now. On a ring it begins with strip LAG q, when the
-/// one before has gone LAG strips beyond that. A ring of any length will do: while pass q is on the last strip of its way, and on its seam
-/// before the first, the passes behind it are LAG strips and more from both, or have not begun.
-static bt_idx place_of(const bt_tiles *ts, int q, bt_idx beat)
+/// Wait until tile k may have its pass q of this turn.
+static void wait_for_others(const bt_bands *b, const bt_knot *knot, int q)
 {
-    const bt_idx done = beat - (ts->ring ? 2 * LAG : LAG) * q;
-    return done >= 0 && done < ts->n_strips ? done : -1;
+    enum { PATIENCE = 4000 }; // looks: as long as a tile or two; then the other thread has perhaps no core
+    for (bt_idx i = knot->begin; i < knot->end; i++) {
+        const bt_knot *other = &b->knot[b->other[i]];
+        const int64_t enough = b->passes + q + (other->phase < knot->phase);
+        for (int n = 0; atomic_load_explicit(&other->done, memory_order_acquire) < enough; n++)
+            if (n > PATIENCE) sched_yield();
+    }
 }
 
-static bt_idx strip_at(const bt_tiles *ts, int q, bt_idx done) { return ts->ring ? (LAG * q + done) % ts->n_strips : done; }
-
-/// What is done in one phase of a beat.
-static int pieces_of(const bt_tiles *ts, int n, bt_idx beat, int phase, piece out[2 * BT_MAX_TURN])
+static void visit_in_turn(bt_world *w, bt_idx k, const bt_pass *pass, int q, bt_totals *own)
 {
-    int n_pieces = 0;
-    for (int q = 0; q < n; q++) {
-        const bt_idx done = place_of(ts, q, beat);
-        if (done < 0) continue;
-        const bt_strip *s = &ts->strip[strip_at(ts, q, done)], *source = &ts->strip[strip_at(ts, q, 0)];
-        const bt_idx begin = ts->ring && done == 0 ? s->seam[phase] : s->begin[phase];
-        if (begin < s->end[phase]) out[n_pieces++] = (piece){begin, s->end[phase], q};
-        if (ts->ring && done == ts->n_strips - 1 && source->begin[phase] < source->seam[phase])
-            out[n_pieces++] = (piece){source->begin[phase], source->seam[phase], q};
-    }
-    return n_pieces;
+    bt_bands *b = &w->tiles->bands;
+    const bt_idx tied = w->tiles->tile[k].knot;
+    if (tied >= 0) wait_for_others(b, &b->knot[tied], q);
+    pass[q].visit(w, k, pass[q].context, &own[q]);
+    if (tied >= 0) atomic_store_explicit(&b->knot[tied].done, b->passes + q + 1, memory_order_release);
+}
+
+/// Bands first to last − 1, by steps.
+static void walk_bands(bt_world *w, bt_idx first, bt_idx last, const bt_pass *pass, int n, bt_totals *own)
+{
+    const bt_tiles *ts = w->tiles;
+    const bt_bands *b = &ts->bands;
+    for (bt_idx now = 0; now < b->n_steps + BT_COLOURS * (n - 1); now++)
+        for (int q = 0; q < n; q++) {
+            const bt_idx step = now - BT_COLOURS * q;
+            if (step < 0 || step >= b->n_steps) continue;
+            for (int phase = 0; phase < BT_PHASES; phase++)
+                for (bt_idx band = first; band < last; band++) {
+                    const bt_idx *start = &b->start[(band * b->n_steps + step) * BT_PHASES + phase];
+                    for (bt_idx i = start[0]; i < start[1]; i++) visit_in_turn(w, ts->order[i], pass, q, own);
+                }
+        }
 }
 
 /// Passes on one rank, one behind the other.
 static void run_alone(bt_world *w, const bt_pass *pass, int n)
 {
-    const bt_tiles *ts = w->tiles;
-    const bt_idx beats = ts->n_strips + (n - 1) * (ts->ring ? 2 * LAG : LAG);
-#pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
+    const bt_bands *b = &w->tiles->bands;
+#pragma omp parallel num_threads(b->n > 1 ? b->n : 1)
     {
+        const bt_idx team = omp_get_num_threads(), me = omp_get_thread_num(); // the team may be smaller than asked
         bt_totals own[BT_MAX_TURN];
         for (int q = 0; q < n; q++) own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
-        for (bt_idx beat = 0; beat < beats; beat++) {
-            for (int phase = 0; phase < BT_COLOURS; phase++) {
-                piece p[2 * BT_MAX_TURN];
-                const int n_pieces = pieces_of(ts, n, beat, phase, p);
-                bt_idx count = 0;
-                for (int k = 0; k < n_pieces; k++) count += p[k].end - p[k].begin;
-                if (count == 0) continue;
-#pragma omp for schedule(dynamic, 2)
-                for (bt_idx i = 0; i < count; i++) {
-                    bt_idx at = i;
-                    int k = 0;
-                    for (; at >= p[k].end - p[k].begin; k++) at -= p[k].end - p[k].begin;
-                    const bt_pass *of = &pass[p[k].pass];
-                    of->visit(w, ts->order[p[k].begin + at], of->context, &own[p[k].pass]);
-                }
-            }
-            for (int q = 0; q < n && ts->large_after >= 0; q++) {
-                const bt_idx done = place_of(ts, q, beat);
-                if (done < 0 || strip_at(ts, q, done) != ts->large_after) continue;
-#pragma omp single
-                pass[q].visit(w, ts->n - 1, pass[q].context, &own[q]);
-            }
-        }
+        walk_bands(w, me * b->n / team, (me + 1) * b->n / team, pass, n, own);
 #pragma omp critical
         for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &own[q]);
     }
+    w->tiles->bands.passes += n;
 }
 
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged)
@@ -127,12 +113,34 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
     const bt_tiles *ts = w->tiles;
-#pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
+    const bt_bands *b = &ts->bands;
+    const bool alone = !w->domain;
+#pragma omp parallel if (alone ? b->n > 1 : BT_MANY(ts->n_units, BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
+        if (alone) {
+#pragma omp for schedule(static, 1)
+            for (bt_idx band = 0; band < b->n; band++)
+                for (bt_idx i = b->start[band * b->n_steps * BT_PHASES]; i < b->start[(band + 1) * b->n_steps * BT_PHASES]; i++) visit(w, ts->order[i], context, &own);
+        } else {
 #pragma omp for schedule(dynamic, 4)
-        for (bt_idx i = 0; i < ts->n_order; i++) visit(w, ts->order[i], context, &own);
+            for (bt_idx i = 0; i < ts->n_order; i++) visit(w, ts->order[i], context, &own);
+        }
 #pragma omp critical
         bt_totals_merge(t, &own);
     }
+}
+
+void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
+{
+    const bt_tiles *ts = w->tiles;
+    const bt_bands *b = &ts->bands;
+    if (w->domain) {
+#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
+        for (bt_idx k = 0; k < ts->n; k++) visit(w, k, context, NULL);
+        return;
+    }
+#pragma omp parallel for schedule(static, 1) num_threads(b->n > 1 ? b->n : 1)
+    for (bt_idx band = 0; band < b->n; band++)
+        for (bt_idx i = b->first[band]; i < b->first[band + 1]; i++) visit(w, b->member[i], context, NULL);
 }

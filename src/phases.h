@@ -8,7 +8,7 @@
 
 enum {
     BT_MAX_TOTALS = 12,
-    BT_FEW_UNITS = 1500, ///< fewer units are swept faster by one thread: a pass has five barriers, of a microsecond or more
+    BT_FEW_UNITS = 1500, ///< fewer units are swept faster by one thread: threads have to meet, which takes some microseconds
 };
 
 /// What a pass adds up over tiles, threads and ranks: exact sums, and one maximum.
@@ -41,7 +41,10 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 /// n passes in turn, with the results of n calls of bt_phases_run; on one rank they follow each other through the field (order.h). Collective.
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged);
 
-/// Visit the tiles in any order, all at once.
+/// Visit the tiles with work in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
+
+/// Visit all tiles, also those without contacts and of other ranks, for the sake of their bodies, in any order; no totals (NULL).
+void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
 
 #endif

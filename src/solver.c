@@ -128,22 +128,23 @@ double bt_solver_residual(bt_world *w, double *rms)
     return residual_of(w, &t, rms);
 }
 
+static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context, (void)t;
+    const bt_tile *tile = &w->tiles->tile[k];
+    bt_bodies *b = &w->bodies;
+    if (k == w->tiles->n - 1 || w->tiles->awake[k]) memcpy(b->vel + tile->first, b->vel_free + tile->first, (size_t)(tile->end - tile->first) * sizeof *b->vel);
+}
+
 /// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up, and their residual. True when some
 /// impulse on this rank is not zero.
 static bool velocities_from_impulses(bt_world *w, bool warm)
 {
-    const bt_tiles *ts = w->tiles;
-    bt_bodies *b = &w->bodies;
-#pragma omp parallel for schedule(static) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
-    for (bt_idx k = 0; k < ts->n; k++) {
-        const bt_tile *tile = &ts->tile[k];
-        if (k < ts->n - 1 && !ts->awake[k]) continue;
-        memcpy(b->vel + tile->first, b->vel_free + tile->first, (size_t)(tile->end - tile->first) * sizeof *b->vel);
-    }
+    bt_phases_everywhere(w, free_velocities, NULL);
     const double scale = scale_of_squares(w);
     bt_totals applied = {0}, left = {.n_sums = 2};
     const bt_pass pass[2] = {{apply_impulses, &warm, &applied, false}, {add_residual, &scale, &left, true}};
-    bt_phases_turn(w, pass, 2, b->vel);
+    bt_phases_turn(w, pass, 2, w->bodies.vel);
     w->stats.residual = residual_of(w, &left, &w->stats.residual_rms);
     return applied.most > 0;
 }
@@ -235,17 +236,26 @@ static void reserve_history(bt_world *w)
         if (ts->awake[k] || ts->tile[k].n_units > 0 || k == ts->n - 1) bt_anderson_reserve(&ts->tile[k], ts->tile[k].n_units > 0);
 }
 
+typedef struct {
+    const bt_anderson *a;
+    bt_anderson_verdict verdict;
+} bodies_order;
+
+static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)t;
+    const bodies_order *o = context;
+    bt_tile *tile = &w->tiles->tile[k];
+    if (k < w->tiles->n - 1 ? w->tiles->awake[k] : tile->own) bt_anderson_move_bodies(o->a, o->verdict, tile, w->bodies.vel);
+}
+
 /// Move the velocities and the line; the impulses of the units are moved at the beginning of the next sweep, which has them at hand.
 static bt_anderson_verdict accelerate(bt_world *w, const bt_totals *t)
 {
     bt_tiles *ts = w->tiles;
     bt_anderson *a = w->solver->anderson;
     const bt_anderson_verdict verdict = bt_anderson_decide(a, t);
-#pragma omp parallel for schedule(static, 8) if (BT_MANY(ts->n_units, BT_FEW_UNITS))
-    for (bt_idx k = 0; k < ts->n; k++) {
-        bt_tile *tile = &ts->tile[k];
-        if (k < ts->n - 1 ? ts->awake[k] : tile->own) bt_anderson_move_bodies(a, verdict, tile, w->bodies.vel);
-    }
+    bt_phases_everywhere(w, move_bodies, &(bodies_order){a, verdict});
     bt_tow *line = ts->tile[ts->n - 1].own ? line_of(w, ts->n - 1) : NULL;
     for (int c = 0; line && verdict != BT_ANDERSON_STAY && c < line->n_branches; c++)
         line->branch[c].lambda = bt_anderson_moved(a, verdict, &a->line[c], line->branch[c].lambda);

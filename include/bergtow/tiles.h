@@ -27,6 +27,8 @@
 #ifndef BERGTOW_TILES_H
 #define BERGTOW_TILES_H
 
+#include <stdint.h>
+
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
 
@@ -76,6 +78,7 @@ typedef struct bt_tile {
     bool own;                       ///< this rank solves its contacts and answers for its bodies
     bool border;                    ///< some body of its block is held by other ranks too
     bt_idx ahead;                   ///< tile that comes soon after it in the order of the pass, −1 = none
+    bt_idx knot;                    ///< its knot, −1 = no neighbour is in another band
     int8_t depth;                   ///< tiles from the nearest border tile, at most BT_PHASES
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
@@ -107,10 +110,24 @@ typedef struct bt_run_of_tiles {
     int8_t send, receive;           ///< phase whose results go out, or come in, after these; −1 = none
 } bt_run_of_tiles;
 
-/// On one rank: tiles that go through the four colours before those of the next strip.
-typedef struct bt_strip {
-    bt_idx begin[BT_COLOURS], seam[BT_COLOURS], end[BT_COLOURS]; ///< in the order of the pass; those before `seam` are of the strip's lowest odd row
-} bt_strip;
+/// A tile that shares its block with tiles of other bands.
+typedef struct bt_knot {
+    _Atomic int64_t done;           ///< passes that it has behind it
+    bt_idx begin, end;              ///< its neighbours in other bands, among bt_bands.other
+    int8_t phase;
+    char apart[64 - sizeof(int64_t) - 2 * sizeof(bt_idx) - 1]; ///< a cache line each
+} bt_knot;
+
+/// On one rank: the order of a pass, a band for each thread (src/order.h).
+typedef struct bt_bands {
+    bt_idx n, n_steps;
+    bt_idx *start;                  ///< [n][n_steps][BT_PHASES] and the end: place in the order
+    bt_idx *member, *first;         ///< all tiles, with work or not, those of band b from first[b] on [n + 1]
+    bt_knot *knot;                  ///< [n_knots]
+    bt_idx *other;                  ///< knots
+    bt_idx n_knots;
+    int64_t passes;                 ///< that all knots have behind them
+} bt_bands;
 
 enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
 
@@ -141,10 +158,7 @@ typedef struct bt_tiles {
     bt_idx n_order;
     bt_run_of_tiles *run;           ///< [n_runs] among ranks: pieces of it whose tiles are done at once
     bt_idx n_runs, cap_runs;
-    bt_strip *strip;                ///< [n_strips] on one rank: the order in strips, the tile of the large bodies apart
-    bt_idx n_strips, cap_strips;
-    bt_idx large_after;             ///< strip after which the tile of the large bodies comes; −1 = it has no work
-    bool ring;                      ///< the last strip lies beside the first
+    bt_bands bands;                 ///< on one rank: who does what of it, and when
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
     bool calm;                      ///< nothing but contacts moves a floe that drifts with the water

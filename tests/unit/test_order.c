@@ -6,7 +6,7 @@
 #include "phases.h"
 #include "scene.h"
 
-enum { TURN = BT_MAX_TURN, SEVERAL = 12 }; // strips of a ring on which three passes work at once
+enum { TURN = BT_MAX_TURN };
 
 /// What passes have done so far.
 typedef struct {
@@ -74,6 +74,45 @@ static void assert_sound(bt_world *w, int n)
     free(log.visits);
 }
 
+static bool tied(const bt_world *w, bt_idx k, bt_idx l)
+{
+    const bt_bands *b = &w->tiles->bands;
+    const bt_idx from = w->tiles->tile[k].knot, to = w->tiles->tile[l].knot;
+    if (from < 0 || to < 0) return false;
+    for (bt_idx i = b->knot[from].begin; i < b->knot[from].end; i++)
+        if (b->other[i] == to) return true;
+    return false;
+}
+
+/// Two tiles of different bands that share a body wait for each other: a race that is seldom lost is found here.
+static void assert_tied(const bt_world *w)
+{
+    enum { MOST = 5 }; // the tiles of a floe's corner, and that of the large bodies
+    const bt_tiles *t = w->tiles;
+    bt_idx *band = bt_alloc((size_t)t->n, sizeof *band), *meets = bt_alloc((size_t)w->bodies.n * MOST, sizeof *meets);
+    int *n_meets = bt_alloc((size_t)w->bodies.n, sizeof *n_meets);
+    for (bt_idx b = 0; b < t->bands.n; b++)
+        for (bt_idx i = t->bands.first[b]; i < t->bands.first[b + 1]; i++) band[t->bands.member[i]] = b;
+    for (bt_idx k = 0; k < t->n; k++)
+        for (bt_idx j = 0; j < t->tile[k].n_units; j++) {
+            const bt_idx ends[2] = {t->tile[k].units[j].a, t->tile[k].units[j].b};
+            for (int e = 0; e < 2; e++) {
+                const bt_idx i = ends[e];
+                if (!movable(w, i) || w->bodies.large[i]) continue;
+                if (n_meets[i] > 0 && meets[i * MOST + n_meets[i] - 1] == k) continue;
+                for (int m = 0; m < n_meets[i]; m++) {
+                    const bt_idx l = meets[i * MOST + m];
+                    assert_true(band[k] == band[l] || (tied(w, k, l) && tied(w, l, k)));
+                }
+                assert_in_range(n_meets[i], 0, MOST - 1);
+                meets[i * MOST + n_meets[i]++] = k;
+            }
+        }
+    free(band);
+    free(meets);
+    free(n_meets);
+}
+
 typedef struct {
     double length, width;
     bool round_x, round_y;
@@ -105,56 +144,90 @@ static bt_world *fill(const scene *s, uint64_t *rng)
     return w;
 }
 
+/// Levels of the tiles, from what the order says of them.
+static bt_idx levels_of(const bt_world *w) { return w->tiles->bands.n_steps - BT_PHASES + 1; }
+
 static void every_body_meets_its_tiles_in_order(void **state)
 {
     (void)state;
     uint64_t rng = 11;
-    // Wide, high, periodic along one axis or both: strips along either axis, in a row and on a ring.
+    // Wide, high, periodic along one axis or both: rows along either axis, in a row and on a ring.
     static const scene scenes[] = {
         {90, 90, false, false, -1, 0},  {300, 30, false, false, -1, 0}, {30, 300, false, false, -1, 0},   {90, 90, true, false, -1, 0},
-        {300, 30, false, true, -1, 0},  {90, 90, true, true, -1, 0},    {30, 480, false, true, -1, 0},    {30, 480, true, true, -1, 0},
+        {300, 30, false, true, -1, 0},  {90, 90, true, true, -1, 0},    {30, 480, false, true, -1, 0},    {480, 30, true, true, -1, 0},
         {90, 90, false, false, 0.4, 0.6}, {300, 30, false, true, 0.2, 0.5}, {30, 480, false, true, 0.5, 0.3}, {30, 480, false, true, 0.5, 0.999},
-        {30, 300, false, false, 0.5, 0},
+        {30, 300, false, false, 0.5, 0}, {480, 30, true, false, 0.001, 0.5},
+        // A row of tiles is 1/240: a large body on even and odd rows, where levels rise and fall, beside a border of bands.
+        {30, 480, false, true, 0.5, 0.1}, {30, 480, false, true, 0.5, 0.1 + 1.0 / 240}, {30, 480, false, true, 0.5, 0.5}, {30, 480, false, true, 0.5, 0.5 + 1.0 / 240},
+        {30, 480, false, true, 0.5, 0.8}, {30, 480, false, true, 0.5, 0.8 + 1.0 / 240}, {480, 30, false, false, 0.3, 0.5}, {480, 30, false, false, 0.3 + 1.0 / 240, 0.5},
     };
-    int in_a_row = 0, on_a_ring = 0, with_large = 0;
-    omp_set_num_threads(4);
-    for (size_t f = 0; f < sizeof scenes / sizeof *scenes; f++) {
-        bt_world *w = fill(&scenes[f], &rng);
-        const bt_tiles *t = w->tiles;
-        for (int n = 1; n <= TURN; n++) assert_sound(w, n);
-        assert_int_equal(scenes[f].at_x >= 0, t->large_after >= 0);
-        in_a_row += !t->ring && t->n_strips >= 4;
-        on_a_ring += t->ring && t->n_strips >= SEVERAL;
-        with_large += t->large_after >= 0 && t->n_strips >= (t->ring ? SEVERAL : 4);
-        bt_world_free(w);
-    }
-    assert_true(in_a_row >= 6);
-    assert_true(on_a_ring >= 3);
-    assert_true(with_large >= 4);
+    int with_levels = 0, knotted_large = 0;
+    for (size_t f = 0; f < sizeof scenes / sizeof *scenes; f++)
+        for (int threads = 1; threads <= 4; threads++) {
+            omp_set_num_threads(threads);
+            bt_world *w = fill(&scenes[f], &rng);
+            const bt_tiles *t = w->tiles;
+            const bt_tile *large = &t->tile[t->n - 1];
+            for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+            assert_tied(w);
+            assert_int_equal(t->bands.n, threads);
+            assert_int_equal(scenes[f].at_x >= 0, large->n_units > 0);
+            assert_true(threads == 1 || t->bands.n_knots > 0);
+            with_levels += levels_of(w) >= 4;
+            knotted_large += large->n_units > 0 && large->knot >= 0;
+            bt_world_free(w);
+        }
+    assert_true(with_levels >= 12);
+    assert_true(knotted_large >= 3);
 }
 
-/// Six passes on rings of 1 to 12 strips: the first ends beside where others are under way.
+/// Rings of 2 to 40 rows of tiles, with bands as thin as two rows.
 static void passes_meet_on_a_short_ring_in_order(void **state)
 {
     (void)state;
     uint64_t rng = 5;
-    bool seen[SEVERAL + 1] = {false};
-    omp_set_num_threads(4);
-    // Strips are thinner in the validation build, so a narrow field and a wide one.
+    int n_thin = 0, n_rings = 0, most = 0;
     for (double length = 12; length <= 30; length += 18)
-        for (double width = length; width < 330; width *= 1.12) {
-            bt_world *w = fill(&(scene){length, width, false, true, -1, 0}, &rng);
-            for (int n = 2; n <= TURN; n++) assert_sound(w, n);
-            if (w->tiles->ring && w->tiles->n_strips <= SEVERAL) seen[w->tiles->n_strips] = true;
-            bt_world_free(w);
-        }
-    int lengths = 0;
-    for (int n = 1; n <= SEVERAL; n++) lengths += seen[n];
-    assert_true(lengths >= 8);
+        for (double width = 6; width < 130; width *= 1.12)
+            for (int threads = 1; threads <= 4; threads++) {
+                omp_set_num_threads(threads);
+                bt_world *w = fill(&(scene){length, width, false, true, -1, 0}, &rng);
+                for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+                assert_tied(w);
+                const bt_tiles *t = w->tiles;
+                n_thin += t->bands.n > 1 && t->wrap_y < 4 * t->bands.n;
+                n_rings += t->n_y == t->wrap_y && t->n_y >= t->n_x;
+                most = t->wrap_y > most ? t->wrap_y : most;
+                bt_world_free(w);
+            }
+#ifdef BT_VALIDATE // else so few tiles are one thread's
+    assert_true(n_thin >= 40);
+#endif
+    assert_true(n_rings >= 40);
+    assert_true(most >= 30);
+}
+
+/// A team smaller than the number of bands: a thread has several of them.
+static void a_small_team_has_several_bands_each(void **state)
+{
+    (void)state;
+    uint64_t rng = 8;
+    omp_set_num_threads(4);
+    bt_world *w = fill(&(scene){30, 480, false, true, 0.5, 0.3}, &rng);
+    assert_int_equal(w->tiles->bands.n, 4);
+    omp_set_max_active_levels(1);
+#pragma omp parallel num_threads(2)
+#pragma omp single
+    {
+        assert_int_equal(omp_get_num_threads(), 2); // within it every team is of one thread
+        for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+    }
+    bt_world_free(w);
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order),
+                                       cmocka_unit_test(a_small_team_has_several_bands_each)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
