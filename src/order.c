@@ -22,17 +22,17 @@ static bt_idx count_bands(const bt_world *w, int64_t n_units, bt_idx n_rows)
 }
 
 /// Least tiles of a level. A large field is swept fastest in levels as low as they may be: six sweeps that follow each other then find most of their
-/// tiles in the second-level cache. In a small one, where all is there anyway, jumping between colours costs 4 %. Threads of a rank among others
-/// share the tiles of one phase, and wait for each other after it.
+/// tiles in the second-level cache. In a small one, where all is there anyway, jumping between colours costs one thread 4 %, and several wait less
+/// often for a neighbour that has steps of few tiles. Threads of a rank among others share the tiles of one phase, and wait for each other after it.
 static bt_idx least_tiles(const bt_world *w, int64_t n_units, bt_idx n_bands)
 {
 #ifdef BT_VALIDATE
     (void)w, (void)n_units, (void)n_bands;
     return 8; // so that small cases have levels too
 #else
-    enum { LARGE = 20000, THICK = 256, THREAD = 32 };
+    enum { LARGE = 20000, THICK = 256, THIN = 32, THREAD = 32 };
     if (w->domain && omp_get_max_threads() > 1) return THREAD * omp_get_max_threads();
-    return n_units < (int64_t)LARGE * n_bands ? THICK : 1;
+    return n_units >= (int64_t)LARGE * n_bands ? 1 : n_bands > 1 ? THIN : THICK;
 #endif
 }
 

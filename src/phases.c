@@ -19,7 +19,7 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from)
 static void run_among_ranks(bt_world *w, const bt_pass *pass, bt_vel *exchanged)
 {
     const bt_tiles *ts = w->tiles;
-#pragma omp parallel if (BT_MANY(ts->n_units, BT_FEW_UNITS))
+#pragma omp parallel if (BT_MANY(ts->n_units, 2 * BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = pass->totals->n_sums};
         for (bt_idx r = 0; r < ts->n_runs; r++) {

@@ -8,7 +8,7 @@
 
 enum {
     BT_MAX_TOTALS = 12,
-    BT_FEW_UNITS = 1500, ///< fewer units are swept faster by one thread: threads have to meet, which takes some microseconds
+    BT_FEW_UNITS = 700, ///< fewer units are swept faster by one thread: threads have to meet, which takes some microseconds
 };
 
 /// What a pass adds up over tiles, threads and ranks: exact sums, and one maximum.
