@@ -131,7 +131,7 @@ static void deal_bands(rows *r, int64_t n_units)
 /// Distances from the nearest zero, when it is cut[u] (1 if NULL) from row u to the next.
 static void relax(const rows *r, const bool *cut, bt_idx *distance)
 {
-    for (int round = 0; round <= r->ring; round++) {
+    for (int rounds = r->ring ? 2 : 1; rounds > 0; rounds--) {
         for (bt_idx u = r->ring ? 0 : 1; u < r->n; u++) {
             const bt_idx before = (u + r->n - 1) % r->n, there = distance[before] + (cut ? cut[before] : 1);
             if (there < distance[u]) distance[u] = there;
