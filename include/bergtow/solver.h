@@ -6,7 +6,7 @@
 // A sweep updates every unit once (a unit is a manifold: the normals of its two points are solved together, and their friction as one),
 // tile by tile in the order of tiles.h, with the velocities as they stand. It touches units, vel and inv and nothing else. Each tile is swept
 // par.inner_sweeps times before the next has its turn: its data are then in the first-level cache, and between ranks nothing
-// need be exchanged. In large fields (par.turn_rows) the sweeps up to the next acceleration, then six, follow each other through the field two strips of
+// need be exchanged. In large fields (par.turn_rows) the sweeps up to the next acceleration, then six, follow each other through the field four levels of
 // tiles apart (src/order.h), so that what one has read from memory serves all; convergence is then looked at after the last of them. Contacts with large movable bodies (the berg on a line has hundreds) follow in sequence, and the tow line after them.
 //
 // Acceleration: Anderson's, around the sweep taken as a fixed-point map of the impulses (src/anderson.h). Why: a plain
