@@ -118,12 +118,40 @@ static void join_met(rows *r, const bool *met, bool *joined)
     r->large = first;
 }
 
-static void deal_bands(rows *r, int64_t n_units)
+/// Shares of the work that let the bands end together: as in the last step, but from the time that each took for what it had.
+static void learn_shares(bt_bands *b, bt_idx n)
 {
+    enum { WORTH = 10 }; // µs of each thread: less says nothing
+    if (b->n_shares != n) {
+        b->n_shares = n;
+        double **each[] = {&b->share, &b->busy, &b->dealt};
+        for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_realloc(*each[i], (size_t)n, sizeof **each[i]);
+        for (bt_idx k = 0; k < n; k++) b->share[k] = 1.0 / n, b->busy[k] = 0;
+    }
+    double pace = 0, sum = 0;
+    for (bt_idx k = 0; k < n; k++) {
+        if (b->busy[k] < 1e-6 * WORTH || b->dealt[k] <= 0) return;
+        pace += b->dealt[k] / b->busy[k];
+    }
+    for (bt_idx k = 0; k < n; k++) {
+        const double even = b->dealt[k] / b->busy[k] / pace, share = 0.5 * (b->share[k] + even);
+        b->share[k] = bt_min(bt_max(share, 0.5 / n), 2.0 / n);
+        sum += b->share[k];
+    }
+    for (bt_idx k = 0; k < n; k++) b->share[k] /= sum;
+}
+
+static void deal_bands(rows *r, int64_t n_units, bt_bands *b)
+{
+    learn_shares(b, r->n_bands);
+    for (bt_idx k = 0; k < r->n_bands; k++) b->busy[k] = b->dealt[k] = 0;
     int64_t before = 0;
+    bt_idx band = 0;
+    double end = b->share[0];
     for (bt_idx u = 0; u < r->n; u++) {
-        r->band[u] = n_units > 0 ? (bt_idx)((before + r->units[u] / 2) * r->n_bands / n_units) : 0;
-        if (r->band[u] >= r->n_bands) r->band[u] = r->n_bands - 1;
+        while (band < r->n_bands - 1 && (double)before + 0.5 * (double)r->units[u] > end * (double)n_units) end += b->share[++band];
+        r->band[u] = band;
+        if (n_units > 0) b->dealt[band] += (double)r->units[u] / (double)n_units;
         before += r->units[u];
     }
 }
@@ -179,7 +207,7 @@ static rows make_rows(const bt_world *w)
     const int64_t n_units = count_rows(w, &r, met);
     join_met(&r, met, joined);
     r.n_bands = count_bands(w, n_units, r.n);
-    deal_bands(&r, n_units);
+    deal_bands(&r, n_units, &w->tiles->bands);
     set_levels(&r, joined, least_tiles(w, n_units, r.n_bands));
     free(met);
     free(joined);

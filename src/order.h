@@ -14,7 +14,8 @@
 // rise and fall at will, around a periodic direction too; a level is one row or more. The tile of the large bodies has all
 // rows that meet its floes in one level.
 //
-// Bands. Each thread has a band of rows, of equal work, and goes through its tiles by steps. A tile at the border of its band first waits until
+// Bands. Each thread has a band of rows, of a share of the units that follows the time it took in the last step (a converged tile is swept in less, cores
+// differ; only who does what depends on it, no result), and goes through its tiles by steps. A tile at the border of its band first waits until
 // its neighbours beyond have had the passes that come before. There are no barriers, and what a thread has in its caches it finds there again. No
 // two threads can wait for each other: each takes its tiles in the order of (step, pass, phase), so of all tiles that are
 // waited for, or not yet reached, the first in this order can be done. Levels are least at every other border and rise from there to

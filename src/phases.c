@@ -42,32 +42,40 @@ static void run_among_ranks(bt_world *w, const bt_pass *pass, bt_vel *exchanged)
     }
 }
 
-/// Wait until tile k may have its pass q of this turn.
-static void wait_for_others(const bt_bands *b, const bt_knot *knot, int q)
+/// Wait until a tile may have its pass q of this turn; returns the time it took, s.
+static double wait_for_others(const bt_bands *b, const bt_knot *knot, int q)
 {
     enum { PATIENCE = 4000 }; // looks: as long as a tile or two; then the other thread has perhaps no core
+    double since = 0;
     for (bt_idx i = knot->begin; i < knot->end; i++) {
         const bt_knot *other = &b->knot[b->other[i]];
         const int64_t enough = b->passes + q + (other->phase < knot->phase);
-        for (int n = 0; atomic_load_explicit(&other->done, memory_order_acquire) < enough; n++)
+        for (int n = 0; atomic_load_explicit(&other->done, memory_order_acquire) < enough; n++) {
+            if (since == 0) since = bt_clock();
             if (n > PATIENCE) sched_yield();
+        }
     }
+    return since > 0 ? bt_clock() - since : 0;
 }
 
-static void visit_in_turn(bt_world *w, bt_idx k, const bt_pass *pass, int q, bt_totals *own)
+/// Returns the time spent waiting.
+static double visit_in_turn(bt_world *w, bt_idx k, const bt_pass *pass, int q, bt_totals *own)
 {
     bt_bands *b = &w->tiles->bands;
     const bt_idx tied = w->tiles->tile[k].knot;
-    if (tied >= 0) wait_for_others(b, &b->knot[tied], q);
+    const double waited = tied >= 0 ? wait_for_others(b, &b->knot[tied], q) : 0;
     pass[q].visit(w, k, pass[q].context, &own[q]);
     if (tied >= 0) atomic_store_explicit(&b->knot[tied].done, b->passes + q + 1, memory_order_release);
+    return waited;
 }
 
-/// Bands first to last − 1, by steps.
-static void walk_bands(bt_world *w, bt_idx first, bt_idx last, const bt_pass *pass, int n, bt_totals *own)
+/// Bands first to last − 1, by steps. Returns the time at work, s.
+static double walk_bands(bt_world *w, bt_idx first, bt_idx last, const bt_pass *pass, int n, bt_totals *own)
 {
     const bt_tiles *ts = w->tiles;
     const bt_bands *b = &ts->bands;
+    const double began = bt_clock();
+    double waited = 0;
     for (bt_idx now = 0; now < b->n_steps + BT_COLOURS * (n - 1); now++)
         for (int q = 0; q < n; q++) {
             const bt_idx step = now - BT_COLOURS * q;
@@ -75,25 +83,27 @@ static void walk_bands(bt_world *w, bt_idx first, bt_idx last, const bt_pass *pa
             for (int phase = 0; phase < BT_PHASES; phase++)
                 for (bt_idx band = first; band < last; band++) {
                     const bt_idx *start = &b->start[(band * b->n_steps + step) * BT_PHASES + phase];
-                    for (bt_idx i = start[0]; i < start[1]; i++) visit_in_turn(w, ts->order[i], pass, q, own);
+                    for (bt_idx i = start[0]; i < start[1]; i++) waited += visit_in_turn(w, ts->order[i], pass, q, own);
                 }
         }
+    return bt_clock() - began - waited;
 }
 
 /// Passes on one rank, one behind the other.
 static void run_alone(bt_world *w, const bt_pass *pass, int n)
 {
-    const bt_bands *b = &w->tiles->bands;
+    bt_bands *b = &w->tiles->bands;
 #pragma omp parallel num_threads(b->n > 1 ? b->n : 1)
     {
         const bt_idx team = omp_get_num_threads(), me = omp_get_thread_num(); // the team may be smaller than asked
         bt_totals own[BT_MAX_TURN];
         for (int q = 0; q < n; q++) own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
-        walk_bands(w, me * b->n / team, (me + 1) * b->n / team, pass, n, own);
+        const double busy = walk_bands(w, me * b->n / team, (me + 1) * b->n / team, pass, n, own);
+        if (team == b->n) b->busy[me] += busy;
 #pragma omp critical
         for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &own[q]);
     }
-    w->tiles->bands.passes += n;
+    b->passes += n;
 }
 
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged)

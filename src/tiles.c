@@ -31,7 +31,8 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, t->bands.start, t->bands.member, t->bands.first, t->bands.knot, t->bands.other, t};
+    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, t->bands.start, t->bands.member, t->bands.first, t->bands.share, t->bands.busy, t->bands.dealt, t->bands.knot,
+                      t->bands.other, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 

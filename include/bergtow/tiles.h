@@ -123,6 +123,10 @@ typedef struct bt_bands {
     bt_idx n, n_steps;
     bt_idx *start;                  ///< [n][n_steps][BT_PHASES] and the end: place in the order
     bt_idx *member, *first;         ///< all tiles, with work or not, those of band b from first[b] on [n + 1]
+    double *share;                  ///< [n_shares] of the units each band is to have
+    double *busy;                   ///< [n_shares] s that its thread has worked in passes of this order, without waiting
+    double *dealt;                  ///< [n_shares] of the units that each band has
+    bt_idx n_shares;
     bt_knot *knot;                  ///< [n_knots]
     bt_idx *other;                  ///< knots
     bt_idx n_knots;

@@ -3,6 +3,7 @@
 #include <omp.h>
 #include <stdatomic.h>
 
+#include "order.h"
 #include "phases.h"
 #include "scene.h"
 
@@ -225,9 +226,30 @@ static void a_small_team_has_several_bands_each(void **state)
     bt_world_free(w);
 }
 
+/// A band that took three times as long has less to do in the next step, none ends with nothing, and the order is sound.
+static void slow_bands_get_less(void **state)
+{
+    (void)state;
+    uint64_t rng = 3;
+    omp_set_num_threads(4);
+    bt_world *w = fill(&(scene){30, 480, false, false, -1, 0}, &rng);
+    bt_bands *b = &w->tiles->bands;
+    assert_int_equal(b->n, 4);
+    assert_sound(w, 2);
+    for (int k = 0; k < 4; k++) assert_true(b->busy[k] > 0 && fabs(b->dealt[k] - 0.25) < 0.02);
+    for (int step = 0; step < 20; step++) { // pace 1, 1/3, 1, 1
+        for (int k = 0; k < 4; k++) b->busy[k] = b->dealt[k] * (k == 1 ? 3 : 1);
+        bt_order_tiles(w);
+    }
+    for (int k = 0; k < 4; k++) assert_true(fabs(b->dealt[k] - (k == 1 ? 0.125 : 0.875 / 3)) < 0.03); // an eighth is the least
+    for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+    assert_tied(w);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order),
-                                       cmocka_unit_test(a_small_team_has_several_bands_each)};
+                                       cmocka_unit_test(a_small_team_has_several_bands_each), cmocka_unit_test(slow_bands_get_less)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
