@@ -52,7 +52,11 @@ def lines(ax, rows, column, wanted):
                 drawn = True
     ax.set_xscale("log")
     sizes = sorted({r["asked"] for r in rows if r[column] is not None})
-    ax.set_xticks(sizes, [f"{n / 1000:g}k" for n in sizes])
+    labels, last = [], 0
+    for n in sizes:  # a label where there is room
+        labels.append(f"{n / 1000:g}k" if n >= 1.8 * last else "")
+        last = n if labels[-1] else last
+    ax.set_xticks(sizes, labels)
     ax.set_xticks([], minor=True)
     ax.set_xlabel("floes")
     ax.grid(True)
