@@ -19,6 +19,7 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from)
 static void run_among_ranks(bt_world *w, const bt_pass *pass, bt_vel *exchanged)
 {
     const bt_tiles *ts = w->tiles;
+    // Five barriers a pass and more: worth while later than bands are.
 #pragma omp parallel if (BT_MANY(ts->n_units, 2 * BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = pass->totals->n_sums};
