@@ -31,8 +31,9 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->tile, t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, t->bands.start, t->bands.member, t->bands.first, t->bands.share, t->bands.busy, t->bands.dealt, t->bands.knot,
-                      t->bands.other, t};
+    const bt_bands *b = &t->bands;
+    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->run, b->start, b->member, b->first, b->share,
+                      b->busy, b->dealt, b->knot, b->other, t->tile, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 

@@ -2,6 +2,7 @@
 // The order of passes over the tiles: what each body meets, and that tiles done at once share no body.
 #include <omp.h>
 #include <stdatomic.h>
+#include <stdlib.h>
 
 #include "order.h"
 #include "phases.h"
@@ -182,7 +183,7 @@ static void every_body_meets_its_tiles_in_order(void **state)
     assert_true(knotted_large >= 3);
 }
 
-/// Rings of 2 to 40 rows of tiles, with bands as thin as two rows.
+/// Rings of 2 to 50 rows of tiles, with bands as thin as two rows.
 static void passes_meet_on_a_short_ring_in_order(void **state)
 {
     (void)state;
@@ -247,9 +248,35 @@ static void slow_bands_get_less(void **state)
     bt_world_free(w);
 }
 
+/// Two heaps with nothing between them, after a step in which there was something.
+static void heaps_far_apart_are_not_tied(void **state)
+{
+    (void)state;
+    uint64_t rng = 4;
+    omp_set_num_threads(2);
+    bt_world *w = fill(&(scene){30, 480, false, false, -1, 0}, &rng);
+    bt_tiles *t = w->tiles;
+    assert_int_equal(t->bands.n, 2);
+    assert_true(t->bands.n_knots > 0);
+    double units[2] = {0};
+    for (bt_idx k = 0; k < t->n; k++) {
+        const int32_t above = t->tile[k].y - t->low_y - t->n_y / 2;
+        if (abs(above) < t->n_y / 8) t->tile[k].n_units = 0;
+        units[above > 0] += t->tile[k].n_units;
+    }
+    for (int b = 0; b < 2; b++) t->bands.share[b] = units[b] / (units[0] + units[1]); // a heap each
+    t->bands.busy[0] = 0;
+    bt_order_tiles(w);
+    assert_int_equal(t->bands.n, 2);
+    assert_int_equal(t->bands.n_knots, 0);
+    for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order),
-                                       cmocka_unit_test(a_small_team_has_several_bands_each), cmocka_unit_test(slow_bands_get_less)};
+                                       cmocka_unit_test(a_small_team_has_several_bands_each), cmocka_unit_test(slow_bands_get_less),
+                                       cmocka_unit_test(heaps_far_apart_are_not_tied)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
