@@ -143,10 +143,15 @@ static void mark_owned(bt_world *w)
         // Whoever holds a body of the block waits for what the tile does to it.
         const bt_idx block[4] = {k, tile->right, tile->above, tile->diagonal};
         tile->border = k == t->n - 1;
-        for (int j = 0; j < 4 && tile->own && !tile->border; j++) {
+        bool beside_large = false;
+        for (int j = 0; j < 4 && tile->own && k < t->n - 1; j++) {
+            if (block[j] < 0) continue;
+            const bt_tile *other = &t->tile[block[j]];
             int holder[BT_MAX_HOLDERS];
-            tile->border = block[j] >= 0 && bt_division_holders(w, t->tile[block[j]].x, t->tile[block[j]].y, holder) > 1;
+            if (bt_division_holders(w, other->x, other->y, holder) > 1) tile->border = true;
+            if (d->under[(int64_t)(other->y - d->low_y) * d->n_x + other->x - d->low_x]) beside_large = true;
         }
+        tile->depth = tile->border || beside_large ? 0 : -1;
     }
     bt_sum sums[2] = {{0}, {0}};
     for (int k = 0; k < 2; k++) bt_sum_add(&sums[k], held[k]);

@@ -36,19 +36,34 @@ static bt_idx least_tiles(const bt_world *w, int64_t n_units, bt_idx n_bands)
 #endif
 }
 
+/// Distances in tiles from those that have 0, over the sides and corners of tiles; more[n] is room.
+static void spread_depths(bt_tiles *t, bt_idx *more, bt_idx n)
+{
+    for (bt_idx i = 0; i < n; i++) {
+        const bt_tile *tile = &t->tile[more[i]];
+        for (int32_t dy = -1; dy <= 1; dy++)
+            for (int32_t dx = -1; dx <= 1; dx++) {
+                const bt_idx beside = bt_tiles_at(t, tile->x + dx, tile->y + dy);
+                if (beside < 0 || t->tile[beside].depth >= 0) continue;
+                t->tile[beside].depth = tile->depth + 1;
+                more[n++] = beside;
+            }
+    }
+}
+
 void bt_order_measure(bt_tiles *t)
 {
-    for (bt_idx k = 0; k < t->n - 1; k++) t->tile[k].depth = t->tile[k].border ? 0 : BT_PHASES;
-    for (int8_t depth = 1; depth < (int8_t)BT_PHASES; depth++)
-        for (bt_idx k = 0; k < t->n - 1; k++) {
-            const bt_tile *tile = &t->tile[k];
-            if (tile->depth != depth - 1) continue;
-            for (int32_t dy = -1; dy <= 1; dy++)
-                for (int32_t dx = -1; dx <= 1; dx++) {
-                    const bt_idx beside = bt_tiles_at(t, tile->x + dx, tile->y + dy);
-                    if (beside >= 0 && t->tile[beside].depth > depth) t->tile[beside].depth = depth;
-                }
-        }
+    bt_idx *reached = bt_alloc((size_t)t->n, sizeof *reached), n = 0;
+    for (bt_idx k = 0; k < t->n - 1; k++)
+        if (t->tile[k].depth == 0) reached[n++] = k;
+    spread_depths(t, reached, n);
+    for (bt_idx k = 0; k < t->n - 1; k++) { // ice that no way over tiles here connects to a border
+        if (t->tile[k].depth >= 0) continue;
+        t->tile[k].depth = 0;
+        reached[0] = k;
+        spread_depths(t, reached, 1);
+    }
+    free(reached);
 }
 
 /// Has this rank work in tile k?
@@ -58,9 +73,9 @@ static bool has_work(const bt_world *w, bt_idx k)
     return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
-/// Rows of tiles, across the longer side of the field.
+/// Rows of tiles, across the longer side of the field; among ranks, the tiles of one depth.
 typedef struct {
-    bool along_x, ring;
+    bool by_depth, along_x, ring;
     bt_idx n;
     int32_t low;
     int64_t *units; ///< [n] in tiles of this rank
@@ -74,7 +89,7 @@ typedef struct {
 
 static bt_idx row_of(const rows *r, const int32_t at[2]) { return at[r->along_x ? 0 : 1] - r->low; }
 
-static bt_idx row_of_tile(const rows *r, const bt_tile *tile) { return row_of(r, (const int32_t[2]){tile->x, tile->y}); }
+static bt_idx row_of_tile(const rows *r, const bt_tile *tile) { return r->by_depth ? tile->depth : row_of(r, (const int32_t[2]){tile->x, tile->y}); }
 
 /// What is to be done in each row; true in met[row] where its tiles may share a floe with that of the large bodies.
 static int64_t count_rows(const bt_world *w, rows *r, bool *met)
@@ -90,7 +105,7 @@ static int64_t count_rows(const bt_world *w, rows *r, bool *met)
         n_units += tile->n_units;
     }
     const bt_tile *large = &t->tile[t->n - 1];
-    for (bt_idx j = 0; j < large->n_units; j++) {
+    for (bt_idx j = 0; j < large->n_units && !r->by_depth; j++) {
         const bt_idx ends[2] = {large->units[j].a, large->units[j].b};
         for (int e = 0; e < 2; e++) {
             if (w->bodies.large[ends[e]]) continue;
@@ -195,17 +210,22 @@ static void set_levels(rows *r, const bool *joined, bt_idx least)
 static rows make_rows(const bt_world *w)
 {
     const bt_tiles *t = w->tiles;
-    rows r = {.along_x = t->n_x > t->n_y};
+    rows r = {.by_depth = w->domain != NULL, .along_x = t->n_x > t->n_y};
     const int32_t wrap = r.along_x ? t->wrap_x : t->wrap_y, n = r.along_x ? t->n_x : t->n_y;
     r.low = r.along_x ? t->low_x : t->low_y;
     r.n = n > 0 ? n : 1;
-    r.ring = wrap > 1 && n == wrap;
+    r.ring = !r.by_depth && wrap > 1 && n == wrap;
+    if (r.by_depth) {
+        r.n = 2;
+        for (bt_idx k = 0; k < t->n - 1; k++) r.n = t->tile[k].depth >= r.n ? t->tile[k].depth + 1 : r.n;
+    }
     bt_idx **each[] = {&r.tiles, &r.level, &r.away, &r.band};
     for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_alloc((size_t)r.n, sizeof **each[i]);
     r.units = bt_alloc((size_t)r.n, sizeof *r.units);
     bool *met = bt_alloc((size_t)r.n, sizeof *met), *joined = bt_alloc((size_t)r.n, sizeof *joined);
     const int64_t n_units = count_rows(w, &r, met);
     join_met(&r, met, joined);
+    joined[0] = joined[0] || r.by_depth;
     r.n_bands = count_bands(w, n_units, r.n);
     deal_bands(&r, n_units, &w->tiles->bands);
     set_levels(&r, joined, least_tiles(w, n_units, r.n_bands));
@@ -237,41 +257,6 @@ static void sort_by(bt_idx n, const bt_idx *in, const bt_idx *key, bt_idx n_keys
     if (start) memcpy(start, at, ((size_t)n_keys + 1) * sizeof *start);
     for (bt_idx i = 0; i < n; i++) out[at[key[in[i]]]++] = in[i];
     free(at);
-}
-
-enum { HEM_GROUPS = 2 * BT_COLOURS };
-
-// --- among ranks -----------------------------------------------------------------------------------------------------
-
-static void add_run(bt_tiles *t, bt_idx begin, bt_idx end, int send, int receive)
-{
-    if (begin == end && send < 0 && receive < 0) return;
-    if (t->n_runs == t->cap_runs) {
-        t->cap_runs = t->cap_runs ? 2 * t->cap_runs : 16;
-        t->run = bt_realloc(t->run, (size_t)t->cap_runs, sizeof *t->run);
-    }
-    t->run[t->n_runs++] = (bt_run_of_tiles){begin, end, (int8_t)send, (int8_t)receive};
-}
-
-/// Group of a tile among ranks: the hem by phases, then by steps, then the large bodies.
-static bt_idx group_of(const bt_world *w, const rows *r, bt_idx k, bt_idx last)
-{
-    const bt_tile *tile = &w->tiles->tile[k];
-    if (k == w->tiles->n - 1) return last;
-    const bool hem = tile->depth <= BT_COLOURS - 1 - tile->phase;
-    return hem ? 2 * tile->phase + !tile->border : HEM_GROUPS + BT_COLOURS * step_of(w, r, k) + tile->phase;
-}
-
-static void list_runs(bt_tiles *t, const bt_idx *start, bt_idx last)
-{
-    t->n_runs = 0;
-    for (bt_idx group = 0; group <= last; group++) {
-        const bool hem = group < HEM_GROUPS;
-        int send = hem && group % 2 == 0 ? group / 2 : -1, receive = hem && group % 2 == 1 && group / 2 < BT_COLOURS - 1 ? group / 2 : -1;
-        if (group == last - 1) receive = BT_COLOURS - 1;
-        if (group == last) send = receive = BT_COLOURS;
-        add_run(t, start[group], start[group + 1], send, receive);
-    }
 }
 
 // --- on one rank -----------------------------------------------------------------------------------------------------
@@ -370,7 +355,7 @@ void bt_order_tiles(bt_world *w)
     rows r = make_rows(w);
     b->n = r.n_bands;
     b->n_steps = r.n_levels + BT_PHASES - 1;
-    const bt_idx last = HEM_GROUPS + BT_COLOURS * b->n_steps, n_keys = w->domain ? last + 1 : b->n * b->n_steps * BT_PHASES;
+    const bt_idx n_keys = b->n * b->n_steps * BT_PHASES;
     bt_idx *list = bt_alloc((size_t)t->n, sizeof *list), *by_row = bt_alloc((size_t)t->n, sizeof *by_row);
     bt_idx *key = bt_alloc((size_t)t->n, sizeof *key), *band = bt_alloc((size_t)t->n, sizeof *band);
     for (bt_idx k = 0; k < t->n; k++) list[k] = k, band[k] = band_of(w, &r, k);
@@ -378,22 +363,24 @@ void bt_order_tiles(bt_world *w)
     b->first = bt_realloc(b->first, (size_t)b->n + 1, sizeof *b->first);
     sort_by(t->n, list, band, b->n, b->member, b->first);
     t->n_units = t->n_order = 0;
+    memset(b->n_border, 0, sizeof b->n_border);
     for (bt_idx k = 0; k < t->n; k++) {
         if (!has_work(w, k)) continue;
-        t->n_units += t->tile[k].n_units;
+        const bt_tile *tile = &t->tile[k];
+        t->n_units += tile->n_units;
         list[t->n_order++] = k;
-        key[k] = k < t->n - 1 ? r.away[row_of_tile(&r, &t->tile[k])] : 0;
+        key[k] = k < t->n - 1 ? r.away[row_of_tile(&r, tile)] + !tile->border : 0;
+        if (tile->border && k < t->n - 1) b->n_border[tile->phase]++;
     }
-    // In each step a thread begins at the border that the next band looks at.
-    sort_by(t->n_order, list, key, r.n, by_row, NULL);
+    // In each step a thread begins at the border that the next band, or rank, looks at.
+    sort_by(t->n_order, list, key, r.n + 1, by_row, NULL);
     for (bt_idx i = 0; i < t->n_order; i++) {
         const bt_idx k = list[i];
-        key[k] = w->domain ? group_of(w, &r, k, last) : (band[k] * b->n_steps + step_of(w, &r, k)) * BT_PHASES + t->tile[k].phase;
+        key[k] = (band[k] * b->n_steps + step_of(w, &r, k)) * BT_PHASES + t->tile[k].phase;
     }
     b->start = bt_realloc(b->start, (size_t)n_keys + 1, sizeof *b->start);
     sort_by(t->n_order, by_row, key, n_keys, t->order, b->start);
-    if (w->domain) list_runs(t, b->start, last);
-    else tie_knots(w, band);
+    tie_knots(w, band);
     for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].ahead = i + AHEAD < t->n_order ? t->order[i + AHEAD] : -1;
     free(list);
     free(by_row);

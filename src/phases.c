@@ -15,33 +15,87 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from)
     into->most = bt_max(into->most, from->most);
 }
 
-/// A pass among ranks.
-static void run_among_ranks(bt_world *w, const bt_pass *pass, bt_vel *exchanged)
+// --- among ranks -----------------------------------------------------------------------------------------------------
+
+/// A turn among ranks, as each thread of a rank sees it.
+typedef struct {
+    bt_world *w;
+    const bt_pass *pass;
+    bt_vel *exchanged;
+    bt_totals own[BT_MAX_TURN];
+    int under_way;                ///< phase whose velocities other ranks have not told yet; −1 = none
+} shared_turn;
+
+/// Tiles [begin, end) of the order, which share no body, in pass q, by all threads.
+static void visit_at_once(shared_turn *o, bt_idx begin, bt_idx end, int q)
 {
-    const bt_tiles *ts = w->tiles;
-    // Five barriers a pass and more: worth while later than bands are.
-#pragma omp parallel if (BT_MANY(ts->n_units, 2 * BT_FEW_UNITS))
-    {
-        bt_totals own = {.n_sums = pass->totals->n_sums};
-        for (bt_idx r = 0; r < ts->n_runs; r++) {
-            const bt_run_of_tiles *run = &ts->run[r];
+    if (begin == end) return;
+    const bt_pass *pass = &o->pass[q];
 #pragma omp for schedule(dynamic, 2)
-            for (bt_idx i = run->begin; i < run->end; i++) pass->visit(w, ts->order[i], pass->context, &own);
-            if (!exchanged) continue;
-            if (run->send >= 0) {
+    for (bt_idx i = begin; i < end; i++) pass->visit(o->w, o->w->tiles->order[i], pass->context, &o->own[q]);
+}
+
+/// To be called before anything that other ranks changed is read.
+static void receive(shared_turn *o)
+{
+    if (o->under_way < 0) return;
 #pragma omp master
-                bt_domain_send(w, run->send, exchanged);
-            }
-            if (run->receive >= 0) {
-#pragma omp master
-                bt_domain_receive(w, run->receive, exchanged);
+    bt_domain_receive(o->w, o->under_way, o->exchanged);
 #pragma omp barrier
-            }
+    o->under_way = -1;
+}
+
+static void send(shared_turn *o, int phase, int q)
+{
+    if (!o->exchanged || o->pass[q].looks) return;
+#pragma omp master
+    bt_domain_send(o->w, phase, o->exchanged);
+    o->under_way = phase;
+}
+
+/// Step `now` of n passes: what other ranks wait for first.
+static void walk_step(shared_turn *o, bt_idx now, int n)
+{
+    const bt_bands *b = &o->w->tiles->bands;
+    const int q = (int)(now / BT_COLOURS), phase = (int)(now % BT_COLOURS);
+    if (phase == 0 && q > 0 && q <= n) { // the large bodies, which have step BT_COLOURS
+        const bt_idx *large = &b->start[BT_COLOURS * BT_PHASES + BT_COLOURS];
+        receive(o);
+        visit_at_once(o, large[0], large[1], q - 1);
+        send(o, BT_COLOURS, q - 1);
+    }
+    if (q < n) {
+        const bt_idx begin = b->start[phase * BT_PHASES + phase];
+        receive(o);
+        visit_at_once(o, begin, begin + b->n_border[phase], q);
+        send(o, phase, q);
+    }
+    for (int p = 0; p < n; p++) {
+        const bt_idx step = now - BT_COLOURS * p;
+        if (step < 0 || step >= b->n_steps) continue;
+        for (int c = 0; c < BT_COLOURS; c++) {
+            const bt_idx *start = &b->start[step * BT_PHASES + c];
+            visit_at_once(o, start[0] + (step == c ? b->n_border[c] : 0), start[1], p);
         }
-#pragma omp critical
-        bt_totals_merge(pass->totals, &own);
     }
 }
+
+static void run_among_ranks(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged)
+{
+    const bt_tiles *ts = w->tiles;
+    // Four barriers a pass and more: worth while later than bands are.
+#pragma omp parallel if (BT_MANY(ts->n_units, 2 * BT_FEW_UNITS))
+    {
+        shared_turn o = {.w = w, .pass = pass, .exchanged = exchanged, .under_way = -1};
+        for (int q = 0; q < n; q++) o.own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
+        for (bt_idx now = 0; now < ts->bands.n_steps + BT_COLOURS * (n - 1); now++) walk_step(&o, now, n);
+        receive(&o);
+#pragma omp critical
+        for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &o.own[q]);
+    }
+}
+
+// --- on one rank -----------------------------------------------------------------------------------------------------
 
 /// Wait until a tile may have its pass q of this turn; returns the time it took, s.
 static double wait_for_others(const bt_bands *b, const bt_knot *knot, int q)
@@ -107,13 +161,12 @@ static void run_alone(bt_world *w, const bt_pass *pass, int n)
     b->passes += n;
 }
 
+// ---------------------------------------------------------------------------------------------------------------------
+
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged)
 {
-    if (w->domain) {
-        for (int q = 0; q < n; q++) run_among_ranks(w, &pass[q], pass[q].looks ? NULL : exchanged);
-        return;
-    }
-    run_alone(w, pass, n);
+    if (w->domain) run_among_ranks(w, pass, n, exchanged);
+    else run_alone(w, pass, n);
 }
 
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)

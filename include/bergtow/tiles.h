@@ -79,7 +79,7 @@ typedef struct bt_tile {
     bool border;                    ///< some body of its block is held by other ranks too
     bt_idx ahead;                   ///< tile that comes soon after it in the order of the pass, −1 = none
     bt_idx knot;                    ///< its knot, −1 = no neighbour is in another band
-    int8_t depth;                   ///< tiles from the nearest border tile, at most BT_PHASES
+    bt_idx depth;                   ///< among ranks: tiles from the nearest tile for which others wait (src/order.h)
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
     double margin;                  ///< m, of this step's detection
@@ -104,12 +104,6 @@ typedef struct bt_tile {
     bt_idx cap_unit_history, cap_body_history;
 } bt_tile;
 
-/// Among ranks: tiles of one phase that are done at once, and what is exchanged after them.
-typedef struct bt_run_of_tiles {
-    bt_idx begin, end;              ///< in the order of the pass
-    int8_t send, receive;           ///< phase whose results go out, or come in, after these; −1 = none
-} bt_run_of_tiles;
-
 /// A tile that shares its block with tiles of other bands.
 typedef struct bt_knot {
     _Atomic int64_t done;           ///< passes that it has behind it
@@ -118,10 +112,11 @@ typedef struct bt_knot {
     char apart[64 - sizeof(int64_t) - 2 * sizeof(bt_idx) - 1]; ///< a cache line each
 } bt_knot;
 
-/// On one rank: the order of a pass, a band for each thread (src/order.h).
+/// The order of a pass; on one rank a band for each thread (src/order.h).
 typedef struct bt_bands {
-    bt_idx n, n_steps;
+    bt_idx n, n_steps;              ///< among ranks n = 1
     bt_idx *start;                  ///< [n][n_steps][BT_PHASES] and the end: place in the order
+    bt_idx n_border[BT_COLOURS];    ///< border tiles of each phase: the first of that phase in the step of the same number
     bt_idx *member, *first;         ///< all tiles, with work or not, those of band b from first[b] on [n + 1]
     double *share;                  ///< [n_shares] of the units each band is to have
     double *busy;                   ///< [n_shares] s that its thread has worked in passes of this order, without waiting
@@ -160,9 +155,7 @@ typedef struct bt_tiles {
     uint8_t *awake;                 ///< [n] contacts may move the tile's bodies in this step
     bt_idx *order;                  ///< [n_order] tiles of this rank with work, in the order of a pass (src/order.h)
     bt_idx n_order;
-    bt_run_of_tiles *run;           ///< [n_runs] among ranks: pieces of it whose tiles are done at once
-    bt_idx n_runs, cap_runs;
-    bt_bands bands;                 ///< on one rank: who does what of it, and when
+    bt_bands bands;                 ///< who does what of it, and when
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
     bool calm;                      ///< nothing but contacts moves a floe that drifts with the water
