@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Order of a pass: levels of rows, bands of threads, hem of ranks; reasons in order.h.
+// Order of a pass: groups of rows, bands of threads, depths among ranks; reasons in order.h.
 #include "order.h"
 
 #include <assert.h>
@@ -14,25 +14,25 @@
 #define AHEAD 2   // tiles: what a sweep asks memory for in advance
 
 /// Threads that so many units feed.
-static bt_idx count_bands(const bt_world *w, int64_t n_units, bt_idx n_rows)
+static bt_idx count_threads(const bt_world *w, int64_t n_units, bt_idx n_rows)
 {
     if (w->domain || !BT_MANY(n_units, BT_FEW_UNITS)) return 1;
     const bt_idx threads = omp_get_max_threads(), most = n_rows / 2; // a row at a border waits for the next band
     return threads < most ? threads : most > 1 ? most : 1;
 }
 
-/// Least tiles of a level. A large field is swept fastest in levels as low as they may be: six sweeps that follow each other then find most of their
+/// Least tiles of a group. A large field is swept fastest in groups as small as they may be: six sweeps that follow each other then find most of their
 /// tiles in the second-level cache. In a small one, where all is there anyway, jumping between colours costs one thread 4 %, and several wait less
 /// often for a neighbour that has steps of few tiles. Threads of a rank among others share the tiles of one phase, and wait for each other after it.
-static bt_idx least_tiles(const bt_world *w, int64_t n_units, bt_idx n_bands)
+static bt_idx least_tiles(const bt_world *w, int64_t n_units, bt_idx n_threads)
 {
 #ifdef BT_VALIDATE
-    (void)w, (void)n_units, (void)n_bands;
-    return 8; // so that small cases have levels too
+    (void)w, (void)n_units, (void)n_threads;
+    return 8; // so that small cases have groups too
 #else
     enum { LARGE = 20000, THICK = 256, THIN = 32, THREAD = 32 };
     if (w->domain && omp_get_max_threads() > 1) return THREAD * omp_get_max_threads();
-    return n_units >= (int64_t)LARGE * n_bands ? 1 : n_bands > 1 ? THIN : THICK;
+    return n_units >= (int64_t)LARGE * n_threads ? 1 : n_threads > 1 ? THIN : THICK;
 #endif
 }
 
@@ -50,6 +50,8 @@ static void spread_depths(bt_tiles *t, bt_idx *more, bt_idx n)
             }
     }
 }
+
+bt_idx bt_bands_of(const bt_bands *b, bt_idx t, bt_idx n_threads) { return t * b->n / n_threads; }
 
 void bt_order_measure(bt_tiles *t)
 {
@@ -80,11 +82,10 @@ typedef struct {
     int32_t low;
     int64_t *units; ///< [n] in tiles of this rank
     bt_idx *tiles;  ///< [n] with work
-    bt_idx *level;  ///< [n]
-    bt_idx *away;   ///< [n] rows to the nearest where the levels are least
-    bt_idx *band;   ///< [n]
-    bt_idx n_bands, n_levels;
-    bt_idx large;   ///< a row of the level that holds all floes of the tile of the large bodies
+    bool *joined;   ///< [n] in one group, or in two of one level, with the row after it
+    bt_idx *group;  ///< [n]
+    bt_idx n_groups, n_bands;
+    bt_idx large;   ///< a row whose level holds all floes of the tile of the large bodies
 } rows;
 
 static bt_idx row_of(const rows *r, const int32_t at[2]) { return at[r->along_x ? 0 : 1] - r->low; }
@@ -118,7 +119,7 @@ static int64_t count_rows(const bt_world *w, rows *r, bool *met)
 }
 
 /// Rows that must have one level with the row after them: all from the first to the last that was met; on a ring, all but the widest gap.
-static void join_met(rows *r, const bool *met, bool *joined)
+static void join_met(rows *r, const bool *met)
 {
     bt_idx first = -1, last = -1, gap_end = -1, widest = 0;
     for (bt_idx u = 0; u < r->n; u++) {
@@ -129,87 +130,129 @@ static void join_met(rows *r, const bool *met, bool *joined)
     }
     if (first < 0) return;
     if (r->ring && first + r->n - last < widest) first = gap_end, last = gap_end - widest + r->n;
-    for (bt_idx u = first; u < last; u++) joined[u % r->n] = true;
+    for (bt_idx u = first; u < last; u++) r->joined[u % r->n] = true;
     r->large = first;
 }
 
-/// Shares of the work that let the bands end together: as in the last step, but from the time that each took for what it had.
-static void learn_shares(bt_bands *b, bt_idx n)
+/// Shares of the work that let the threads end together: as in the last step, but from the time that each band took for what it did.
+static void learn_shares(bt_bands *b)
 {
-    enum { WORTH = 10 }; // µs of each thread: less says nothing
-    if (b->n_shares != n) {
-        b->n_shares = n;
-        double **each[] = {&b->share, &b->busy, &b->dealt};
-        for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_realloc(*each[i], (size_t)n, sizeof **each[i]);
-        for (bt_idx k = 0; k < n; k++) b->share[k] = 1.0 / n, b->busy[k] = 0;
+    enum { WORTH = 10 }; // µs of each band: less says nothing
+    const bool known = b->n_shares == b->n;
+    if (!known) {
+        double **each[] = {&b->share, &b->busy, &b->worked};
+        for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_realloc(*each[i], (size_t)b->n, sizeof **each[i]);
+        b->n_shares = b->n;
     }
-    double pace = 0, sum = 0;
-    for (bt_idx k = 0; k < n; k++) {
-        if (b->busy[k] < 1e-6 * WORTH || b->dealt[k] <= 0) return;
-        pace += b->dealt[k] / b->busy[k];
+    double *even = bt_alloc((size_t)b->n, sizeof *even), sum = 0, total = 0;
+    bool enough = known;
+    for (bt_idx k = 0; known && k < b->n; k++) enough = enough && b->busy[k] >= 1e-6 * WORTH && b->worked[k] > 0;
+    for (bt_idx t = 0; t < b->n_threads; t++) {
+        const bt_idx first = bt_bands_of(b, t, b->n_threads), end = bt_bands_of(b, t + 1, b->n_threads);
+        for (bt_idx k = first; k < end; k++) sum += even[k] = (enough ? b->worked[k] / b->busy[k] : 1) / (end - first);
     }
-    for (bt_idx k = 0; k < n; k++) {
-        const double even = b->dealt[k] / b->busy[k] / pace, share = 0.5 * (b->share[k] + even);
-        b->share[k] = bt_min(bt_max(share, 0.5 / n), 2.0 / n);
-        sum += b->share[k];
+    for (bt_idx k = 0; k < b->n; k++) {
+        even[k] /= sum;
+        if (!known) b->share[k] = even[k];
+        else if (enough) b->share[k] = bt_min(bt_max(0.5 * (b->share[k] + even[k]), 0.5 / b->n), 2.0 / b->n);
+        total += b->share[k];
+        b->busy[k] = b->worked[k] = 0;
     }
-    for (bt_idx k = 0; k < n; k++) b->share[k] /= sum;
+    for (bt_idx k = 0; k < b->n; k++) b->share[k] /= total;
+    free(even);
 }
 
-static void deal_bands(rows *r, int64_t n_units, bt_bands *b)
+/// Where bands begin, first[n_bands + 1], in rows: by their shares, none empty.
+static void deal_rows(const rows *r, int64_t n_units, const double *share, bt_idx *first)
 {
-    learn_shares(b, r->n_bands);
-    for (bt_idx k = 0; k < r->n_bands; k++) b->busy[k] = b->dealt[k] = 0;
     int64_t before = 0;
-    bt_idx band = 0;
-    double end = b->share[0];
-    for (bt_idx u = 0; u < r->n; u++) {
-        while (band < r->n_bands - 1 && (double)before + 0.5 * (double)r->units[u] > end * (double)n_units) end += b->share[++band];
-        r->band[u] = band;
-        if (n_units > 0) b->dealt[band] += (double)r->units[u] / (double)n_units;
-        before += r->units[u];
+    double end = 0;
+    bt_idx u = 0;
+    for (bt_idx k = 0; k < r->n_bands; k++) {
+        first[k] = u;
+        end += share[k];
+        const bt_idx last = r->n - (r->n_bands - k - 1); // a row for each of the others
+        do before += r->units[u++];
+        while (u < last && (k == r->n_bands - 1 || (double)before + 0.5 * (double)r->units[u] <= end * (double)n_units));
     }
+    first[r->n_bands] = r->n;
 }
 
-/// Distances from the nearest zero, when it is cut[u] (1 if NULL) from row u to the next.
-static void relax(const rows *r, const bool *cut, bt_idx *distance)
+/// Number the groups of rows [begin, end), from `group` on; from the last row on if `down`, whose groups have numbers from `group` downwards. Returns how many there are.
+static bt_idx group_rows(rows *r, bt_idx begin, bt_idx end, bt_idx group, bool down, bt_idx least)
 {
-    for (int rounds = r->ring ? 2 : 1; rounds > 0; rounds--) {
-        for (bt_idx u = r->ring ? 0 : 1; u < r->n; u++) {
-            const bt_idx before = (u + r->n - 1) % r->n, there = distance[before] + (cut ? cut[before] : 1);
-            if (there < distance[u]) distance[u] = there;
-        }
-        for (bt_idx u = r->n - 1 - !r->ring; u >= 0; u--) {
-            const bt_idx there = distance[(u + 1) % r->n] + (cut ? cut[u] : 1);
-            if (there < distance[u]) distance[u] = there;
-        }
-    }
-}
-
-/// Levels that are least at every other border of bands.
-static void set_levels(rows *r, const bool *joined, bt_idx least)
-{
-    bool *cut = bt_alloc((size_t)r->n, sizeof *cut);
-    bt_idx filled = 0;
-    for (bt_idx u = 0; u < r->n; u++) {
+    bt_idx n = 0, filled = 0;
+    for (bt_idx i = 0; i < end - begin; i++) {
+        const bt_idx u = down ? end - 1 - i : begin + i;
+        const bool joined = i > 0 && r->joined[down ? u : u - 1];
+        if (i > 0 && filled >= least && !joined) n++, filled = 0;
         filled += r->tiles[u];
-        cut[u] = filled >= least && !joined[u];
-        if (cut[u]) filled = 0;
-        const bool low = u == 0 ? r->n_bands == 1 : r->band[u] != r->band[u - 1] && r->band[u] % 2 == 1;
-        const bool top = u == r->n - 1 && r->n_bands > 1 && r->n_bands % 2 == 1;
-        r->level[u] = low || top ? 0 : r->n;
-        if (low && u > 0) r->level[u - 1] = 0;
+        r->group[u] = down ? group - n : group + n;
     }
-    memcpy(r->away, r->level, (size_t)r->n * sizeof *r->away);
-    relax(r, NULL, r->away);
-    relax(r, cut, r->level);
-    for (bt_idx u = 0; u < r->n; u++) r->n_levels = r->level[u] >= r->n_levels ? r->level[u] + 1 : r->n_levels;
-    free(cut);
+    return n + 1;
+}
+
+/// Join groups of rows [begin, end), n of them from `group` on (or downwards), so that `most` are left.
+static void thin_out(rows *r, bt_idx begin, bt_idx end, bt_idx group, bool down, bt_idx n, bt_idx most)
+{
+    for (bt_idx u = begin; n > most && u < end; u++) {
+        const bt_idx level = down ? group - r->group[u] : r->group[u] - group;
+        const bt_idx now = (bt_idx)((int64_t)level * most / n);
+        r->group[u] = down ? group - now : group + now;
+    }
+}
+
+enum { LEAST_LEVEL = BT_COLOURS * BT_MAX_TURN }; // of a group that either band may take: reason in order.h
+
+/// Groups of the two bands of rows [begin, middle) and [middle, end).
+static void meet(rows *r, bt_idx begin, bt_idx middle, bt_idx end, bt_idx least, bt_segment *s, bt_idx *edge)
+{
+    s->begin = r->n_groups;
+    const bt_idx n = group_rows(r, begin, end, s->begin, false, least);
+    if (n > 2 * LEAST_LEVEL) {
+        s->end = s->begin + n;
+        const bt_idx low = s->begin + LEAST_LEVEL, high = s->end - LEAST_LEVEL, about = r->group[middle], reach = n / 8 + 1;
+        *edge = about < low ? low : about > high ? high : about;
+        s->free_begin = *edge - reach > low ? *edge - reach : low;
+        s->free_end = *edge + reach < high ? *edge + reach : high;
+    } else { // as many of each: they meet at one level
+        const bt_idx up = group_rows(r, begin, middle, s->begin, false, least), down = group_rows(r, middle, end, 0, true, least);
+        const bt_idx each = up < down ? up : down;
+        thin_out(r, begin, middle, s->begin, false, up, each);
+        thin_out(r, middle, end, 0, true, down, each);
+        s->end = s->begin + 2 * each;
+        for (bt_idx u = middle; u < end; u++) r->group[u] += s->end - 1;
+        *edge = s->free_begin = s->free_end = s->begin + each;
+    }
+    r->n_groups = s->end;
+}
+
+static void make_groups(rows *r, int64_t n_units, bt_idx least, bt_bands *b)
+{
+    bt_idx *first = bt_alloc((size_t)r->n_bands + 1, sizeof *first);
+    deal_rows(r, n_units, b->share, first);
+    free(b->segment);
+    b->segment = bt_alloc_aligned(((size_t)r->n_bands + 1) / 2, sizeof *b->segment);
+    b->edge = bt_realloc(b->edge, (size_t)r->n_bands + 1, sizeof *b->edge);
+    for (bt_idx k = 0; k < r->n_bands; k += 2) {
+        bt_segment *s = &b->segment[k / 2];
+        b->edge[k] = r->n_groups;
+        if (k + 1 < r->n_bands) {
+            meet(r, first[k], first[k + 1], first[k + 2], least, s, &b->edge[k + 1]);
+            continue;
+        }
+        s->begin = r->n_groups;
+        r->n_groups += group_rows(r, first[k], first[k + 1], s->begin, false, least);
+        s->end = s->free_begin = s->free_end = r->n_groups;
+    }
+    b->edge[r->n_bands] = b->n_groups = r->n_groups;
+    free(first);
 }
 
 static rows make_rows(const bt_world *w)
 {
     const bt_tiles *t = w->tiles;
+    bt_bands *b = &w->tiles->bands;
     rows r = {.by_depth = w->domain != NULL, .along_x = t->n_x > t->n_y};
     const int32_t wrap = r.along_x ? t->wrap_x : t->wrap_y, n = r.along_x ? t->n_x : t->n_y;
     r.low = r.along_x ? t->low_x : t->low_y;
@@ -219,34 +262,27 @@ static rows make_rows(const bt_world *w)
         r.n = 2;
         for (bt_idx k = 0; k < t->n - 1; k++) r.n = t->tile[k].depth >= r.n ? t->tile[k].depth + 1 : r.n;
     }
-    bt_idx **each[] = {&r.tiles, &r.level, &r.away, &r.band};
-    for (size_t i = 0; i < sizeof each / sizeof *each; i++) *each[i] = bt_alloc((size_t)r.n, sizeof **each[i]);
     r.units = bt_alloc((size_t)r.n, sizeof *r.units);
-    bool *met = bt_alloc((size_t)r.n, sizeof *met), *joined = bt_alloc((size_t)r.n, sizeof *joined);
+    r.tiles = bt_alloc((size_t)r.n, sizeof *r.tiles);
+    r.group = bt_alloc((size_t)r.n, sizeof *r.group);
+    r.joined = bt_alloc((size_t)r.n, sizeof *r.joined);
+    bool *met = bt_alloc((size_t)r.n, sizeof *met);
     const int64_t n_units = count_rows(w, &r, met);
-    join_met(&r, met, joined);
-    joined[0] = joined[0] || r.by_depth;
-    r.n_bands = count_bands(w, n_units, r.n);
-    deal_bands(&r, n_units, &w->tiles->bands);
-    set_levels(&r, joined, least_tiles(w, n_units, r.n_bands));
+    if (r.by_depth) r.joined[0] = true;
+    else join_met(&r, met);
     free(met);
-    free(joined);
+    b->n_threads = count_threads(w, n_units, r.n);
+    b->n = r.n_bands = b->n_threads + (r.ring && b->n_threads % 2 == 1);
+    learn_shares(b);
+    make_groups(&r, n_units, least_tiles(w, n_units, b->n_threads), b);
     return r;
 }
 
 static void free_rows(rows *r)
 {
-    void *arrays[] = {r->units, r->tiles, r->level, r->away, r->band};
+    void *arrays[] = {r->units, r->tiles, r->group, r->joined};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
-
-static bt_idx step_of(const bt_world *w, const rows *r, bt_idx k)
-{
-    const bt_tile *tile = &w->tiles->tile[k];
-    return r->level[k == w->tiles->n - 1 ? r->large : row_of_tile(r, tile)] + tile->phase;
-}
-
-static bt_idx band_of(const bt_world *w, const rows *r, bt_idx k) { return r->band[k == w->tiles->n - 1 ? r->large : row_of_tile(r, &w->tiles->tile[k])]; }
 
 /// Stable: out[] holds in[] by rising key[tile] < n_keys; start[n_keys + 1], if any, where each key begins.
 static void sort_by(bt_idx n, const bt_idx *in, const bt_idx *key, bt_idx n_keys, bt_idx *out, bt_idx *start)
@@ -259,7 +295,22 @@ static void sort_by(bt_idx n, const bt_idx *in, const bt_idx *key, bt_idx n_keys
     free(at);
 }
 
-// --- on one rank -----------------------------------------------------------------------------------------------------
+// --- knots -----------------------------------------------------------------------------------------------------------
+
+/// What decides which thread does a tile.
+typedef struct {
+    const bt_bands *bands;
+    const bt_idx *group;  ///< [tiles]
+    const bt_idx *band;   ///< [tiles] that is expected to do it
+} deal;
+
+static bool is_free(const deal *d, bt_idx k)
+{
+    const bt_segment *s = &d->bands->segment[d->band[k] / 2];
+    return d->group[k] >= s->free_begin && d->group[k] < s->free_end;
+}
+
+static bool same_thread(const deal *d, bt_idx k, bt_idx l) { return k == l || (d->band[k] == d->band[l] && !is_free(d, k) && !is_free(d, l)); }
 
 /// near[k]: tile k may share a floe with the tile of the large bodies.
 static void mark_near_large(const bt_world *w, bool *near)
@@ -294,8 +345,8 @@ static int list_neighbours(const bt_world *w, const bool *near, bt_idx k, bt_idx
     return n;
 }
 
-/// Make knots of all tiles that share a floe with one of another band, and tie them to each other. band[tile].
-static void tie_knots(const bt_world *w, const bt_idx *band)
+/// Make knots of all tiles that share a floe with one that another thread may do, and tie them to each other.
+static void tie_knots(const bt_world *w, const deal *d)
 {
     bt_tiles *t = w->tiles;
     bt_bands *b = &t->bands;
@@ -312,7 +363,7 @@ static void tie_knots(const bt_world *w, const bt_idx *band)
         if (k == large) continue;
         const int n = list_neighbours(w, near, k, beside);
         for (int j = 0; j < n; j++) {
-            if (band[beside[j]] == band[k]) continue;
+            if (same_thread(d, beside[j], k)) continue;
             if (t->tile[k].knot < 0) t->tile[k].knot = b->n_knots++;
             if (beside[j] != large) {
                 n_ties++;
@@ -334,11 +385,11 @@ static void tie_knots(const bt_world *w, const bt_idx *band)
         knot->begin = at;
         if (k == large) {
             for (bt_idx l = 0; l < large; l++)
-                if (near[l] && has_work(w, l) && band[l] != band[k]) b->other[at++] = t->tile[l].knot;
+                if (near[l] && has_work(w, l) && !same_thread(d, l, k)) b->other[at++] = t->tile[l].knot;
         } else {
             const int n = list_neighbours(w, near, k, beside);
             for (int j = 0; j < n; j++)
-                if (band[beside[j]] != band[k]) b->other[at++] = t->tile[beside[j]].knot;
+                if (!same_thread(d, beside[j], k)) b->other[at++] = t->tile[beside[j]].knot;
         }
         knot->end = at;
     }
@@ -348,17 +399,44 @@ static void tie_knots(const bt_world *w, const bt_idx *band)
 
 // ---------------------------------------------------------------------------------------------------------------------
 
+/// Band that is expected to do each group; the caller frees.
+static bt_idx *list_bands(const bt_bands *b)
+{
+    bt_idx *band = bt_alloc((size_t)b->n_groups, sizeof *band);
+    for (bt_idx k = 0; k < b->n; k++)
+        for (bt_idx g = b->edge[k]; g < b->edge[k + 1]; g++) band[g] = k;
+    return band;
+}
+
+/// What is swept next but one: tiles of one group and phase, then, in a step, those of the group behind and the next phase.
+static void look_ahead(bt_tiles *t, const bt_idx *group)
+{
+    const bt_bands *b = &t->bands;
+    for (bt_idx k = 0; k < b->n; k++)
+        for (bt_idx i = b->start[b->edge[k] * BT_PHASES]; i < b->start[b->edge[k + 1] * BT_PHASES]; i++) {
+            bt_tile *tile = &t->tile[t->order[i]];
+            const bt_idx g = group[t->order[i]], end = b->start[g * BT_PHASES + tile->phase + 1], behind = k % 2 == 0 ? g - 1 : g + 1;
+            bt_idx at = i + AHEAD;
+            if (at >= end && behind >= 0 && behind < b->n_groups && tile->phase < BT_COLOURS) {
+                const bt_idx *next = &b->start[behind * BT_PHASES + (tile->phase + 1) % BT_COLOURS];
+                at = next[0] + at - end < next[1] ? next[0] + at - end : -1;
+            } else if (at >= end) at = -1;
+            tile->ahead = at >= 0 ? t->order[at] : -1;
+        }
+}
+
 void bt_order_tiles(bt_world *w)
 {
     bt_tiles *t = w->tiles;
     bt_bands *b = &t->bands;
     rows r = make_rows(w);
-    b->n = r.n_bands;
-    b->n_steps = r.n_levels + BT_PHASES - 1;
-    const bt_idx n_keys = b->n * b->n_steps * BT_PHASES;
-    bt_idx *list = bt_alloc((size_t)t->n, sizeof *list), *by_row = bt_alloc((size_t)t->n, sizeof *by_row);
-    bt_idx *key = bt_alloc((size_t)t->n, sizeof *key), *band = bt_alloc((size_t)t->n, sizeof *band);
-    for (bt_idx k = 0; k < t->n; k++) list[k] = k, band[k] = band_of(w, &r, k);
+    bt_idx *list = bt_alloc((size_t)t->n, sizeof *list), *by_row = bt_alloc((size_t)t->n, sizeof *by_row), *key = bt_alloc((size_t)t->n, sizeof *key);
+    bt_idx *group = bt_alloc((size_t)t->n, sizeof *group), *band = bt_alloc((size_t)t->n, sizeof *band), *band_of_group = list_bands(b);
+    for (bt_idx k = 0; k < t->n; k++) {
+        list[k] = k;
+        group[k] = r.group[k == t->n - 1 ? r.large : row_of_tile(&r, &t->tile[k])];
+        band[k] = band_of_group[group[k]];
+    }
     b->member = bt_realloc(b->member, (size_t)t->n, sizeof *b->member);
     b->first = bt_realloc(b->first, (size_t)b->n + 1, sizeof *b->first);
     sort_by(t->n, list, band, b->n, b->member, b->first);
@@ -367,24 +445,20 @@ void bt_order_tiles(bt_world *w)
     for (bt_idx k = 0; k < t->n; k++) {
         if (!has_work(w, k)) continue;
         const bt_tile *tile = &t->tile[k];
+        const bt_idx u = k < t->n - 1 ? row_of_tile(&r, tile) : 0;
         t->n_units += tile->n_units;
         list[t->n_order++] = k;
-        key[k] = k < t->n - 1 ? r.away[row_of_tile(&r, tile)] + !tile->border : 0;
+        key[k] = band[k] % 2 == 0 ? u + !tile->border : r.n - 1 - u;
         if (tile->border && k < t->n - 1) b->n_border[tile->phase]++;
     }
     // In each step a thread begins at the border that the next band, or rank, looks at.
     sort_by(t->n_order, list, key, r.n + 1, by_row, NULL);
-    for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_idx k = list[i];
-        key[k] = (band[k] * b->n_steps + step_of(w, &r, k)) * BT_PHASES + t->tile[k].phase;
-    }
-    b->start = bt_realloc(b->start, (size_t)n_keys + 1, sizeof *b->start);
-    sort_by(t->n_order, by_row, key, n_keys, t->order, b->start);
-    tie_knots(w, band);
-    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].ahead = i + AHEAD < t->n_order ? t->order[i + AHEAD] : -1;
-    free(list);
-    free(by_row);
-    free(key);
-    free(band);
+    for (bt_idx i = 0; i < t->n_order; i++) key[list[i]] = group[list[i]] * BT_PHASES + t->tile[list[i]].phase;
+    b->start = bt_realloc(b->start, (size_t)b->n_groups * BT_PHASES + 1, sizeof *b->start);
+    sort_by(t->n_order, by_row, key, b->n_groups * BT_PHASES, t->order, b->start);
+    tie_knots(w, &(deal){b, group, band});
+    look_ahead(t, group);
+    void *arrays[] = {list, by_row, key, group, band, band_of_group};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     free_rows(&r);
 }

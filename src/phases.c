@@ -5,9 +5,11 @@
 #include <omp.h>
 #include <sched.h>
 #include <stdatomic.h>
+#include <stdlib.h>
 
 #include "bergtow/tiles.h"
 #include "domain.h"
+#include "order.h"
 
 void bt_totals_merge(bt_totals *into, const bt_totals *from)
 {
@@ -58,24 +60,24 @@ static void walk_step(shared_turn *o, bt_idx now, int n)
 {
     const bt_bands *b = &o->w->tiles->bands;
     const int q = (int)(now / BT_COLOURS), phase = (int)(now % BT_COLOURS);
-    if (phase == 0 && q > 0 && q <= n) { // the large bodies, which have step BT_COLOURS
-        const bt_idx *large = &b->start[BT_COLOURS * BT_PHASES + BT_COLOURS];
+    if (phase == 0 && q > 0 && q <= n) { // the large bodies, whose tile is in group 0
+        const bt_idx *large = &b->start[BT_COLOURS];
         receive(o);
         visit_at_once(o, large[0], large[1], q - 1);
         send(o, BT_COLOURS, q - 1);
     }
     if (q < n) {
-        const bt_idx begin = b->start[phase * BT_PHASES + phase];
+        const bt_idx begin = b->start[phase];
         receive(o);
         visit_at_once(o, begin, begin + b->n_border[phase], q);
         send(o, phase, q);
     }
     for (int p = 0; p < n; p++) {
-        const bt_idx step = now - BT_COLOURS * p;
-        if (step < 0 || step >= b->n_steps) continue;
         for (int c = 0; c < BT_COLOURS; c++) {
-            const bt_idx *start = &b->start[step * BT_PHASES + c];
-            visit_at_once(o, start[0] + (step == c ? b->n_border[c] : 0), start[1], p);
+            const bt_idx level = now - BT_COLOURS * p - c;
+            if (level < 0 || level >= b->n_groups) continue;
+            const bt_idx *start = &b->start[level * BT_PHASES + c];
+            visit_at_once(o, start[0] + (level == 0 ? b->n_border[c] : 0), start[1], p);
         }
     }
 }
@@ -88,7 +90,7 @@ static void run_among_ranks(bt_world *w, const bt_pass *pass, int n, bt_vel *exc
     {
         shared_turn o = {.w = w, .pass = pass, .exchanged = exchanged, .under_way = -1};
         for (int q = 0; q < n; q++) o.own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
-        for (bt_idx now = 0; now < ts->bands.n_steps + BT_COLOURS * (n - 1); now++) walk_step(&o, now, n);
+        for (bt_idx now = 0; now < ts->bands.n_groups + BT_PHASES - 1 + BT_COLOURS * (n - 1); now++) walk_step(&o, now, n);
         receive(&o);
 #pragma omp critical
         for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &o.own[q]);
@@ -97,66 +99,130 @@ static void run_among_ranks(bt_world *w, const bt_pass *pass, int n, bt_vel *exc
 
 // --- on one rank -----------------------------------------------------------------------------------------------------
 
-/// Wait until a tile may have its pass q of this turn; returns the time it took, s.
-static double wait_for_others(const bt_bands *b, const bt_knot *knot, int q)
+/// A band on its way through a turn.
+typedef struct {
+    bt_idx band, taken;           ///< groups
+    bool open;                    ///< it may take more
+    bool over;
+    bt_idx now;                   ///< step, pass and phase,
+    int q, phase;
+    bt_idx i, end;                ///< and what is left of their tiles in the order
+    int64_t worked;               ///< units
+    double busy;                  ///< s
+} walk;
+
+/// Take the next of the groups that both bands of a segment may do. False when the other has taken it.
+static bool take(bt_segment *s, bool up)
 {
-    enum { PATIENCE = 4000 }; // looks: as long as a tile or two; then the other thread has perhaps no core
-    double since = 0;
+    uint64_t seen = atomic_load_explicit(&s->free, memory_order_relaxed), left;
+    do {
+        const uint64_t first = seen & UINT32_MAX, end = seen >> 32;
+        if (first == end) return false;
+        left = up ? (first + 1) | end << 32 : first | (end - 1) << 32;
+    } while (!atomic_compare_exchange_weak_explicit(&s->free, &seen, left, memory_order_relaxed, memory_order_relaxed));
+    return true; // what the other did to these floes is known from the knots
+}
+
+static walk set_out(const bt_bands *b, bt_idx band)
+{
+    const bt_segment *s = &b->segment[band / 2];
+    return (walk){.band = band, .taken = band % 2 == 0 ? s->free_begin - s->begin : s->end - s->free_end, .open = s->free_begin < s->free_end, .phase = -1};
+}
+
+/// To the next tiles of one step, pass and phase; false after the last.
+static bool go_on(const bt_bands *b, walk *f, int n)
+{
+    const bool up = f->band % 2 == 0;
+    bt_segment *s = &b->segment[f->band / 2];
+    do {
+        if (++f->phase == BT_PHASES) {
+            f->phase = 0;
+            if (++f->q == n) f->q = 0, f->now++;
+        }
+        if (f->open && f->now == f->taken) {
+            f->open = take(s, up);
+            f->taken += f->open;
+        }
+        if (!f->open && f->now >= f->taken + BT_PHASES - 1 + BT_COLOURS * (n - 1)) return false;
+        const bt_idx level = f->now - BT_COLOURS * f->q - f->phase;
+        if (level < 0 || level >= f->taken) continue;
+        const bt_idx *start = &b->start[(up ? s->begin + level : s->end - 1 - level) * BT_PHASES + f->phase];
+        f->i = start[0], f->end = start[1];
+    } while (f->i == f->end);
+    return true;
+}
+
+/// May a tile have its pass q of this turn?
+static bool is_ready(const bt_bands *b, const bt_knot *knot, int q)
+{
     for (bt_idx i = knot->begin; i < knot->end; i++) {
         const bt_knot *other = &b->knot[b->other[i]];
-        const int64_t enough = b->passes + q + (other->phase < knot->phase);
-        for (int n = 0; atomic_load_explicit(&other->done, memory_order_acquire) < enough; n++) {
-            if (since == 0) since = bt_clock();
-            if (n > PATIENCE) sched_yield();
-        }
+        if (atomic_load_explicit(&other->done, memory_order_acquire) < b->passes + q + (other->phase < knot->phase)) return false;
     }
-    return since > 0 ? bt_clock() - since : 0;
+    return true;
 }
 
-/// Returns the time spent waiting.
-static double visit_in_turn(bt_world *w, bt_idx k, const bt_pass *pass, int q, bt_totals *own)
-{
-    bt_bands *b = &w->tiles->bands;
-    const bt_idx tied = w->tiles->tile[k].knot;
-    const double waited = tied >= 0 ? wait_for_others(b, &b->knot[tied], q) : 0;
-    pass[q].visit(w, k, pass[q].context, &own[q]);
-    if (tied >= 0) atomic_store_explicit(&b->knot[tied].done, b->passes + q + 1, memory_order_release);
-    return waited;
-}
-
-/// Bands first to last − 1, by steps. Returns the time at work, s.
-static double walk_bands(bt_world *w, bt_idx first, bt_idx last, const bt_pass *pass, int n, bt_totals *own)
+/// On until a tile has to wait for others, or to the end. Returns whether it has moved.
+static bool advance(bt_world *w, walk *f, const bt_pass *pass, int n, bt_totals *own)
 {
     const bt_tiles *ts = w->tiles;
-    const bt_bands *b = &ts->bands;
-    const double began = bt_clock();
-    double waited = 0;
-    for (bt_idx now = 0; now < b->n_steps + BT_COLOURS * (n - 1); now++)
-        for (int q = 0; q < n; q++) {
-            const bt_idx step = now - BT_COLOURS * q;
-            if (step < 0 || step >= b->n_steps) continue;
-            for (int phase = 0; phase < BT_PHASES; phase++)
-                for (bt_idx band = first; band < last; band++) {
-                    const bt_idx *start = &b->start[(band * b->n_steps + step) * BT_PHASES + phase];
-                    for (bt_idx i = start[0]; i < start[1]; i++) waited += visit_in_turn(w, ts->order[i], pass, q, own);
-                }
+    bt_bands *b = &w->tiles->bands;
+    double began = 0;
+    for (;; f->i++) {
+        if (f->i == f->end && !go_on(b, f, n)) {
+            f->over = true;
+            break;
         }
-    return bt_clock() - began - waited;
+        const bt_idx k = ts->order[f->i];
+        bt_knot *knot = ts->tile[k].knot >= 0 ? &b->knot[ts->tile[k].knot] : NULL;
+        if (knot && !is_ready(b, knot, f->q)) break;
+        if (began == 0) began = bt_clock();
+        pass[f->q].visit(w, k, pass[f->q].context, &own[f->q]);
+        f->worked += ts->tile[k].n_units;
+        if (knot) atomic_store_explicit(&knot->done, b->passes + f->q + 1, memory_order_release);
+    }
+    if (began > 0) f->busy += bt_clock() - began;
+    return began > 0 || f->over;
+}
+
+/// All bands of one thread, each as far as it comes.
+static void walk_bands(bt_world *w, walk *band, bt_idx n_bands, const bt_pass *pass, int n, bt_totals *own)
+{
+    enum { PATIENCE = 4000 }; // looks: as long as a tile or two; then the other thread has perhaps no core
+    bt_idx left = n_bands;
+    for (int idle = 0; left > 0; idle++) {
+        for (bt_idx k = 0; k < n_bands; k++) {
+            if (band[k].over || !advance(w, &band[k], pass, n, own)) continue;
+            idle = 0;
+            left -= band[k].over;
+        }
+        if (idle > PATIENCE) sched_yield();
+    }
 }
 
 /// Passes on one rank, one behind the other.
 static void run_alone(bt_world *w, const bt_pass *pass, int n)
 {
     bt_bands *b = &w->tiles->bands;
-#pragma omp parallel num_threads(b->n > 1 ? b->n : 1)
+    for (bt_idx s = 0; s < (b->n + 1) / 2; s++) b->segment[s].free = (uint64_t)b->segment[s].free_begin | (uint64_t)b->segment[s].free_end << 32;
+#pragma omp parallel num_threads(b->n_threads)
     {
         const bt_idx team = omp_get_num_threads(), me = omp_get_thread_num(); // the team may be smaller than asked
+        const bt_idx first = bt_bands_of(b, me, team), end = bt_bands_of(b, me + 1, team);
         bt_totals own[BT_MAX_TURN];
         for (int q = 0; q < n; q++) own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
-        const double busy = walk_bands(w, me * b->n / team, (me + 1) * b->n / team, pass, n, own);
-        if (team == b->n) b->busy[me] += busy;
+        walk *band = bt_alloc_aligned((size_t)(end - first), sizeof *band);
+        for (bt_idx k = first; k < end; k++) band[k - first] = set_out(b, k);
+        walk_bands(w, band, end - first, pass, n, own);
 #pragma omp critical
-        for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &own[q]);
+        {
+            for (int q = 0; q < n; q++) bt_totals_merge(pass[q].totals, &own[q]);
+            for (bt_idx k = first; k < end; k++) {
+                b->busy[k] += band[k - first].busy;
+                b->worked[k] += (double)band[k - first].worked;
+            }
+        }
+        free(band);
     }
     b->passes += n;
 }
@@ -179,13 +245,15 @@ void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_t
     const bt_tiles *ts = w->tiles;
     const bt_bands *b = &ts->bands;
     const bool alone = !w->domain;
-#pragma omp parallel if (alone ? b->n > 1 : BT_MANY(ts->n_units, BT_FEW_UNITS))
+#pragma omp parallel if (alone ? b->n_threads > 1 : BT_MANY(ts->n_units, BT_FEW_UNITS))
     {
         bt_totals own = {.n_sums = t->n_sums};
         if (alone) {
-#pragma omp for schedule(static, 1)
-            for (bt_idx band = 0; band < b->n; band++)
-                for (bt_idx i = b->start[band * b->n_steps * BT_PHASES]; i < b->start[(band + 1) * b->n_steps * BT_PHASES]; i++) visit(w, ts->order[i], context, &own);
+#pragma omp for schedule(static)
+            for (bt_idx thread = 0; thread < b->n_threads; thread++) {
+                const bt_idx first = b->edge[bt_bands_of(b, thread, b->n_threads)], end = b->edge[bt_bands_of(b, thread + 1, b->n_threads)];
+                for (bt_idx i = b->start[first * BT_PHASES]; i < b->start[end * BT_PHASES]; i++) visit(w, ts->order[i], context, &own);
+            }
         } else {
 #pragma omp for schedule(dynamic, 4)
             for (bt_idx i = 0; i < ts->n_order; i++) visit(w, ts->order[i], context, &own);
@@ -204,7 +272,9 @@ void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
         for (bt_idx k = 0; k < ts->n; k++) visit(w, k, context, NULL);
         return;
     }
-#pragma omp parallel for schedule(static, 1) num_threads(b->n > 1 ? b->n : 1)
-    for (bt_idx band = 0; band < b->n; band++)
-        for (bt_idx i = b->first[band]; i < b->first[band + 1]; i++) visit(w, b->member[i], context, NULL);
+#pragma omp parallel for schedule(static) num_threads(b->n_threads)
+    for (bt_idx thread = 0; thread < b->n_threads; thread++) {
+        const bt_idx first = b->first[bt_bands_of(b, thread, b->n_threads)], end = b->first[bt_bands_of(b, thread + 1, b->n_threads)];
+        for (bt_idx i = first; i < end; i++) visit(w, b->member[i], context, NULL);
+    }
 }

@@ -33,7 +33,7 @@ void bt_tiles_free(bt_tiles *t)
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
     const bt_bands *b = &t->bands;
     void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, b->start, b->member, b->first, b->share,
-                      b->busy, b->dealt, b->knot, b->other, t->tile, t};
+                      b->busy, b->worked, b->segment, b->edge, b->knot, b->other, t->tile, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 

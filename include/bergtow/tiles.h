@@ -78,7 +78,7 @@ typedef struct bt_tile {
     bool own;                       ///< this rank solves its contacts and answers for its bodies
     bool border;                    ///< some body of its block is held by other ranks too
     bt_idx ahead;                   ///< tile that comes soon after it in the order of the pass, −1 = none
-    bt_idx knot;                    ///< its knot, −1 = no neighbour is in another band
+    bt_idx knot;                    ///< its knot, −1 = all its neighbours are the same thread's
     bt_idx depth;                   ///< among ranks: tiles from the nearest tile for which others wait (src/order.h)
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
@@ -104,23 +104,34 @@ typedef struct bt_tile {
     bt_idx cap_unit_history, cap_body_history;
 } bt_tile;
 
-/// A tile that shares its block with tiles of other bands.
+/// A tile that may share its block with tiles that another thread does.
 typedef struct bt_knot {
     _Atomic int64_t done;           ///< passes that it has behind it
-    bt_idx begin, end;              ///< its neighbours in other bands, among bt_bands.other
+    bt_idx begin, end;              ///< those tiles, among bt_bands.other
     int8_t phase;
     char apart[64 - sizeof(int64_t) - 2 * sizeof(bt_idx) - 1]; ///< a cache line each
 } bt_knot;
 
-/// The order of a pass; on one rank a band for each thread (src/order.h).
+/// Groups of rows between two places where passes begin: one band goes up from the first, one, if any, down from the last, until they meet.
+typedef struct bt_segment {
+    _Atomic uint64_t free;          ///< groups that neither has taken in this turn: the first, and 2³² times the end
+    bt_idx begin, end;              ///< groups
+    bt_idx free_begin, free_end;    ///< those that either may take
+    char apart[64 - sizeof(uint64_t) - 4 * sizeof(bt_idx)];
+} bt_segment;
+
+/// The order of a pass (src/order.h).
 typedef struct bt_bands {
-    bt_idx n, n_steps;              ///< among ranks n = 1
-    bt_idx *start;                  ///< [n][n_steps][BT_PHASES] and the end: place in the order
-    bt_idx n_border[BT_COLOURS];    ///< border tiles of each phase: the first of that phase in the step of the same number
+    bt_idx n, n_threads;            ///< bands, and threads for them; among ranks one band, shared by all threads
+    bt_idx n_groups;
+    bt_idx *start;                  ///< [n_groups][BT_PHASES] and the end: place in the order
+    bt_segment *segment;            ///< [(n + 1) / 2] bands 2 s (up) and 2 s + 1 (down) are in segment s
+    bt_idx *edge;                   ///< [n + 1] groups that each band is expected to do
+    bt_idx n_border[BT_COLOURS];    ///< among ranks: border tiles of each phase, the first of that phase in group 0
     bt_idx *member, *first;         ///< all tiles, with work or not, those of band b from first[b] on [n + 1]
-    double *share;                  ///< [n_shares] of the units each band is to have
-    double *busy;                   ///< [n_shares] s that its thread has worked in passes of this order, without waiting
-    double *dealt;                  ///< [n_shares] of the units that each band has
+    double *share;                  ///< [n_shares] of the units each band is expected to do
+    double *busy;                   ///< [n_shares] s that it has been worked on in passes of this order, without waiting
+    double *worked;                 ///< [n_shares] units that it has visited in that time
     bt_idx n_shares;
     bt_knot *knot;                  ///< [n_knots]
     bt_idx *other;                  ///< knots

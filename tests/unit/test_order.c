@@ -21,7 +21,14 @@ typedef struct {
 typedef struct {
     int pass;
     log_of_passes *log;
+    int held_up; ///< this thread takes long over each tile; −1 = none, −2 = any over some tiles
 } visitor;
+
+static void take_long(double seconds)
+{
+    const double began = bt_clock();
+    while (bt_clock() < began + seconds) {}
+}
 
 static bool movable(const bt_world *w, bt_idx i) { return w->bodies.inv[i].m > 0; }
 
@@ -32,6 +39,8 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const bt_tile *tile = &w->tiles->tile[k];
     const int now = BT_PHASES * v->pass + tile->phase;
     atomic_fetch_add(&log->visits[v->pass * w->tiles->n + k], 1);
+    if (v->held_up == omp_get_thread_num()) take_long(20e-6);
+    if (v->held_up == -2 && (k * 7 + v->pass * 13) % 101 == 0) take_long(200e-6);
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_idx ends[2] = {tile->units[j].a, tile->units[j].b};
         for (int e = 0; e < 2; e++) {
@@ -50,8 +59,8 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     t->most = bt_max(t->most, v->pass);
 }
 
-/// n passes in turn.
-static void assert_sound(bt_world *w, int n)
+/// n passes in turn; one thread may be held up (visitor).
+static void assert_sound_with(bt_world *w, int n, int held_up)
 {
     const size_t bodies = (size_t)w->bodies.n, tiles = (size_t)w->tiles->n;
     log_of_passes log = {.holder = bt_alloc(bodies, sizeof *log.holder), .stamp = bt_alloc(bodies, sizeof *log.stamp), .visits = bt_alloc(TURN * tiles, sizeof *log.visits)};
@@ -59,7 +68,7 @@ static void assert_sound(bt_world *w, int n)
     bt_pass pass[TURN];
     bt_totals t[TURN];
     for (int q = 0; q < n; q++) {
-        v[q] = (visitor){q, &log};
+        v[q] = (visitor){q, &log, held_up};
         t[q] = (bt_totals){.n_sums = 1};
         pass[q] = (bt_pass){visit, &v[q], &t[q], false};
     }
@@ -76,6 +85,8 @@ static void assert_sound(bt_world *w, int n)
     free(log.visits);
 }
 
+static void assert_sound(bt_world *w, int n) { assert_sound_with(w, n, -1); }
+
 static bool tied(const bt_world *w, bt_idx k, bt_idx l)
 {
     const bt_bands *b = &w->tiles->bands;
@@ -86,15 +97,26 @@ static bool tied(const bt_world *w, bt_idx k, bt_idx l)
     return false;
 }
 
-/// Two tiles of different bands that share a body wait for each other: a race that is seldom lost is found here.
+/// Band that is expected to do each tile, n bands for those that either of two may do.
+static bt_idx *bands_of_tiles(const bt_world *w)
+{
+    const bt_tiles *t = w->tiles;
+    const bt_bands *b = &t->bands;
+    bt_idx *band = bt_alloc((size_t)t->n, sizeof *band);
+    for (bt_idx k = 0; k < b->n; k++)
+        for (bt_idx i = b->first[k]; i < b->first[k + 1]; i++) band[b->member[i]] = k;
+    for (bt_idx s = 0; s < (b->n + 1) / 2; s++)
+        for (bt_idx i = b->start[b->segment[s].free_begin * BT_PHASES]; i < b->start[b->segment[s].free_end * BT_PHASES]; i++) band[t->order[i]] = b->n;
+    return band;
+}
+
+/// Two tiles that share a body, and that two threads may do, wait for each other: a race that is seldom lost is found here.
 static void assert_tied(const bt_world *w)
 {
     enum { MOST = 5 }; // the tiles of a floe's corner, and that of the large bodies
     const bt_tiles *t = w->tiles;
-    bt_idx *band = bt_alloc((size_t)t->n, sizeof *band), *meets = bt_alloc((size_t)w->bodies.n * MOST, sizeof *meets);
+    bt_idx *band = bands_of_tiles(w), *meets = bt_alloc((size_t)w->bodies.n * MOST, sizeof *meets);
     int *n_meets = bt_alloc((size_t)w->bodies.n, sizeof *n_meets);
-    for (bt_idx b = 0; b < t->bands.n; b++)
-        for (bt_idx i = t->bands.first[b]; i < t->bands.first[b + 1]; i++) band[t->bands.member[i]] = b;
     for (bt_idx k = 0; k < t->n; k++)
         for (bt_idx j = 0; j < t->tile[k].n_units; j++) {
             const bt_idx ends[2] = {t->tile[k].units[j].a, t->tile[k].units[j].b};
@@ -104,7 +126,7 @@ static void assert_tied(const bt_world *w)
                 if (n_meets[i] > 0 && meets[i * MOST + n_meets[i] - 1] == k) continue;
                 for (int m = 0; m < n_meets[i]; m++) {
                     const bt_idx l = meets[i * MOST + m];
-                    assert_true(band[k] == band[l] || (tied(w, k, l) && tied(w, l, k)));
+                    assert_true((band[k] == band[l] && band[k] < t->bands.n) || (tied(w, k, l) && tied(w, l, k)));
                 }
                 assert_in_range(n_meets[i], 0, MOST - 1);
                 meets[i * MOST + n_meets[i]++] = k;
@@ -113,6 +135,14 @@ static void assert_tied(const bt_world *w)
     free(band);
     free(meets);
     free(n_meets);
+}
+
+static int n_free(const bt_world *w)
+{
+    const bt_bands *b = &w->tiles->bands;
+    int n = 0;
+    for (bt_idx s = 0; s < (b->n + 1) / 2; s++) n += b->segment[s].free_end - b->segment[s].free_begin;
+    return n;
 }
 
 typedef struct {
@@ -146,9 +176,6 @@ static bt_world *fill(const scene *s, uint64_t *rng)
     return w;
 }
 
-/// Levels of the tiles, from what the order says of them.
-static bt_idx levels_of(const bt_world *w) { return w->tiles->bands.n_steps - BT_PHASES + 1; }
-
 static void every_body_meets_its_tiles_in_order(void **state)
 {
     (void)state;
@@ -161,26 +188,33 @@ static void every_body_meets_its_tiles_in_order(void **state)
         {30, 300, false, false, 0.5, 0}, {480, 30, true, false, 0.001, 0.5},
         // A row of tiles is 1/240: a large body on even and odd rows, where levels rise and fall, beside a border of bands.
         {30, 480, false, true, 0.5, 0.1}, {30, 480, false, true, 0.5, 0.1 + 1.0 / 240}, {30, 480, false, true, 0.5, 0.5}, {30, 480, false, true, 0.5, 0.5 + 1.0 / 240},
+        {12, 1200, false, false, -1, 0}, {12, 1200, false, true, -1, 0}, {12, 1200, false, false, 0.5, 0.5}, {12, 1200, false, true, 0.5, 0.26}, {1200, 12, false, false, 0.75, 0.5},
         {30, 480, false, true, 0.5, 0.8}, {30, 480, false, true, 0.5, 0.8 + 1.0 / 240}, {480, 30, false, false, 0.3, 0.5}, {480, 30, false, false, 0.3 + 1.0 / 240, 0.5},
     };
-    int with_levels = 0, knotted_large = 0;
+    int with_levels = 0, knotted_large = 0, meeting = 0, fixed = 0;
     for (size_t f = 0; f < sizeof scenes / sizeof *scenes; f++)
         for (int threads = 1; threads <= 4; threads++) {
             omp_set_num_threads(threads);
             bt_world *w = fill(&scenes[f], &rng);
             const bt_tiles *t = w->tiles;
             const bt_tile *large = &t->tile[t->n - 1];
-            for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+            for (int n = 1; n <= TURN; n++) assert_sound_with(w, n, n % 2 == 0 ? -2 : n == TURN - 1 ? (int)f % threads : -1);
             assert_tied(w);
-            assert_int_equal(t->bands.n, threads);
+            const bool ring = t->n_y >= t->n_x ? t->n_y == t->wrap_y : t->n_x == t->wrap_x;
+            assert_int_equal(t->bands.n_threads, threads);
+            assert_int_equal(t->bands.n, threads + (ring && threads % 2 == 1));
             assert_int_equal(scenes[f].at_x >= 0, large->n_units > 0);
-            assert_true(threads == 1 || t->bands.n_knots > 0);
-            with_levels += levels_of(w) >= 4;
+            assert_true(t->bands.n == 1 || t->bands.n_knots > 0);
+            with_levels += t->bands.n_groups >= 4;
+            meeting += n_free(w) > 0;
+            fixed += t->bands.n > 1 && n_free(w) == 0;
             knotted_large += large->n_units > 0 && large->knot >= 0;
             bt_world_free(w);
         }
     assert_true(with_levels >= 12);
     assert_true(knotted_large >= 3);
+    assert_true(meeting >= 6);
+    assert_true(fixed >= 10);
 }
 
 /// Rings of 2 to 50 rows of tiles, with bands as thin as two rows.
@@ -194,10 +228,10 @@ static void passes_meet_on_a_short_ring_in_order(void **state)
             for (int threads = 1; threads <= 4; threads++) {
                 omp_set_num_threads(threads);
                 bt_world *w = fill(&(scene){length, width, false, true, -1, 0}, &rng);
-                for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+                for (int n = 1; n <= TURN; n++) assert_sound_with(w, n, n == TURN - 1 ? -2 : -1);
                 assert_tied(w);
                 const bt_tiles *t = w->tiles;
-                n_thin += t->bands.n > 1 && t->wrap_y < 4 * t->bands.n;
+                n_thin += t->bands.n_threads > 1 && t->wrap_y < 4 * t->bands.n;
                 n_rings += t->n_y == t->wrap_y && t->n_y >= t->n_x;
                 most = t->wrap_y > most ? t->wrap_y : most;
                 bt_world_free(w);
@@ -227,6 +261,34 @@ static void a_small_team_has_several_bands_each(void **state)
     bt_world_free(w);
 }
 
+/// The groups about the middle are done by the thread that comes first, all of them if the other is very late, and some are left to it.
+static void bands_meet_where_their_threads_do(void **state)
+{
+    (void)state;
+    uint64_t rng = 6;
+    omp_set_num_threads(2);
+    bt_world *w = fill(&(scene){12, 2400, false, false, -1, 0}, &rng);
+    const bt_bands *b = &w->tiles->bands;
+    assert_int_equal(b->n, 2);
+    assert_true(n_free(w) >= 8);
+    for (int late = 0; late < 2; late++) {
+        b->worked[0] = b->worked[1] = 0;
+        assert_sound_with(w, TURN, late);
+        assert_true(b->worked[!late] > 1.2 * b->worked[late]);
+        CHECK_CLOSE(b->worked[0] + b->worked[1], TURN * w->tiles->n_units, 0);
+    }
+    bt_world_free(w);
+}
+
+/// Units of the tiles that each band is expected to do, as a share of all.
+static double dealt_to(const bt_world *w, bt_idx band)
+{
+    const bt_bands *b = &w->tiles->bands;
+    double n = 0;
+    for (bt_idx i = b->first[band]; i < b->first[band + 1]; i++) n += w->tiles->tile[b->member[i]].n_units;
+    return n / w->tiles->n_units;
+}
+
 /// A band that took three times as long has less to do in the next step, none ends with nothing, and the order is sound.
 static void slow_bands_get_less(void **state)
 {
@@ -236,25 +298,48 @@ static void slow_bands_get_less(void **state)
     bt_world *w = fill(&(scene){30, 480, false, false, -1, 0}, &rng);
     bt_bands *b = &w->tiles->bands;
     assert_int_equal(b->n, 4);
+    for (int k = 0; k < 4; k++) assert_true(fabs(dealt_to(w, k) - 0.25) < 0.03);
     assert_sound(w, 2);
-    for (int k = 0; k < 4; k++) assert_true(b->busy[k] > 0 && fabs(b->dealt[k] - 0.25) < 0.02);
+    for (int k = 0; k < 4; k++) assert_true(b->busy[k] > 0 && b->worked[k] > 0);
     for (int step = 0; step < 20; step++) { // pace 1, 1/3, 1, 1
-        for (int k = 0; k < 4; k++) b->busy[k] = b->dealt[k] * (k == 1 ? 3 : 1);
+        for (int k = 0; k < 4; k++) b->worked[k] = 1, b->busy[k] = k == 1 ? 3 : 1;
         bt_order_tiles(w);
     }
-    for (int k = 0; k < 4; k++) assert_true(fabs(b->dealt[k] - (k == 1 ? 0.125 : 0.875 / 3)) < 0.03); // an eighth is the least
+    for (int k = 0; k < 4; k++) assert_true(fabs(dealt_to(w, k) - (k == 1 ? 0.125 : 0.875 / 3)) < 0.04); // an eighth is the least
     for (int n = 1; n <= TURN; n++) assert_sound(w, n);
     assert_tied(w);
     bt_world_free(w);
 }
 
-/// Two heaps with nothing between them, after a step in which there was something.
+/// Three threads on a ring of four bands: the two of one thread are half as large each.
+static void threads_of_two_bands_have_no_more(void **state)
+{
+    (void)state;
+    uint64_t rng = 9;
+    omp_set_num_threads(3);
+    bt_world *w = fill(&(scene){30, 480, false, true, -1, 0}, &rng);
+    const bt_bands *b = &w->tiles->bands;
+    assert_int_equal(b->n, 4);
+    for (int step = 0; step < 10; step++) {
+        for (int k = 0; k < 4; k++) b->worked[k] = b->busy[k] = 1;
+        bt_order_tiles(w);
+    }
+    for (bt_idx t = 0; t < 3; t++) {
+        double all = 0;
+        for (bt_idx k = bt_bands_of(b, t, 3); k < bt_bands_of(b, t + 1, 3); k++) all += dealt_to(w, k);
+        assert_true(fabs(all - 1.0 / 3) < 0.05);
+    }
+    for (int n = 1; n <= TURN; n++) assert_sound(w, n);
+    bt_world_free(w);
+}
+
+/// Two heaps with nothing between them, after a step in which there was something: nobody waits, in a field too short for bands that meet anywhere.
 static void heaps_far_apart_are_not_tied(void **state)
 {
     (void)state;
     uint64_t rng = 4;
     omp_set_num_threads(2);
-    bt_world *w = fill(&(scene){30, 480, false, false, -1, 0}, &rng);
+    bt_world *w = fill(&(scene){60, 90, false, false, -1, 0}, &rng);
     bt_tiles *t = w->tiles;
     assert_int_equal(t->bands.n, 2);
     assert_true(t->bands.n_knots > 0);
@@ -268,6 +353,7 @@ static void heaps_far_apart_are_not_tied(void **state)
     t->bands.busy[0] = 0;
     bt_order_tiles(w);
     assert_int_equal(t->bands.n, 2);
+    assert_int_equal(n_free(w), 0);
     assert_int_equal(t->bands.n_knots, 0);
     for (int n = 1; n <= TURN; n++) assert_sound(w, n);
     bt_world_free(w);
@@ -276,7 +362,8 @@ static void heaps_far_apart_are_not_tied(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(every_body_meets_its_tiles_in_order), cmocka_unit_test(passes_meet_on_a_short_ring_in_order),
-                                       cmocka_unit_test(a_small_team_has_several_bands_each), cmocka_unit_test(slow_bands_get_less),
+                                       cmocka_unit_test(a_small_team_has_several_bands_each), cmocka_unit_test(bands_meet_where_their_threads_do), cmocka_unit_test(slow_bands_get_less),
+                                       cmocka_unit_test(threads_of_two_bands_have_no_more),
                                        cmocka_unit_test(heaps_far_apart_are_not_tied)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
