@@ -52,6 +52,8 @@ static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_tile *t
     }
 }
 
+static bool is_under(const bt_domain *d, const bt_tile *t) { return d->under[(int64_t)(t->y - d->low_y) * d->n_x + t->x - d->low_x]; }
+
 /// Lists of bodies for the tiles that this rank holds.
 static void list_bodies(bt_world *w)
 {
@@ -66,7 +68,7 @@ static void list_bodies(bt_world *w)
         for (int p = 0; p < BT_PHASES; p++) {
             int32_t at[2];
             int solver = -1;
-            if (p == BT_COLOURS) solver = d->under[(int64_t)(tile->y - d->low_y) * d->n_x + tile->x - d->low_x] ? d->large_owner : -1;
+            if (p == BT_COLOURS) solver = is_under(d, tile) ? d->large_owner : -1;
             else if (bt_division_toucher(w, p, tile->x, tile->y, at)) solver = bt_division_owner(w, at[0], at[1]);
             if (solver < 0) continue;
             for (int h = 0; h < n; h++) {
@@ -149,7 +151,7 @@ static void mark_owned(bt_world *w)
             const bt_tile *other = &t->tile[block[j]];
             int holder[BT_MAX_HOLDERS];
             if (bt_division_holders(w, other->x, other->y, holder) > 1) tile->border = true;
-            if (d->under[(int64_t)(other->y - d->low_y) * d->n_x + other->x - d->low_x]) beside_large = true;
+            if (is_under(d, other)) beside_large = true;
         }
         tile->depth = tile->border || beside_large ? 0 : -1;
     }
@@ -190,7 +192,7 @@ void bt_domain_connect(bt_world *w)
 {
     if (!w->domain) return;
     mark_owned(w);
-    bt_order_measure(w->tiles);
+    bt_order_depths(w->tiles);
     bt_halo_connect(w);
     bt_domain_check(w);
 }

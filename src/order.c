@@ -51,9 +51,13 @@ static void spread_depths(bt_tiles *t, bt_idx *more, bt_idx n)
     }
 }
 
-bt_idx bt_bands_of(const bt_bands *b, bt_idx t, bt_idx n_threads) { return t * b->n / n_threads; }
+bt_idx bt_bands_of(const bt_bands *b, bt_idx t, bt_idx n_threads)
+{
+    if (n_threads > 1 && b->n == n_threads + 1) return t > 1 ? t + 1 : t; // thread 1 has two, of different pairs: it can be relieved on both sides
+    return t * b->n / n_threads;
+}
 
-void bt_order_measure(bt_tiles *t)
+void bt_order_depths(bt_tiles *t)
 {
     bt_idx *reached = bt_alloc((size_t)t->n, sizeof *reached), n = 0;
     for (bt_idx k = 0; k < t->n - 1; k++)
@@ -195,7 +199,8 @@ static bt_idx group_rows(rows *r, bt_idx begin, bt_idx end, bt_idx group, bool d
 /// Join groups of rows [begin, end), n of them from `group` on (or downwards), so that `most` are left.
 static void thin_out(rows *r, bt_idx begin, bt_idx end, bt_idx group, bool down, bt_idx n, bt_idx most)
 {
-    for (bt_idx u = begin; n > most && u < end; u++) {
+    if (n <= most) return;
+    for (bt_idx u = begin; u < end; u++) {
         const bt_idx level = down ? group - r->group[u] : r->group[u] - group;
         const bt_idx now = (bt_idx)((int64_t)level * most / n);
         r->group[u] = down ? group - now : group + now;
@@ -330,7 +335,7 @@ static void mark_near_large(const bt_world *w, bool *near)
     }
 }
 
-/// Tiles with work that may share a floe with tile k, itself among them; some may be there twice.
+/// Tiles with work that may share a floe with tile k, itself among them.
 static int list_neighbours(const bt_world *w, const bool *near, bt_idx k, bt_idx out[10])
 {
     const bt_tiles *t = w->tiles;
@@ -414,10 +419,11 @@ static void look_ahead(bt_tiles *t, const bt_idx *group)
     const bt_bands *b = &t->bands;
     for (bt_idx k = 0; k < b->n; k++)
         for (bt_idx i = b->start[b->edge[k] * BT_PHASES]; i < b->start[b->edge[k + 1] * BT_PHASES]; i++) {
+            const bt_segment *s = &b->segment[k / 2];
             bt_tile *tile = &t->tile[t->order[i]];
             const bt_idx g = group[t->order[i]], end = b->start[g * BT_PHASES + tile->phase + 1], behind = k % 2 == 0 ? g - 1 : g + 1;
             bt_idx at = i + AHEAD;
-            if (at >= end && behind >= 0 && behind < b->n_groups && tile->phase < BT_COLOURS) {
+            if (at >= end && behind >= s->begin && behind < s->end && tile->phase < BT_COLOURS) {
                 const bt_idx *next = &b->start[behind * BT_PHASES + (tile->phase + 1) % BT_COLOURS];
                 at = next[0] + at - end < next[1] ? next[0] + at - end : -1;
             } else if (at >= end) at = -1;

@@ -139,7 +139,7 @@ static bool go_on(const bt_bands *b, walk *f, int n)
             f->phase = 0;
             if (++f->q == n) f->q = 0, f->now++;
         }
-        if (f->open && f->now == f->taken) {
+        if (f->open && f->now == f->taken) { // in pass 0 and phase 0: before the step has a tile that could wait for this group
             f->open = take(s, up);
             f->taken += f->open;
         }
@@ -190,13 +190,16 @@ static void walk_bands(bt_world *w, walk *band, bt_idx n_bands, const bt_pass *p
 {
     enum { PATIENCE = 4000 }; // looks: as long as a tile or two; then the other thread has perhaps no core
     bt_idx left = n_bands;
-    for (int idle = 0; left > 0; idle++) {
+    int idle = 0;
+    while (left > 0) {
+        bool moved = false;
         for (bt_idx k = 0; k < n_bands; k++) {
             if (band[k].over || !advance(w, &band[k], pass, n, own)) continue;
-            idle = 0;
+            moved = true;
             left -= band[k].over;
         }
-        if (idle > PATIENCE) sched_yield();
+        idle = moved ? 0 : idle + (idle < PATIENCE);
+        if (idle == PATIENCE) sched_yield();
     }
 }
 
@@ -245,7 +248,7 @@ void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_t
     const bt_tiles *ts = w->tiles;
     const bt_bands *b = &ts->bands;
     const bool alone = !w->domain;
-#pragma omp parallel if (alone ? b->n_threads > 1 : BT_MANY(ts->n_units, BT_FEW_UNITS))
+#pragma omp parallel if (alone || BT_MANY(ts->n_units, BT_FEW_UNITS)) num_threads(alone ? b->n_threads : omp_get_max_threads())
     {
         bt_totals own = {.n_sums = t->n_sums};
         if (alone) {

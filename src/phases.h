@@ -38,7 +38,7 @@ enum { BT_MAX_TURN = 6 }; ///< passes of a turn
 /// waits for are still worked on. Collective.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
 
-/// n passes in turn, with the results of n calls of bt_phases_run; on one rank they follow each other through the field (order.h). Collective.
+/// n passes in turn, with the results of n calls of bt_phases_run; they follow each other through the field (order.h). Collective.
 void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged);
 
 /// Visit the tiles with work in any order, all at once.

@@ -54,8 +54,8 @@ TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
 # Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
 CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
-# Six sweeps that follow each other through the strips of one rank, as in large fields; among ranks one after the other. In a row of columns, with
-# the berg's tile after one of them, and on a ring of rows.
+# Six sweeps that follow each other through the bands of one rank, or from the border of each rank inwards, as in large fields: in columns, with
+# the berg's tile beside one of them, and on a ring of rows. Levels are many in the validation build only.
 TURNS = changed(LINE, solver__turn_rows=1)
 RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal"}, solver__turn_rows=1)
 CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH, "turns": TURNS, "ring": RING}
@@ -130,7 +130,8 @@ def test_the_same_bits(alone, name, ranks, threads):
     assert 0 <= r.summary["dealt_imbalance"] <= r.summary["worst_dealt_imbalance"]
 
 
-@pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2)])
+@pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
+                                                   ("turns", 2, 2), ("ring", 2, 2), ("ring", 4, 1)])
 def test_the_division_is_sound(alone, name, ranks, threads):
     """In the validation build: every body that several ranks hold is the same there, bit for bit, after each migration and every
     20 steps; threads share every loop, however few the contacts. And another optimisation gives the same numbers."""
