@@ -26,6 +26,7 @@ typedef struct {
     bt_vel *exchanged;
     bt_totals own[BT_MAX_TURN];
     int under_way;                ///< phase whose velocities other ranks have not told yet; −1 = none
+    bool shared;                  ///< with other threads
 } shared_turn;
 
 /// Tiles [begin, end) of the order, which share no body, in pass q, by all threads.
@@ -33,8 +34,13 @@ static void visit_at_once(shared_turn *o, bt_idx begin, bt_idx end, int q)
 {
     if (begin == end) return;
     const bt_pass *pass = &o->pass[q];
+    const bt_idx *order = o->w->tiles->order;
+    if (!o->shared) { // a group has few tiles: handing them out would cost one thread some per cent
+        for (bt_idx i = begin; i < end; i++) pass->visit(o->w, order[i], pass->context, &o->own[q]);
+        return;
+    }
 #pragma omp for schedule(dynamic, 2)
-    for (bt_idx i = begin; i < end; i++) pass->visit(o->w, o->w->tiles->order[i], pass->context, &o->own[q]);
+    for (bt_idx i = begin; i < end; i++) pass->visit(o->w, order[i], pass->context, &o->own[q]);
 }
 
 /// To be called before anything that other ranks changed is read.
@@ -88,7 +94,7 @@ static void run_among_ranks(bt_world *w, const bt_pass *pass, int n, bt_vel *exc
     // Four barriers a pass and more: worth while later than bands are.
 #pragma omp parallel if (BT_MANY(ts->n_units, 2 * BT_FEW_UNITS))
     {
-        shared_turn o = {.w = w, .pass = pass, .exchanged = exchanged, .under_way = -1};
+        shared_turn o = {.w = w, .pass = pass, .exchanged = exchanged, .under_way = -1, .shared = omp_get_num_threads() > 1};
         for (int q = 0; q < n; q++) o.own[q] = (bt_totals){.n_sums = pass[q].totals->n_sums};
         for (bt_idx now = 0; now < ts->bands.n_groups + BT_PHASES - 1 + BT_COLOURS * (n - 1); now++) walk_step(&o, now, n);
         receive(&o);
