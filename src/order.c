@@ -51,12 +51,6 @@ static void spread_depths(bt_tiles *t, bt_idx *more, bt_idx n)
     }
 }
 
-bt_idx bt_bands_of(const bt_bands *b, bt_idx t, bt_idx n_threads)
-{
-    if (n_threads > 1 && b->n == n_threads + 1) return t > 1 ? t + 1 : t; // thread 1 has two, of different pairs: it can be relieved on both sides
-    return t * b->n / n_threads;
-}
-
 void bt_order_depths(bt_tiles *t)
 {
     bt_idx *reached = bt_alloc((size_t)t->n, sizeof *reached), n = 0;
@@ -136,6 +130,12 @@ static void join_met(rows *r, const bool *met)
     if (r->ring && first + r->n - last < widest) first = gap_end, last = gap_end - widest + r->n;
     for (bt_idx u = first; u < last; u++) r->joined[u % r->n] = true;
     r->large = first;
+}
+
+bt_idx bt_bands_of(const bt_bands *b, bt_idx t, bt_idx n_threads)
+{
+    if (n_threads > 1 && b->n == n_threads + 1) return t > 1 ? t + 1 : t; // thread 1 has two, of different pairs: it can be relieved on both sides
+    return t * b->n / n_threads;
 }
 
 /// Shares of the work that let the threads end together: as in the last step, but from the time that each band took for what it did.

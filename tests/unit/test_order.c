@@ -311,7 +311,7 @@ static void slow_bands_get_less(void **state)
     bt_world_free(w);
 }
 
-/// Three threads on a ring of four bands: the two of one thread are half as large each.
+/// Three threads on a ring of four bands: the two of one thread are half as large each, and of different pairs, so that each thread meets another.
 static void threads_of_two_bands_have_no_more(void **state)
 {
     (void)state;
@@ -328,6 +328,7 @@ static void threads_of_two_bands_have_no_more(void **state)
         double all = 0;
         for (bt_idx k = bt_bands_of(b, t, 3); k < bt_bands_of(b, t + 1, 3); k++) all += dealt_to(w, k);
         assert_true(fabs(all - 1.0 / 3) < 0.05);
+        for (bt_idx k = bt_bands_of(b, t, 3) + 1; k < bt_bands_of(b, t + 1, 3); k++) assert_true(k % 2 == 0); // 2 s and 2 s + 1 are a pair
     }
     for (int n = 1; n <= TURN; n++) assert_sound(w, n);
     bt_world_free(w);
