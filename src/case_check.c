@@ -427,6 +427,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bool placed = check_body(&k, &n, v);
     bt_case_tow_hull(c, n, v);
     check_tow(&k);
+    bt_case_tow_ramp(c);
     bt_case_tow_check(&k);
     follow_impact(c);
     if (placed) check_path(&k, n, v);

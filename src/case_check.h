@@ -38,6 +38,11 @@ double bt_case_tow_distance(const bt_case *c, double t);
 /// Time at which the tow has led along this way at the latest within the run, s.
 double bt_case_tow_time(const bt_case *c, double way);
 
+/// Natural period of the body, with added mass, on its line or lines (taken as parallel), against the vessel in mode thrust, s; 0 without a line.
+double bt_case_line_period(const bt_case *c);
+
+#define BT_RAMP_PERIODS 2.0 ///< of the body on its line that a start takes which does not jerk it, assumed
+
 /// A check under way, for the checks that stand in files of their own (case_tow.c).
 typedef struct bt_check bt_check;
 bt_case *bt_check_case(const bt_check *k);
@@ -49,6 +54,8 @@ void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __
 void bt_case_tow_course(const bt_check *k);
 /// Defaults of the tow that follow from other keys; body.x and body.y are there.
 void bt_case_tow_follow(const bt_check *k);
+/// tow.ramp, where it is not given; the tow mode and the body are there.
+void bt_case_tow_ramp(bt_case *c);
 /// Fastening points that are not given, from the waterline v [n][2].
 void bt_case_tow_hull(bt_case *c, int n, const double *v);
 /// Work and output of the run against the limits of size, of a case that is sound so far.

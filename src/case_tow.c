@@ -136,6 +136,28 @@ void bt_case_tow_follow(const bt_check *k)
     fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
 }
 
+// A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r with that amplitude. A
+// sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and whole periods leave no swing behind.
+double bt_case_line_period(const bt_case *c)
+{
+    if (!has_line(c)) return 0;
+    const double body = bt_case_body_mass(c) * (1 + c->body.added_mass), vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass);
+    const double mass = c->tow.mode == BT_TOW_THRUST ? body * vessel / (body + vessel) : body;
+    double k = c->tow.line_stiffness / c->tow.line_length;
+    if (c->tow.line.branches > 1) k += c->tow.branch2.stiffness / c->tow.branch2.length;
+    const double period = 2 * BT_PI * sqrt(mass / k);
+    return isfinite(period) ? period : 0;
+}
+
+void bt_case_tow_ramp(bt_case *c)
+{
+    if (!isnan(c->tow.ramp)) return;
+    double v[2 * BT_MAX_VERTICES];
+    const int n = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_waterline(c, v);
+    const double size = n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0, way = c->tow.speed > 0 ? size / c->tow.speed : 0;
+    c->tow.ramp = bt_max(way, BT_RAMP_PERIODS * bt_case_line_period(c));
+}
+
 /// The point of the waterline farthest in a direction; the middle when several corners are equally far.
 static void farthest_point(int n, const double *v, double ux, double uy, double at[2])
 {

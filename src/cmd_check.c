@@ -106,20 +106,18 @@ static void print_ice(const bt_case *c, const bt_check_ice *n)
     printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
 }
 
-/// mass: of the body with added mass, kg.
-static void print_line(const bt_case *c, double mass)
+static void print_line(const bt_case *c)
 {
     const bool thrust = c->tow.mode == BT_TOW_THRUST;
-    const double vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass), reduced = thrust ? mass * vessel / (mass + vessel) : mass;
-    double k = c->tow.line_stiffness / c->tow.line_length;
-    if (c->tow.line.branches > 1) k += c->tow.branch2.stiffness / c->tow.branch2.length; // as if parallel
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
     printf("line                 %s, %d x %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", rope.name, (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
            c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load, c->tow.line.breaking_load > 0 ? "" : " = never breaks");
     if (c->tow.line.type != BT_ROPE_NUMBERS)
         printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
                rope.stiffness, rope.breaking, rope.source);
-    printf("line                 period of the body on the line %.3g s\n", 2 * BT_PI * sqrt(reduced / k));
+    const double period = bt_case_line_period(c);
+    const char *verdict = c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * period * (1 - 1e-12) ? "ok" : "TOO SHORT: the start jerks the line";
+    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", period, c->tow.ramp, BT_RAMP_PERIODS, verdict);
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
     printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,
@@ -156,7 +154,7 @@ static void print_body(const bt_case *c)
     }
     static const char *const modes[] = {[BT_TOW_NONE] = "none", [BT_TOW_SPEED] = "speed", [BT_TOW_LINE] = "line", [BT_TOW_THRUST] = "thrust"};
     printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", modes[c->tow.mode], speed, bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
-    if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c, mass * (1 + c->body.added_mass));
+    if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c);
 }
 
 /// What one contact of the mean floe bears at most, along its whole side and at a corner's first touch.

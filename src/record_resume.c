@@ -19,18 +19,10 @@
 #define HISTORY(type, member) {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}
 static const bt_state_row history_rows[] = {
     HISTORY(F64, sum_contacts), HISTORY(F64, sum_sweeps), HISTORY(F64, contact_work), HISTORY(F64, max_overlap), HISTORY(F64, max_momentum_residual), HISTORY(F64, max_residual),
-    HISTORY(F64, peak_tension), HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged),
+    HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged),
     HISTORY(I64, positive_work), HISTORY(I64, restitution_cut), HISTORY(I64, repeats), HISTORY(I64, outrun),
 };
-enum { N_HISTORY = sizeof history_rows / sizeof *history_rows, N_COLUMNS = 8 };
-
-static const struct { const char *name; size_t offset; } columns[N_COLUMNS] = {
-#define COLUMN(member) {"history/" #member, offsetof(bt_history, member)}
-    COLUMN(time), COLUMN(ice), COLUMN(tow), COLUMN(drag), COLUMN(coriolis), COLUMN(tilt), COLUMN(inertia), COLUMN(budget),
-#undef COLUMN
-};
-
-static double **column_of(bt_history *h, int k) { return (double **)(void *)((char *)h + columns[k].offset); }
+enum { N_HISTORY = sizeof history_rows / sizeof *history_rows };
 
 bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_errors *err)
 {
@@ -39,7 +31,8 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_record_flush(r);
     bt_history *h = &r->history;
     bt_snapshot_add_rows(s, "history", history_rows, N_HISTORY, h);
-    for (int k = 0; k < N_COLUMNS; k++) bt_snapshot_add(s, columns[k].name, BT_ITEM_F64, h->n, 1, *column_of(h, k));
+    for (int k = 0; k < BT_N_COLUMNS; k++)
+        bt_snapshot_add(s, bt_history_columns[k].name, BT_ITEM_F64, h->n, 1, h->column[k]);
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
@@ -79,10 +72,10 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
     bt_snapshot_take_rows(s, "history", history_rows, N_HISTORY, h);
     h->n = h->cap = n;
-    for (int k = 0; k < N_COLUMNS; k++) {
-        free(*column_of(h, k));
-        *column_of(h, k) = bt_snapshot_copy(s, columns[k].name, BT_ITEM_F64, 1, &n);
-        bt_snapshot_want(s, n == h->n, columns[k].name, -1, "has not a value for each step");
+    for (int k = 0; k < BT_N_COLUMNS; k++) {
+        free(h->column[k]);
+        h->column[k] = bt_snapshot_copy(s, bt_history_columns[k].name, BT_ITEM_F64, 1, &n);
+        bt_snapshot_want(s, n == h->n, bt_history_columns[k].name, -1, "has not a value for each step");
     }
     if (s->faulty) h->n = 0;
 }

@@ -1,26 +1,38 @@
 // SPDX-License-Identifier: MIT
-// Mean with its standard error from the autocorrelation, and the start of the steady window.
+// Mean with its interval, trend, and the start of the steady window of a correlated series.
 //
-// Standard error (Sokal 1997, "Monte Carlo methods in statistical mechanics", §3; Wolff 2004, Comput. Phys. Commun.
-// 156, eqs. 31–35, 49). With m the mean of x[n] and
-//     G(t) = Σ_i (x_i − m)(x_{i+t} − m) / (n − t)                    autocovariance at lag t
-//     C(M) = G(0) + 2 Σ_{t=1..M} G(t),   τ(M) = C(M) / (2 G(0))     integrated autocorrelation time, samples
-// the window is the smallest M >= 5 τ(M): the sum up to infinity has finite mean and infinite noise, and beyond five
-// times its own length an exponential correlation has less than 1 % left. Subtracting the sample's own mean takes
-// var(m) = C/n off every G(t), hence the corrected
-//     C' = C (1 + (2M + 1)/n),   se² = C'/n.
+// Interval of the mean: the cosine estimator with equal weights [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36].
+//     Λ_j = √(2/n) Σ_i (x_i − m) cos(π j (i + ½)/n),   j = 1..ν      how much of the slowest waves the series holds
+//     var(m) = (1/ν) Σ_j Λ_j² / n,                     interval m ± t_ν √var(m)
+// The Λ_j are nearly independent, each with the variance of the spectrum at a frequency near zero, which is n var(m): so Student's t with
+// ν = WAVES degrees of freedom.
+// Why so few: the spectrum of a tow force falls towards zero. Ice that has been pushed away in one jam is missing in the next, so that forces some 1 to 3
+// body lengths apart are negatively correlated. Whatever looks at shorter times only (the sum of autocorrelations up to Sokal's window, batch
+// means, an autoregression) misses that and gives 1.5 to 1.9 times the scatter of fields at 65 %. The price is a factor of
+// 2.45 in place of 1.96.
 //
-// A strongly correlated series would need many lags: n·M products. When the window has not closed after MAX_LAG lags
-// the series is replaced by the means of neighbouring pairs, which leaves var(m) as it is and halves τ in samples
-// (Goodman's acor does the same). So the cost is at most 2 MAX_LAG n. An FFT would form all the lags to drop most of them.
+// Correlation time: B batches (at most BATCHES), and a first-order autoregression through their deviations d_k,
+//     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²       p parameters fitted
+// It counts the independent samples of the short correlation and is far less noisy than ν squares.
+//
+// Trend: least squares on the same batches against the time u from −½ to ½. Of its deviations from the line, the larger of v and the mean square of
+// Λ_2..Λ_7 (slow waves that the short correlation does not know) gives
+//     se(change)² = v / Σ u_k²,                        interval change ± TREND_FACTOR se
+// A drift must be fitted before the correlation is, which it would otherwise enter as slow noise. The factor is set by measurement: 4 to 6 %
+// false alarms on white and AR(1) series of 20 to 400 independent samples, and a drift that parts the means of the two halves by three standard
+// errors of their difference is seen in 90 % or more (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#define MAX_LAG 256
-#define MIN_CORRELATED 8 // below this a lag has too few products to mean anything: taken as white noise
+#define BATCHES 96
+#define WAVES 6
+#define TREND_FACTOR 1.95
 #define BATCH 5
+
+/// The 97.5 % point of Student's t by degrees of freedom.
+static const double student[WAVES + 1] = {INFINITY, 12.706, 4.303, 3.182, 2.776, 2.571, 2.447};
 
 /// Mean in two passes: the second takes the rounding of the first out.
 static double mean_of(const double *x, int64_t n)
@@ -32,68 +44,104 @@ static double mean_of(const double *x, int64_t n)
     return m + rest / (double)n;
 }
 
-static double autocovariance(const double *d, int64_t n, int64_t lag)
+/// Means of the batches of x[n], less centre; returns how many.
+static int batches_of(const double *x, int64_t n, double centre, double z[BATCHES])
 {
-    double sum = 0;
-    for (int64_t i = 0; i + lag < n; i++) sum += d[i] * d[i + lag];
-    return sum / (double)(n - lag);
+    const int count = n < BATCHES ? (int)n : BATCHES;
+    for (int k = 0; k < count; k++) {
+        const int64_t first = n * k / count, end = n * (k + 1) / count;
+        double sum = 0;
+        for (int64_t i = first; i < end; i++) sum += x[i] - centre;
+        z[k] = sum / (double)(end - first);
+    }
+    return count;
 }
 
-/// var(m) of deviations d[n], which are overwritten by their pair means where the correlation is long.
-static double variance_of_mean(double *d, int64_t n)
+/// Variance of a batch with its correlation, from deviations d[count] after a fit of p parameters.
+static double variance_of_batches(const double *d, int count, int p)
 {
-    for (;;) {
-        const double g0 = autocovariance(d, n, 0);
-        if (!(g0 > 0) || n < MIN_CORRELATED) return g0 / (double)(n > 1 ? n - 1 : 1);
-        // Lags over n/2 pair the first half with the second only and carry no information on the fluctuation within.
-        const int64_t last = n / 2 < MAX_LAG ? n / 2 : MAX_LAG;
-        double c = g0;
-        int64_t m = 0;
-        bool closed = false;
-        while (m < last && !closed) {
-            m++;
-            c += 2 * autocovariance(d, n, m);
-            closed = (double)m >= 5 * c / (2 * g0);
+    double squares = 0, products = 0;
+    for (int k = 0; k < count; k++) squares += d[k] * d[k];
+    for (int k = 0; k + 1 < count; k++) products += d[k] * d[k + 1];
+    const bool many = squares > 0 && count >= BT_TREND_LEAST; // fewer batches tell nothing of their correlation
+    const double phi = many ? products / squares : 0;
+    return squares / (count - p - many) * (1 + phi) / (1 - phi);
+}
+
+/// Mean square of Λ_j, j = from..to, of n samples as batches z[count] about their mean or line.
+static double slow_variance(const double *z, int count, int64_t n, int from, int to)
+{
+    double sum = 0;
+    for (int j = from; j <= to; j++) {
+        double wave = 0;
+        for (int k = 0; k < count; k++) {
+            const int64_t first = n * k / count, end = n * (k + 1) / count;
+            wave += (double)(end - first) * z[k] * cos(BT_PI * j * (double)(first + end) / (double)(2 * n));
         }
-        if (closed || last < MAX_LAG) {
-            const double corrected = c * (1 + (2 * (double)m + 1) / (double)n);
-            // An anticorrelated series can bring C to zero or below it; but one sample more or less at the end
-            // always moves the mean by about sd/n.
-            return bt_max(corrected, g0 / (double)n) / (double)n;
-        }
-        n /= 2;
-        for (int64_t i = 0; i < n; i++) d[i] = 0.5 * (d[2 * i] + d[2 * i + 1]);
+        sum += wave * wave * 2 / (double)n;
     }
+    return sum / (to - from + 1);
 }
 
 bt_mean bt_stats_mean(const double *x, int64_t n)
 {
-    bt_mean r = {.mean = NAN, .sd = NAN, .se = NAN, .tau = 0.5, .n_eff = (double)n, .n = n};
+    bt_mean r = {.mean = NAN, .sd = NAN, .se = NAN, .low = NAN, .high = NAN, .tau = 0.5, .n_eff = (double)n, .n = n};
     if (n < 1) return r;
     r.mean = mean_of(x, n);
     if (n < 2) return r;
 
-    double *d = bt_alloc((size_t)n, sizeof *d);
     double sum = 0, spread = 0;
     for (int64_t i = 0; i < n; i++) {
-        d[i] = x[i] - r.mean;
-        sum += d[i] * d[i];
+        sum += (x[i] - r.mean) * (x[i] - r.mean);
         spread = bt_max(spread, fabs(x[i] - x[0]));
     }
     r.sd = sqrt(sum / (double)(n - 1));
     if (spread == 0 && isfinite(sum)) { // a constant series: the rounding of its mean is no fluctuation
-        r.mean = x[0];
+        r.mean = r.low = r.high = x[0];
         r.sd = r.se = 0;
     } else if (isfinite(sum)) {
-        const double var = variance_of_mean(d, n);
-        r.se = sqrt(var);
-        r.tau = (double)n * var / (2 * r.sd * r.sd);
+        double z[BATCHES];
+        const int count = batches_of(x, n, r.mean, z), waves = count - 1 < WAVES ? count - 1 : WAVES;
+        // One sample more or less at the end always moves the mean by about sd/n, also that of a series that alternates.
+        r.se = sqrt(bt_max(slow_variance(z, count, n, 1, waves) / (double)n, r.sd * r.sd / ((double)n * (double)n)));
+        r.low = r.mean - student[waves] * r.se;
+        r.high = r.mean + student[waves] * r.se;
+        r.tau = bt_max(0.5, (double)n * variance_of_batches(z, count, 1) / count / (2 * r.sd * r.sd));
         r.n_eff = (double)n / (2 * r.tau);
     } else {
-        r.sd = r.se = r.tau = r.n_eff = NAN;
+        r.sd = r.tau = r.n_eff = NAN;
     }
-    free(d);
     return r;
+}
+
+bt_trend bt_stats_trend(const double *x, int64_t n)
+{
+    bt_trend t = {.change = NAN, .se = NAN, .low = NAN, .high = NAN};
+    if (n < BT_TREND_LEAST) return t;
+    double z[BATCHES], squares = 0, product = 0, level = 0;
+    const int count = batches_of(x, n, mean_of(x, n), z);
+    for (int k = 0; k < count; k++) level += z[k] / count;
+    for (int k = 0; k < count; k++) {
+        const double u = (k + 0.5) / count - 0.5; // from −½ to ½, so that the slope is the change over the series
+        squares += u * u;
+        product += u * (z[k] - level);
+    }
+    t.change = product / squares;
+    for (int k = 0; k < count; k++) z[k] -= level + t.change * ((k + 0.5) / count - 0.5);
+    const double slow = slow_variance(z, count, n, 2, WAVES + 1) * count / (double)n;
+    t.se = sqrt(bt_max(variance_of_batches(z, count, 2), slow) / squares);
+    t.low = t.change - TREND_FACTOR * t.se;
+    t.high = t.change + TREND_FACTOR * t.se;
+    t.significant = t.low > 0 || t.high < 0;
+    return t;
+}
+
+void bt_stats_quarters(const double *x, int64_t n, double quarter[4])
+{
+    for (int64_t k = 0; k < 4; k++) {
+        const int64_t first = n * k / 4, end = n * (k + 1) / 4;
+        quarter[k] = end > first ? mean_of(x + first, end - first) : NAN;
+    }
 }
 
 // MSER(d) = Σ_{j>=d} (Y_j − mean_d)² / (k − d)² over k batch means Y_j: the squared standard error that the batches

@@ -1,67 +1,24 @@
 // SPDX-License-Identifier: MIT
-// The numbers of a whole run: kept step by step, reduced over the steady window, with a warning for each doubt.
+// The numbers of a whole run: reduced over one window (steady.h), with a warning for each doubt.
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
-//     mean ice resistance ± standard error (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
+//     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "summary.h"
+#include "case_check.h"
 #include "summary_window.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/// Work of the contacts above this fraction of the kinetic energy is no rounding.
-#define WORK_ROUNDING 1e-10
-/// Independent samples (n / 2τ) below which a standard error is itself too uncertain: its own relative error is then > 25 %.
-#define MIN_INDEPENDENT 20
 #define CLOSURE_LIMIT 1e-6
 #define MOMENTUM_LIMIT 1e-9
 /// Overlap above this fraction of the mean floe size is told.
 #define OVERLAP_LIMIT 0.01
 /// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other part sideways.
 #define CRUSH_LIMIT 0.3
-
-void bt_history_init(bt_history *h) { *h = (bt_history){.peak_tension = NAN}; }
-
-void bt_history_free(bt_history *h)
-{
-    double *columns[] = {h->time, h->ice, h->tow, h->drag, h->coriolis, h->tilt, h->inertia, h->budget};
-    for (size_t i = 0; i < sizeof columns / sizeof *columns; i++) free(columns[i]);
-    bt_history_init(h);
-}
-
-void bt_history_add(bt_history *h, const bt_sample *s)
-{
-    enum { N_COLUMNS = 8 };
-    double **columns[N_COLUMNS] = {&h->time, &h->ice, &h->tow, &h->drag, &h->coriolis, &h->tilt, &h->inertia, &h->budget};
-    const double values[N_COLUMNS] = {s->time, s->ice_resistance, s->tow_force, s->drag_force, s->coriolis_force, s->tilt_force, s->inertia_force,
-                                      s->ice_resistance_budget};
-    if (h->n == h->cap) {
-        h->cap = h->cap ? 2 * h->cap : 1024;
-        for (size_t i = 0; i < N_COLUMNS; i++) *columns[i] = bt_realloc(*columns[i], (size_t)h->cap, sizeof(double));
-    }
-    for (size_t i = 0; i < N_COLUMNS; i++) (*columns[i])[h->n] = values[i];
-    h->n++;
-    h->sum_contacts += s->contacts;
-    h->sum_sweeps += s->sweeps;
-    h->contact_work += s->contact_work;
-    h->max_overlap = bt_max_seen(h->max_overlap, s->overlap);
-    h->max_residual = bt_max_seen(h->max_residual, s->residual);
-    h->max_momentum_residual = bt_max_seen(h->max_momentum_residual, s->momentum_residual);
-    if (!isnan(s->line_tension)) h->peak_tension = isnan(h->peak_tension) ? s->line_tension
-                                                                          : bt_max(h->peak_tension, s->line_tension);
-    h->crushed_work += s->crushed_work;
-    h->max_crushed_depth = bt_max_seen(h->max_crushed_depth, s->crushed_depth);
-    h->max_crushing = bt_max_seen(h->max_crushing, s->crushing);
-    h->crushing_steps += s->crushing > 0;
-    h->unconverged += s->unconverged != 0;
-    h->repeats += (int64_t)s->repeats;
-    h->outrun += s->outrun != 0;
-    h->restitution_cut += s->restitution_cut != 0;
-    h->positive_work += s->contact_work > WORK_ROUNDING * s->kinetic_energy;
-}
 
 static int ascending(const void *a, const void *b)
 {
@@ -78,62 +35,21 @@ static double percentile(const double *x, int64_t n, double percent)
     return x[i] + (at - (double)i) * (x[next] - x[i]);
 }
 
-static int64_t first_at_or_after(const bt_history *h, double time)
-{
-    int64_t i = 0;
-    while (i < h->n && h->time[i] < time) i++;
-    return i;
-}
+static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k) { return bt_stats_mean(h->column[k] + s->window.first, s->window.n); }
 
-static const char *warn_window(bt_summary *s)
+static void reduce_window(bt_summary *s, const bt_history *h)
 {
-    return s->window.warning ? s->window.warning : s->warnings.text[s->warnings.n - 1];
-}
-
-static void choose_window(bt_summary *s, const bt_history *h, const bt_case *c)
-{
-    s->window.given = c->output.window_start >= 0;
-    const double ramp = c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp;
-    const double earliest = s->window.given ? c->output.window_start : ramp;
-    int64_t first = first_at_or_after(h, earliest);
-    if (first >= h->n) {
-        s->window.first = h->n;
-        s->window.start = s->window.end = NAN;
-        bt_errors_add(&s->warnings, "no steady window: it would begin at %g s and the run ends at %g s; run longer, or %s",
-                      earliest, s->sim_time, s->window.given ? "lower output.window_start" : "shorten tow.ramp");
-        s->window.warning = warn_window(s);
-        return;
-    }
-    if (!s->window.given) {
-        const int64_t earliest_step = first;
-        first = bt_stats_steady_start(h->ice, h->n, first);
-        // A minimum at the far end of the search means that the variance still falls where the search stops.
-        if (first > earliest_step && first + 5 > h->n / 2) {
-            bt_errors_add(&s->warnings, "no steady state was found: the ice resistance still drifts in the first half of the "
-                          "run, and the window begins at its middle (%g s); run longer", h->time[first]);
-            s->window.warning = warn_window(s);
-        }
-    }
-    s->window.first = first;
-    s->window.n = h->n - first;
-    s->window.start = h->time[first];
-    s->window.end = h->time[h->n - 1];
-}
-
-static void reduce_window(bt_summary *s, const bt_history *h, double dt)
-{
-    const int64_t first = s->window.first, n = s->window.n;
-    s->ice = bt_stats_mean(h->ice + first, n);
-    s->tow = bt_stats_mean(h->tow + first, n);
-    s->drag = bt_stats_mean(h->drag + first, n);
-    s->coriolis = bt_stats_mean(h->coriolis + first, n);
-    s->tilt = bt_stats_mean(h->tilt + first, n);
-    s->inertia = bt_stats_mean(h->inertia + first, n);
-    s->budget = bt_stats_mean(h->budget + first, n);
-    s->window.correlation_time = n > 1 ? s->ice.tau * dt : NAN;
+    const int64_t n = s->window.n;
+    s->ice = s->window.series[0].mean;
+    s->tow = s->window.series[1].mean;
+    s->drag = mean_over(s, h, BT_COL_DRAG);
+    s->coriolis = mean_over(s, h, BT_COL_CORIOLIS);
+    s->tilt = mean_over(s, h, BT_COL_TILT);
+    s->inertia = mean_over(s, h, BT_COL_INERTIA);
+    s->budget = mean_over(s, h, BT_COL_BUDGET);
 
     double *sorted = bt_alloc((size_t)n, sizeof *sorted);
-    if (n > 0) memcpy(sorted, h->ice + first, (size_t)n * sizeof *sorted);
+    if (n > 0) memcpy(sorted, h->column[BT_COL_ICE] + s->window.first, (size_t)n * sizeof *sorted);
     qsort(sorted, (size_t)n, sizeof *sorted, ascending);
     s->p95 = percentile(sorted, n, 95);
     s->p99 = percentile(sorted, n, 99);
@@ -149,34 +65,12 @@ static void reduce_window(bt_summary *s, const bt_history *h, double dt)
     s->budget_closure_relative = largest > 0 ? other / largest : other == 0 ? 0 : NAN;
     if (n == 0) return;
 
-    if (!(s->ice.n_eff >= MIN_INDEPENDENT)) {
-        if (isfinite(s->ice.n_eff))
-            bt_errors_add(&s->warnings, "the steady window is short: %g s hold %.1f independent samples of the ice resistance "
-                          "(correlation time %g s) and the standard error needs %d; run longer",
-                          s->window.end - s->window.start, s->ice.n_eff, s->window.correlation_time, MIN_INDEPENDENT);
-        else
-            bt_errors_add(&s->warnings, "the ice resistance is not finite within the steady window: the run is not usable; "
-                          "lower run.dt");
-        s->window.warning = warn_window(s);
-    }
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings, "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the largest of them; "
                       "the momentum balance of the towed body does not close", fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings, "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
                       "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
-}
-
-/// A mean over a ramp or a stop is none of a steady tow.
-static void warn_of_programme(bt_summary *s, const bt_case *c)
-{
-    const double *p = c->tow.programme;
-    for (int i = 0; i + 1 < c->tow.n_programme && s->window.n > 0; i++) {
-        if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= s->window.start || p[2 * i] >= s->window.end) continue;
-        bt_errors_add(&s->warnings, "the speed programme goes from %g to %g m/s within the steady window, %g to %g s; end the run before, or read the series",
-                      p[2 * i + 1], p[2 * i + 3], s->window.start, s->window.end);
-        return;
-    }
 }
 
 /// A line that broke changes what the means stand for.
@@ -186,16 +80,25 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
         if (e->event[i].kind != BT_EVENT_LINE_BROKEN && e->event[i].kind != BT_EVENT_ADRIFT) continue;
         char text[160];
         bt_event_describe(&e->event[i], text);
-        bt_errors_add(&s->warnings, "at %g s %s%s", e->event[i].time, text,
-                      s->window.n > 0 && e->event[i].time > s->window.start ? ": within the steady window, whose means mix before and after" : "");
+        bt_errors_add(&s->warnings, "at %g s %s", e->event[i].time, text);
     }
+}
+
+/// The verdict, where it is not "steady", and a ramp that jerks the body on its line.
+static void warn_of_window(bt_summary *s, const bt_case *c)
+{
+    if (s->window.verdict != BT_STEADY) bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
+    const double period = bt_case_line_period(c);
+    if (c->tow.n_programme == 0 && c->tow.ramp < BT_RAMP_PERIODS * period * (1 - 1e-12))
+        bt_errors_add(&s->warnings, "tow.ramp of %g s is shorter than %g periods of the body on its line (%.3g s each): the start jerks the line, and it swings on; "
+                      "leave tow.ramp out, or take at least %.3g s", c->tow.ramp, BT_RAMP_PERIODS, period, BT_RAMP_PERIODS * period);
 }
 
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body)
 {
     const double nan = NAN;
-    *s = (bt_summary){.body = body, .sim_time = h->n ? h->time[h->n - 1] : 0, .reference_ratio = nan};
+    *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
     if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
 
     const bt_mean none = bt_stats_mean(NULL, 0);
@@ -203,8 +106,9 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
     s->window.start = s->window.end = s->window.correlation_time = nan;
     if (body) {
-        choose_window(s, h, c);
-        reduce_window(s, h, t->dt);
+        bt_steady_find(&s->window, h, c, t);
+        reduce_window(s, h);
+        warn_of_window(s, c);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         bt_estimate_conditions(c, &s->estimate);
         s->estimate.concentration = t->concentration;
@@ -243,7 +147,6 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
     warn_of_events(s, t->events);
-    warn_of_programme(s, c);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
         bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "

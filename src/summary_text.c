@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "estimate_text.h"
 #include "impact_report.h"
@@ -58,38 +59,106 @@ static void json_outlines(bt_json *j, const bt_outline_counts *o)
     bt_json_close(j, '}');
 }
 
-static void json_forces(bt_json *j, const bt_summary *s, const bt_history *h, const bt_case *c)
+/// Mean with standard error and 95 % interval: mean_KEY_n, mean_KEY_se_n, mean_KEY_low_n, mean_KEY_high_n.
+static void json_mean(bt_json *j, const char *key, const bt_mean *m)
 {
-    bt_json_number(j, "mean_ice_resistance_n", s->ice.mean);
-    bt_json_number(j, "mean_ice_resistance_se_n", s->ice.se);
+    const struct { const char *suffix; double value; } row[] = {{"", m->mean}, {"_se", m->se}, {"_low", m->low}, {"_high", m->high}};
+    for (int k = 0; k < 4; k++) {
+        char name[80];
+        snprintf(name, sizeof name, "mean_%s%s_n", key, row[k].suffix);
+        bt_json_number(j, name, row[k].value);
+    }
+}
+
+/// What the verdict rests on: of each reported series the trend, the quarters, the independent samples, and the peaks within and before the window.
+static void json_reported(bt_json *j, const bt_steady *w)
+{
+    bt_json_open(j, "series", '{');
+    for (int k = 0; k < BT_N_REPORTED; k++) {
+        const bt_reported *r = &w->series[k];
+        if (!r->present || w->n == 0) continue;
+        bt_json_open(j, r->key, '{');
+        bt_json_number(j, "mean_n", r->mean.mean);
+        bt_json_number(j, "mean_low_n", r->mean.low);
+        bt_json_number(j, "mean_high_n", r->mean.high);
+        bt_json_number(j, "n_independent", r->mean.n_eff);
+        bt_json_number(j, "change_n", r->trend.change);
+        bt_json_number(j, "change_low_n", r->trend.low);
+        bt_json_number(j, "change_high_n", r->trend.high);
+        bt_json_open(j, "quarters_n", '[');
+        for (int q = 0; q < 4; q++) bt_json_number(j, NULL, r->quarter[q]);
+        bt_json_close(j, ']');
+        bt_json_number(j, "peak_n", r->peak);
+        bt_json_number(j, "start_peak_n", r->start_peak);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, '}');
+}
+
+static void json_window(bt_json *j, const bt_summary *s)
+{
+    const bt_steady *w = &s->window;
+    const char *reason = s->body && w->verdict != BT_STEADY ? w->reason : NULL;
+    bt_json_open(j, "window", '{');
+    bt_json_string(j, "verdict", s->body ? bt_verdict_names[w->verdict] : NULL);
+    bt_json_string(j, "reason", reason);
+    bt_json_number(j, "earliest_s", s->body ? w->earliest : NAN);
+    bt_json_number(j, "start_s", w->start);
+    bt_json_number(j, "end_s", w->end);
+    bt_json_int(j, "n_samples", w->n);
+    bt_json_number(j, "n_independent", w->n ? s->ice.n_eff : NAN);
+    bt_json_number(j, "correlation_time_s", w->correlation_time);
+    bt_json_number(j, "unconverged_share", w->n ? w->unconverged : NAN);
+    bt_json_number(j, "max_residual_m_s", w->n ? w->residual : NAN);
+    bt_json_string(j, "rule", !s->body ? NULL : w->given ? "given" : "mser5");
+    bt_json_string(j, "warning", reason);
+    if (s->body) json_reported(j, w);
+    bt_json_close(j, '}');
+}
+
+/// Largest of the two branches within the window, or before it.
+static double peak_tension(const bt_steady *w, bool before)
+{
+    double most = NAN;
+    for (int k = 0; k < BT_N_REPORTED; k++)
+        if (!strncmp(w->series[k].key ? w->series[k].key : "", "line_tension", 12) && w->series[k].present) {
+            const double x = before ? w->series[k].start_peak : w->series[k].peak;
+            if (!(x <= most)) most = x;
+        }
+    return most;
+}
+
+static void json_forces(bt_json *j, const bt_summary *s, const bt_case *c)
+{
+    const bt_steady *w = &s->window;
+    const bt_mean none = bt_stats_mean(NULL, 0);
+    json_mean(j, "ice_resistance", &s->ice);
     bt_json_number(j, "sd_ice_resistance_n", s->ice.sd);
     bt_json_number(j, "p95_ice_resistance_n", s->p95);
     bt_json_number(j, "p99_ice_resistance_n", s->p99);
     bt_json_number(j, "peak_ice_resistance_n", s->peak);
     bt_json_string(j, "peak_conversion", "mean over a step, impulse / dt");
-    bt_json_number(j, "mean_tow_force_n", s->tow.mean);
-    bt_json_number(j, "mean_tow_force_se_n", s->tow.se);
+    json_mean(j, "tow_force", &s->tow);
+    bt_json_number(j, "peak_tow_force_n", s->body && w->n ? w->series[1].peak : NAN);
+    bt_json_number(j, "start_peak_tow_force_n", s->body ? w->series[1].start_peak : NAN);
+    for (int k = 3; k < BT_N_REPORTED; k++) {
+        static const char *const keys[] = {"line_tension", "line_tension_2", "vessel_thrust"};
+        json_mean(j, keys[k - 3], s->body && w->series[k].present ? &w->series[k].mean : &none);
+    }
+    bt_json_number(j, "peak_line_tension_n", s->body ? peak_tension(w, false) : NAN);
+    bt_json_number(j, "start_peak_line_tension_n", s->body ? peak_tension(w, true) : NAN);
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
     bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
     bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
-    bt_json_number(j, "peak_line_tension_n", s->body ? h->peak_tension : NAN);
     bt_json_open(j, "budget", '{');
     bt_json_number(j, "tow_minus_other_forces_n", s->balance);
     bt_json_number(j, "closure_n", s->closure);
     bt_json_number(j, "closure_relative", s->closure_relative);
     bt_json_number(j, "ice_momentum_closure_relative", s->budget_closure_relative);
     bt_json_close(j, '}');
-    bt_json_open(j, "window", '{');
-    bt_json_number(j, "start_s", s->window.start);
-    bt_json_number(j, "end_s", s->window.end);
-    bt_json_int(j, "n_samples", s->window.n);
-    bt_json_number(j, "n_independent", s->window.n ? s->ice.n_eff : NAN);
-    bt_json_number(j, "correlation_time_s", s->window.correlation_time);
-    bt_json_string(j, "rule", !s->body ? NULL : s->window.given ? "given" : "mser5");
-    bt_json_string(j, "warning", s->window.warning);
-    bt_json_close(j, '}');
+    json_window(j, s);
     if (isnan(c->reference.mean_force)) {
         bt_json_string(j, "reference", NULL);
         return;
@@ -153,7 +222,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "mean_size_m", t->mean_size);
     json_lead(&j, &t->lead);
     json_outlines(&j, &t->outlines);
-    json_forces(&j, s, h, c);
+    json_forces(&j, s, c);
     bt_impacts_json(&j, t->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
     else bt_json_string(&j, "estimates", NULL);
@@ -207,24 +276,43 @@ static const char *force(char out[32], double newton)
 
 const char *bt_force_text(char out[32], double newton) { return force(out, newton); }
 
-static void print_forces(const bt_summary *s, const bt_history *h, const bt_case *c)
+static void print_mean(const char *label, const bt_mean *m)
 {
+    char a[32], b[32], d[32], e[32];
+    printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, force(a, m->mean), force(b, m->low), force(d, m->high), force(e, m->sd));
+}
+
+static void print_forces(const bt_summary *s, const bt_case *c)
+{
+    static const char *const loud[] = {"steady", "NOT STEADY", "TOO SHORT"};
+    const bt_steady *w = &s->window;
     char a[32], b[32], d[32];
-    if (s->window.n == 0) {
-        printf("  steady window       none\n");
+    if (w->n == 0) {
+        printf("  window              none: %s\n", w->reason);
         return;
     }
-    printf("  steady window       %g to %g s (%s), %.3g independent samples, correlation time %.3g s\n", s->window.start,
-           s->window.end, s->window.given ? "given" : "found by MSER-5", s->ice.n_eff, s->window.correlation_time);
-    printf("  ice resistance      %s +- %s (standard error), sd %s\n", force(a, s->ice.mean), force(b, s->ice.se),
-           force(d, s->ice.sd));
-    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95),
-           force(b, s->p99), force(d, s->peak));
+    printf("  window              %g to %g s (%s), %s; %.3g independent samples, correlation time %.3g s\n", w->start, w->end,
+           w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff, w->correlation_time);
+    if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
+    printf("  %s\n", w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
+    print_mean("  ice resistance", &s->ice);
+    printf("    quarters          %s,", force(a, w->series[0].quarter[0]));
+    printf(" %s, %s, %s\n", force(a, w->series[0].quarter[1]), force(b, w->series[0].quarter[2]), force(d, w->series[0].quarter[3]));
+    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95), force(b, s->p99), force(d, s->peak));
     printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
            force(b, s->budget.mean));
-    printf("  tow force           %s +- %s, drag %s", force(a, s->tow.mean), force(b, s->tow.se), force(d, s->drag.mean));
-    if (!isnan(h->peak_tension)) printf(", peak line tension %s", force(a, h->peak_tension));
-    printf("\n");
+    print_mean("  tow force", &s->tow);
+    printf("    drag              %s\n", force(a, s->drag.mean));
+    for (int k = 3; k < BT_N_REPORTED; k++) {
+        const bt_reported *r = &w->series[k];
+        if (!r->present) continue;
+        char label[24];
+        snprintf(label, sizeof label, "  %s", k == 3 ? "line tension" : k == 4 ? "second branch" : "vessel thrust");
+        print_mean(label, &r->mean);
+        printf("      peak            %s in the window", force(a, r->peak));
+        if (isfinite(r->start_peak)) printf(", %s in the start before it", force(b, r->start_peak));
+        printf("\n");
+    }
     if (!isnan(c->reference.mean_force))
         printf("  measured            %s (%s): computed / measured = %.3g\n", force(a, c->reference.mean_force),
                c->reference.source ? c->reference.source : "no source given", s->reference_ratio);
@@ -239,7 +327,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     const bt_outline_counts *o = &t->outlines;
     if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
     if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
-    if (s->body) print_forces(s, h, c);
+    if (s->body) print_forces(s, c);
     bt_impacts_print(t->impacts);
     if (s->body && !isnan(s->estimate.along)) {
         printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);

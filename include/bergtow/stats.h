@@ -1,22 +1,37 @@
 // SPDX-License-Identifier: MIT
-// Mean, standard error from the autocorrelation, and the steady window of a time series.
+// Mean, interval and trend of a correlated time series, and the start of its steady window.
 #ifndef BERGTOW_STATS_H
 #define BERGTOW_STATS_H
 
 #include "bergtow/base.h"
 
 typedef struct bt_mean {
-    double mean, sd;   ///< of the samples
-    double se;         ///< standard error of the mean with correlation, sd·√(2τ/n); NaN when n < 2
-    double tau;        ///< integrated autocorrelation time in samples, ½ for white noise
-    double n_eff;      ///< n / (2τ)
+    double mean, sd;    ///< of the samples
+    double se;          ///< standard error of the mean, from the slowest waves of the series; NaN when n < 2
+    double low, high;   ///< 95 % interval of the mean (Student's t with 6 degrees of freedom); NaN when n < 2
+    double tau;         ///< correlation time in samples, ½ for white noise, no less
+    double n_eff;       ///< n / (2τ)
     int64_t n;
 } bt_mean;
 
-/// Mean and standard error of x[n], spaced evenly: integrated autocorrelation time with Sokal's self-consistent
-/// window M ≥ 5τ (Sokal 1997, "Monte Carlo methods in statistical mechanics", §3), corrected for the bias of the
-/// sample mean. Linear in n: the lags beyond the window are never formed.
+/// A straight line through a series.
+typedef struct bt_trend {
+    double change;      ///< of the line from the first sample to the last, in the unit of the series; NaN when n < BT_TREND_LEAST
+    double se;          ///< its standard error with correlation
+    double low, high;   ///< the interval that a series without drift leaves in 5 % of all cases
+    bool significant;   ///< it does not contain 0
+} bt_trend;
+
+enum { BT_TREND_LEAST = 12 }; ///< samples below which no trend is looked for
+
+/// Mean, standard error and interval of x[n], spaced evenly. The method and its measured coverage: src/stats.c. Linear in n.
 bt_mean bt_stats_mean(const double *x, int64_t n);
+
+/// Does the mean of x[n] drift? Least squares on batch means, with the correlation of what the line leaves. Linear in n.
+bt_trend bt_stats_trend(const double *x, int64_t n);
+
+/// Means of the four quarters of x[n]; NaN where a quarter has no sample.
+void bt_stats_quarters(const double *x, int64_t n, double quarter[4]);
 
 /// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the
 /// variance of the mean of batches of 5, searched over the first half. Returns an index in [first, n/2 or first].

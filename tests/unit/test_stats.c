@@ -34,44 +34,130 @@ static void ar1(double *x, int n, double phi, uint64_t *state)
     }
 }
 
-static void check_coverage(double phi, int n, double tau_tolerance)
+/// Largest fraction by which the mean of 400 estimates from 6 squares each differs from the truth by chance: 3 √(2/6/400).
+#define CHANCE 0.09
+
+static void check_coverage(double phi, int n)
 {
     enum { SERIES = 400 };
     const double tau = 0.5 * (1 + phi) / (1 - phi), mean = 7;
     uint64_t state = 12345;
     double *x = malloc((size_t)n * sizeof *x);
     int inside = 0;
-    double tau_sum = 0, ratio_sum = 0;
+    double tau_sum = 0, var_sum = 0, sd_sum = 0;
     for (int s = 0; s < SERIES; s++) {
         ar1(x, n, phi, &state);
         for (int i = 0; i < n; i++) x[i] = mean + 2 * x[i];
         const bt_mean m = bt_stats_mean(x, n);
-        inside += fabs(m.mean - mean) <= 1.96 * m.se;
+        inside += m.low <= mean && mean <= m.high;
         tau_sum += m.tau / SERIES;
-        ratio_sum += m.sd / SERIES;
-        assert_true(fabs(m.se - m.sd * sqrt(2 * m.tau / n)) <= 1e-12 * m.se);
+        var_sum += m.se * m.se / SERIES;
+        sd_sum += m.sd / SERIES;
+        assert_true(fabs(m.high - m.mean - 2.447 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 2.447 * m.se) <= 1e-9 * m.se);
         assert_true(fabs(m.n_eff - n / (2 * m.tau)) <= 1e-9 * n);
     }
     free(x);
-    const double covered = 100.0 * inside / SERIES;
-    print_message("phi %.2f n %d: coverage %.1f %%, tau %.3f of %.3f\n", phi, n, covered, tau_sum, tau);
+    const double covered = 100.0 * inside / SERIES, true_var = 4 * 2 * tau / n;
+    print_message("phi %.2f n %d: coverage %.1f %%, variance %.3f of the true one, tau %.3f of %.3f\n", phi, n, covered, var_sum / true_var, tau_sum, tau);
     assert_true(covered >= 92 && covered <= 98);
-    assert_true(fabs(tau_sum / tau - 1) < tau_tolerance);
-    assert_true(fabs(ratio_sum / 2 - 1) < 0.05);
+    assert_true(fabs(var_sum / true_var - 1) < CHANCE);
+    assert_true(fabs(tau_sum / tau - 1) < 0.15); // short series of batches see a little of the correlation as noise
+    assert_true(fabs(sd_sum / 2 - 1) < 0.05);
 }
 
-static void the_error_of_correlated_series_covers(void **s)
+static void the_interval_of_correlated_series_covers(void **s)
 {
     (void)s;
-    check_coverage(0.0, 1000, 0.02);
-    check_coverage(0.5, 1000, 0.04);
-    check_coverage(0.9, 4000, 0.05);
+    check_coverage(0.0, 1000);
+    check_coverage(0.5, 1000);
+    check_coverage(0.9, 4000);
+    check_coverage(0.99, 20000);
 }
 
-static void long_correlation_goes_through_pair_means(void **s)
+/// Noise whose slow part is taken back later, as ice that one jam has used up is missing in the next: x_i = e_i − θ e_{i−LAG}. Its mean
+/// has the variance (1 − θ)² / n, while the autocorrelation is zero up to LAG.
+static void what_is_taken_back_later_is_seen(void **state)
 {
-    (void)s;
-    check_coverage(0.99, 20000, 0.08); // 5 τ ≈ 500 lags: above the limit after which pairs are merged
+    (void)state;
+    enum { N = 2000, LAG = 60, SERIES = 200 };
+    static double e[N + LAG], x[N];
+    const double theta = 0.5;
+    uint64_t seed = 3;
+    double var = 0;
+    int inside = 0;
+    for (int k = 0; k < SERIES; k++) {
+        for (int i = 0; i < N + LAG; i++) e[i] = normal(&seed);
+        for (int i = 0; i < N; i++) x[i] = e[i + LAG] - theta * e[i];
+        const bt_mean m = bt_stats_mean(x, N);
+        var += m.se * m.se * N / SERIES;
+        inside += m.low <= 0 && 0 <= m.high;
+    }
+    print_message("variance %.3f, true %.3f, of white noise of the same sd %.3f; coverage %.1f %%\n", var, 0.25, 1.25, 100.0 * inside / SERIES);
+    assert_true(var > 0.2 && var < 0.45); // the highest of the six waves begins to see the noise
+    assert_true(inside >= 0.93 * SERIES);
+}
+
+typedef enum { NOTHING, DRIFT, JUMP, START_UP } change;
+
+/// Share of series with a trend, in per cent. size: in standard errors of the mean, as the run itself would report it in the mean.
+static double alarms(int n, double phi, change kind, double size)
+{
+    enum { SERIES = 1000 };
+    uint64_t state = 77;
+    double *x = malloc((size_t)n * sizeof *x);
+    const double se = sqrt((1 + phi) / (1 - phi) / n);
+    int found = 0;
+    for (int k = 0; k < SERIES; k++) {
+        ar1(x, n, phi, &state);
+        for (int i = 0; i < n; i++) {
+            const double u = (i + 0.5) / n;
+            if (kind == DRIFT) x[i] += size * se * (u - 0.5);
+            if (kind == JUMP) x[i] += size * se * (u > 0.5);
+            if (kind == START_UP) x[i] -= size * se * exp(-10 * u);
+        }
+        found += bt_stats_trend(x, n).significant;
+    }
+    free(x);
+    return 100.0 * found / SERIES;
+}
+
+/// A drift of d parts the means of the halves by d/2, whose standard error is twice that of the mean: three of them are d = 12.
+static void a_drift_is_told_from_noise(void **state)
+{
+    (void)state;
+    static const struct { int n; double phi; } series[] = {{480, 0}, {2600, 0}, {480, 0.5}, {2600, 0.9}, {480, 0.8}, {2600, 0.95}};
+    double false_sum = 0, drift_sum = 0;
+    enum { N = sizeof series / sizeof *series };
+    for (int k = 0; k < N; k++) {
+        const int n = series[k].n;
+        const double phi = series[k].phi, none = alarms(n, phi, NOTHING, 0), drift = alarms(n, phi, DRIFT, 12), jump = alarms(n, phi, JUMP, 10),
+                     start = alarms(n, phi, START_UP, 60);
+        print_message("n %d phi %.2f (%.0f independent): false %.1f %%, drift %.1f %%, jump %.1f %%, start-up %.1f %%\n", n, phi, n * (1 - phi) / (1 + phi), none,
+                      drift, jump, start);
+        assert_true(none <= 7); // 5 % and three standard errors of 1,000 trials
+        assert_true(drift >= 87.2);
+        assert_true(jump >= 90);
+        assert_true(start >= 80); // it bends, and what the line leaves of it counts as noise; a window that is found begins after it
+        false_sum += none / N;
+        drift_sum += drift / N;
+    }
+    assert_true(false_sum <= 5 && drift_sum >= 90);
+}
+
+static void the_trend_is_the_line_through_the_series(void **state)
+{
+    (void)state;
+    double x[960], quarter[4];
+    for (int i = 0; i < 960; i++) x[i] = 3 + 2.0 * i / 960 + 0.1 * cos(2 * BT_PI * 20 * (i + 0.5) / 960);
+    const bt_trend t = bt_stats_trend(x, 960);
+    assert_true(t.significant && fabs(t.change - 2) < 1e-2 && t.low < t.change && t.change < t.high);
+    bt_stats_quarters(x, 960, quarter);
+    for (int q = 0; q < 4; q++) assert_true(fabs(quarter[q] - (3.25 + 0.5 * q)) < 2e-3);
+    assert_true(isnan(bt_stats_trend(x, BT_TREND_LEAST - 1).change));
+    bt_stats_quarters(x, 2, quarter);
+    assert_true(isnan(quarter[0]) && quarter[1] == x[0] && isnan(quarter[2]) && quarter[3] == x[1]);
+    for (int i = 0; i < 960; i++) x[i] = 5;
+    assert_true(!bt_stats_trend(x, 960).significant && bt_stats_trend(x, 960).change == 0);
 }
 
 static void constant_series_have_no_error(void **s)
@@ -158,8 +244,10 @@ static void the_transient_is_cut(void **s)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_error_of_correlated_series_covers),
-        cmocka_unit_test(long_correlation_goes_through_pair_means),
+        cmocka_unit_test(the_interval_of_correlated_series_covers),
+        cmocka_unit_test(what_is_taken_back_later_is_seen),
+        cmocka_unit_test(a_drift_is_told_from_noise),
+        cmocka_unit_test(the_trend_is_the_line_through_the_series),
         cmocka_unit_test(constant_series_have_no_error),
         cmocka_unit_test(short_series),
         cmocka_unit_test(alternating_series_keep_an_error_above_zero),

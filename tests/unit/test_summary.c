@@ -2,6 +2,8 @@
 // summary.json of made-up runs: its numbers against sums of the test's own, and a warning for each doubt.
 #include "made_up_run.h"
 
+#include "bergtow/window.h"
+
 /// The text after "key": up to the end of the line, without a comma.
 static const char *json_value(const char *json, const char *key)
 {
@@ -116,7 +118,8 @@ static void every_doubt_is_told(void **state)
 
     c.output.window_start = 20;
     char *json = summary_of(&c, 600, &t, FLOES, slow_wave);
-    assert_non_null(strstr(json, "the steady window is short"));
+    assert_non_null(strstr(json, "independent samples of the ice resistance"));
+    assert_string_equal(json_value(json, "verdict"), "\"too short\"");
     assert_string_equal(json_value(json, "rule"), "\"given\"");
     assert_string_equal(json_value(json, "start_s"), "20");
     assert_int_not_equal(strncmp(json_value(json, "warning"), "null", 4), 0);
@@ -133,7 +136,8 @@ static void every_doubt_is_told(void **state)
                                        "crushed to a depth of 0.9 m, 45 % of the mean floe size", "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++)
         if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
-    assert_null(strstr(json, "the steady window is short"));
+    assert_null(strstr(json, "independent samples of the"));
+    assert_string_equal(json_value(json, "verdict"), "\"not steady\""); // a third of the steps did not converge
     free(json);
 
     t = totals(600);
@@ -145,7 +149,7 @@ static void every_doubt_is_told(void **state)
     c.output.window_start = 100;
     json = summary_of(&c, 600, &t, FLOES, NULL);
     assert_string_equal(json_value(json, "mean_ice_resistance_n"), "null");
-    assert_non_null(strstr(json, "no steady window: it would begin at 100 s and the run ends at 60 s"));
+    assert_non_null(strstr(json, "no window: it would begin at 100 s and the run ends at 60 s"));
     free(json);
 
     c.output.window_start = -1;
@@ -153,6 +157,98 @@ static void every_doubt_is_told(void **state)
     json = summary_of(&c, 600, &t, FLOES, NULL);
     assert_true(atof(json_value(json, "start_s")) >= 50);
     free(json);
+}
+
+/// White noise of unit size by i, the test's own.
+static double noise(int i)
+{
+    uint64_t z = ((uint64_t)i + 1) * 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return sqrt(12) * ((double)((z ^ (z >> 31)) >> 11) * 0x1p-53 - 0.5);
+}
+
+static void set_forces(bt_sample *s, double ice, double tow)
+{
+    s->ice_resistance = s->ice_resistance_budget = ice;
+    s->tow_force = tow;
+    s->drag_force = 20;
+    s->inertia_force = tow - ice - s->drag_force - s->coriolis_force - s->tilt_force;
+}
+
+static void sound_tow(bt_sample *s, int i) { set_forces(s, 100 + 10 * noise(i), 121 + 10 * noise(i)); }
+
+/// The body is drawn with a jerk and swings on its line for half of the run, in noiseless ice.
+static void jerked_tow(bt_sample *s, int i)
+{
+    set_forces(s, 100 + 10 * noise(i), 121 + 10 * noise(i));
+    s->line_tension_2 = NAN;
+    s->line_tension = s->line_tension_1 = 121 + 2000 * exp(-i / 60.0) + 10 * noise(i + 1000);
+}
+
+static void rising_ice(bt_sample *s, int i) { set_forces(s, 100 + 0.05 * i + 10 * noise(i), 121 + 0.05 * i + 10 * noise(i)); }
+static void one_wild_step(bt_sample *s, int i) { sound_tow(s, i), s->residual = i == 500 ? 0.2 : s->residual; }
+static void few_unconverged(bt_sample *s, int i) { sound_tow(s, i), s->unconverged = i > 300 && i % 50 == 0; }
+
+static void the_window_serves_every_series(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    const bt_run_totals t = totals(600);
+    char *json = summary_of(&c, 600, &t, FLOES, sound_tow);
+    assert_string_equal(json_value(json, "verdict"), "\"steady\"");
+    assert_string_equal(json_value(json, "reason"), "null");
+    const double alone = atof(json_value(json, "start_s"));
+    assert_true(alone < 20);
+    free(json);
+
+    json = summary_of(&c, 600, &t, FLOES, jerked_tow);
+    const double start = atof(json_value(json, "start_s"));
+    assert_true(start > 15 && start > alone); // the ice alone would begin at `alone`
+    assert_true(atof(json_value(json, "peak_line_tension_n")) < 300);
+    assert_true(atof(json_value(json, "start_peak_line_tension_n")) > 2000);
+    assert_true(fabs(atof(json_value(json, "mean_line_tension_n")) - 121) < 5);
+    free(json);
+
+    // Quarters, and the change of the line through them.
+    c.output.window_start = 0;
+    json = summary_of(&c, 600, &t, FLOES, rising_ice);
+    assert_string_equal(json_value(json, "verdict"), "\"not steady\"");
+    assert_non_null(strstr(json, "the ice resistance rises over the window by"));
+    const char *quarters = strstr(json, "\"quarters_n\": [");
+    assert_non_null(quarters);
+    double q[4];
+    assert_int_equal(sscanf(quarters + 15, " %lf , %lf , %lf , %lf", &q[0], &q[1], &q[2], &q[3]), 4);
+    for (int k = 0; k < 4; k++) assert_true(fabs(q[k] - (103.75 + 7.5 * k)) < 2.5);
+    assert_true(fabs(atof(json_value(json, "change_n")) - 30) < 4);
+    free(json);
+}
+
+static void what_no_mean_goes_across_is_a_verdict(void **state)
+{
+    (void)state;
+    bt_case c = made_up_case();
+    c.output.window_start = 20;
+    double programme[] = {0, 1, 40, 1, 50, 0.5};
+    bt_event event[] = {{.time = 45, .kind = BT_EVENT_LINE_BROKEN, .subject = 1, .value = 7}};
+    const bt_events events = {.event = event, .n = 1};
+    static const char *const told[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s", "a step in the window was left with a residual of 0.2 m/s",
+                                       "1.2 % of the steps in the window did not converge", "the speed programme goes from 1 to 0.5 m/s within the window",
+                                       "the line parted at 45 s", "stood still for 6 s of 60 s", "of the places ahead of the moving window stayed empty"};
+    for (size_t k = 0; k < sizeof told / sizeof *told; k++) {
+        bt_case d = c;
+        bt_run_totals t = totals(600);
+        bt_window window = {.renewed = 50, .missed = k == 6 ? 10 : 0, .length = 10};
+        if (k == 0) d.tow.ramp = 30;
+        if (k == 3) d.tow.programme = programme, d.tow.n_programme = 3;
+        if (k == 4) t.events = &events;
+        if (k == 5) t.stall = (bt_stall){.windows = 1, .time = 6};
+        if (k == 6) t.window = &window;
+        char *json = summary_of(&d, 600, &t, FLOES, k == 1 ? one_wild_step : k == 2 ? few_unconverged : sound_tow);
+        assert_string_equal(json_value(json, "verdict"), "\"not steady\"");
+        if (!strstr(json_value(json, "reason"), told[k])) fail_msg("wanted '%s', told %s", told[k], json_value(json, "reason"));
+        free(json);
+    }
 }
 
 static void without_a_towed_body_forces_are_null(void **state)
@@ -174,7 +270,7 @@ static void without_a_towed_body_forces_are_null(void **state)
     json = summary_of(&c, 0, &none, FLOES, NULL);
     assert_string_equal(json_value(json, "contacts_mean"), "null");
     assert_string_equal(json_value(json, "sim_time_s"), "0");
-    assert_non_null(strstr(json, "no steady window"));
+    assert_non_null(strstr(json, "no window: it would begin at 0 s and the run ends at 0 s"));
     free(json);
 }
 
@@ -183,6 +279,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(summary_holds_the_numbers),
         cmocka_unit_test(every_doubt_is_told),
+        cmocka_unit_test(the_window_serves_every_series),
+        cmocka_unit_test(what_no_mean_goes_across_is_a_verdict),
         cmocka_unit_test(without_a_towed_body_forces_are_null),
     };
     int failed;
