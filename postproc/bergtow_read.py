@@ -201,9 +201,34 @@ class Run:
 
     @property
     def window(self):
-        """(start s, end s) of the steady window that the means of the summary refer to, or None."""
+        """(start s, end s) of the window that the means of the summary refer to, or None."""
         window = self.number("window.start_s"), self.number("window.end_s")
         return window if np.isfinite(window).all() else None
+
+    @property
+    def verdict(self):
+        """("steady", "not steady" or "too short", the reason); "not judged" of a result that names no verdict: an older one, or without a towed body."""
+        window = self.summary.get("window")
+        window = window if isinstance(window, dict) else {}
+        return str(window.get("verdict") or "not judged"), str(window.get("reason") or window.get("warning") or "")
+
+    @property
+    def window_name(self):
+        """How the window may be called: "steady window" for a steady tow alone."""
+        return "steady window" if self.verdict[0] == "steady" else "window"
+
+    @property
+    def mean_name(self):
+        """How a mean of it may be called."""
+        return "mean" if self.verdict[0] == "steady" else "mean over the window"
+
+    def interval(self, key):
+        """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval; NaN where it is not known.
+
+        Results of earlier versions have a standard error and no interval: there low and high are 1.96 of them off.
+        """
+        mean, se = self.number(f"mean_{key}_n"), self.number(f"mean_{key}_se_n")
+        return mean, self.number(f"mean_{key}_low_n", mean - 1.96 * se), self.number(f"mean_{key}_high_n", mean + 1.96 * se)
 
     def number(self, key, default=np.nan):
         """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""

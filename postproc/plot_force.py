@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forces of a run against time, with the mean over the steady window; on request, how the solver fared."""
+"""Forces of a run against time, with the mean over its window; on request, how the solver fared."""
 import textwrap
 
 import command
@@ -60,7 +60,7 @@ def draw_ice(axes, run, factor, unit, top=None):
     samples, seconds = smoothing(run)
     smooth = running_mean(ice, samples)
     reference = run.number("reference.mean_force_n")
-    mean, se = run.number("mean_ice_resistance_n"), run.number("mean_ice_resistance_se_n")
+    mean, bottom, ceiling = run.interval("ice_resistance")
     mark_window(axes, run)
     many = len(time) > 2000
     axes.plot(time, ice / factor, color=style.ICE, alpha=0.22 if many else 0.45, linewidth=0.6 if many else 0.8,
@@ -68,14 +68,14 @@ def draw_ice(axes, run, factor, unit, top=None):
     axes.plot(time, smooth / factor, color=style.ICE, label=f"running mean over {style.short(seconds, 2)} s")
     if np.isfinite(mean) and run.window:
         start, end = run.window
-        if np.isfinite(se):
-            axes.fill_between([start, end], (mean - 1.96 * se) / factor, (mean + 1.96 * se) / factor,
-                              color=style.TOW, alpha=0.28, linewidth=0, zorder=1.5)
-        axes.plot([start, end], [mean / factor] * 2, color=style.TOW, linewidth=1.8, zorder=4,
-                  label="mean, 95 % confidence" if np.isfinite(se) else "mean")
+        steady = run.verdict[0] == "steady"
+        if np.isfinite(bottom):
+            axes.fill_between([start, end], bottom / factor, ceiling / factor, color=style.TOW, alpha=0.28, linewidth=0, zorder=1.5)
+        axes.plot([start, end], [mean / factor] * 2, color=style.TOW, linewidth=1.8, linestyle="-" if steady else ":", zorder=4,
+                  label=run.mean_name + (", 95 % interval" if np.isfinite(bottom) else ""))
     if np.isfinite(reference):
         axes.axhline(reference / factor, color=style.REFERENCE, linewidth=1.3, dashes=(5, 3), zorder=4, label="reference")
-    marks = [m for m in (reference, mean - 1.96 * se, mean + 1.96 * se) if np.isfinite(m)]
+    marks = [m for m in (reference, bottom, ceiling) if np.isfinite(m)]
     _clip_peaks(axes, ice, smooth, marks, factor, top)
     axes.set_ylabel(f"ice resistance ({unit})")
     axes.grid(axis="y")
@@ -85,9 +85,11 @@ def draw_ice(axes, run, factor, unit, top=None):
 
 
 def mark_window(axes, run):
-    """Shade the steady window."""
+    """Shade the window of the means; hatched where the tow is not steady in it."""
     if run.window:
-        axes.axvspan(*run.window, color=style.WINDOW, linewidth=0, zorder=0)
+        steady = run.verdict[0] in ("steady", "not judged")
+        axes.axvspan(*run.window, facecolor=style.WINDOW, edgecolor=style.PAPER if steady else style.FAINT, hatch=None if steady else "///",
+                     alpha=1 if steady else 0.35, linewidth=0, zorder=0)
 
 
 def draw_balance(axes, run, factor, unit):
@@ -119,20 +121,19 @@ def draw_balance(axes, run, factor, unit):
 
 
 def findings(run):
-    """One line with the means of the steady window."""
-    mean, se = run.number("mean_ice_resistance_n"), run.number("mean_ice_resistance_se_n")
+    """One line with the means of the window."""
+    mean, low, high = run.interval("ice_resistance")
     words = []
     if np.isfinite(mean):
         factor, unit = style.scale([mean], "N")
-        if np.isfinite(se) and se > 0:  # both with the two digits that the error leaves
-            band = style.short(1.96 * se / factor, 2)
-            decimals = len(band.partition(".")[2])
-            words.append(f"mean ice resistance {mean / factor:.{decimals}f} ± {band} {unit} (95 %)")
+        if np.isfinite(low) and high > low:  # all with the two digits that the interval leaves
+            decimals = len(style.short((high - low) / 2 / factor, 2).partition(".")[2])
+            words.append(f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: {low / factor:.{decimals}f} to {high / factor:.{decimals}f})")
         else:
-            words.append(f"mean ice resistance {style.short(mean / factor)} {unit}")
-    tow = run.number("mean_tow_force_n")
+            words.append(f"{run.mean_name}: ice resistance {style.short(mean / factor)} {unit}")
+    tow, low, high = run.interval("tow_force")
     if np.isfinite(tow):
-        words.append(f"mean tow force {style.quantity(tow, 'N')}")
+        words.append(f"tow force {style.quantity(tow, 'N')}")
     reference = run.number("reference.mean_force_n")
     if np.isfinite(reference):
         source = style.plain(textwrap.shorten(run.summary["reference"].get("source") or "", 60, placeholder=" ..."))
@@ -177,7 +178,7 @@ def draw(run, top=None):
     figure.text(0.02, 1 - 0.92 / height, "\n".join(doubts(run)), va="top", fontsize=9, color=style.TOW)
     notes = "assumed parameters: see case.resolved.yml"
     if run.window:
-        notes = f"shaded: steady window {style.short(run.window[0])} to {style.short(run.window[1])} s; " + notes
+        notes = f"shaded: {run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s; " + notes
     figure.text(0.975, 0.02, notes, ha="right", va="bottom", fontsize=8.5, color=style.FAINT)
     return figure
 

@@ -35,7 +35,10 @@ class Point:
     asked: float          #: ice.concentration, or as made where the case does not say
     concentration: float  #: as made
     mean: float           #: N
-    se: float             #: N, NaN where the run gives none
+    se: float             #: standard error of the mean, N, NaN where the run gives none
+    low: float            #: 95 % interval of the mean, N, NaN where the run gives none
+    high: float
+    steady: bool          #: the window is that of a steady tow
     reference: float      #: N, measured, NaN without one
     unconverged: float    #: share of the steps
     warnings: int
@@ -55,12 +58,12 @@ def read(path):
             raise RunError(run.path / "summary.json", "holds no estimates", "run a case with a towed body, with this version")
         if estimates["lichey_hellmer"]["force_n"] is None:
             raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
-        made, mean = run.number("concentration"), run.number("mean_ice_resistance_n")
+        made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):
-            raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no steady window")
+            raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
         from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
         return Point(path=run.path, title=style.title(run), asked=made if from_file else run.value("ice.concentration", made), concentration=made,
-                     mean=mean, se=run.number("mean_ice_resistance_se_n"), reference=run.number("reference.mean_force_n"),
+                     mean=mean, se=run.number("mean_ice_resistance_se_n"), low=low, high=high, steady=run.verdict[0] == "steady", reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
                      warnings=len(run.summary.get("warnings") or []), estimates=estimates)
 
@@ -137,7 +140,7 @@ def draw_estimates(axes, points, factor):
 
 def limits(points, log):
     """Lower and upper end of the force axis, N: the runs, and the estimates that are meant for what was run."""
-    seen = [x for p in points for x in (p.mean, p.mean - 1.96 * p.se, p.mean + 1.96 * p.se, p.reference)]
+    seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)]
     for p in points:
         for name in ESTIMATES:
             e = p.estimates[name]
@@ -162,11 +165,16 @@ def draw(points, log=True):
     axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
     draw_estimates(axes, points, factor)
     a = np.array([p.concentration for p in points])
-    mean, se = np.array([p.mean for p in points]), np.nan_to_num(np.array([p.se for p in points]))
+    mean = np.array([p.mean for p in points])
+    below, above = (np.nan_to_num(np.array(x)) for x in ([p.mean - p.low for p in points], [p.high - p.mean for p in points]))
+    steady = np.array([p.steady for p in points])
     shown = mean > 0 if log else np.full(len(mean), True)
-    below = np.minimum(1.96 * se, mean - low / 2) if log else 1.96 * se
-    axes.errorbar(a[shown], mean[shown] / factor, yerr=np.array([np.maximum(below, 0)[shown], 1.96 * se[shown]]) / factor, fmt="o", color=style.ICE,
-                  markersize=6, capsize=3, linewidth=1.4, zorder=5, label="simulated, 95 % of the run's mean")
+    below = np.minimum(below, mean - low / 2) if log else below
+    for which, face, label in ((steady, style.ICE, "simulated, 95 % of the run's mean"), (~steady, style.PAPER, "simulated, window not steady or too short")):
+        which = which & shown
+        if which.any():
+            axes.errorbar(a[which], mean[which] / factor, yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor, fmt="o", color=style.ICE,
+                          markerfacecolor=face, markersize=6, capsize=3, linewidth=1.4, zorder=5, label=label)
     averaged = [r for r in rows(points) if r["runs"] > 1]
     if averaged:
         axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged], marker="_", markersize=22,

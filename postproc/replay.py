@@ -251,7 +251,8 @@ def curve(run):
         out["lines"].append({"name": name, "label": label, "unit": run.units(name), "colour": colour, "low": _digits(low), "high": _digits(high),
                              "smooth": _digits(smooth[middle])})
     out["window"] = list(run.window) if run.window else None
-    mean, se = run.number("mean_ice_resistance_n"), run.number("mean_ice_resistance_se_n")
-    out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float(1.96 * se) if np.isfinite(se) else None)
+    mean, low, high = run.interval("ice_resistance")
+    out["window_name"] = run.window_name
+    out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float((high - low) / 2) if np.isfinite(high - low) else None)
     out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.summary.get("events", [])]
     return out

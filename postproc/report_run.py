@@ -40,19 +40,18 @@ def force(value):
     return style.quantity(value, "N") if value is not None and np.isfinite(value) else "–"
 
 
-def with_error(mean, se):
-    """(mean ± standard error, 95 % interval) in words, to the two digits that the error leaves; a dash for what is not known."""
+def with_interval(mean, low, high):
+    """(mean, 95 % interval) in words, to the two digits that the interval leaves; a dash for what is not known."""
     if not np.isfinite(mean):
         return "–", "–"
-    if not np.isfinite(se) or se <= 0:
+    if not np.isfinite(low) or high <= low:
         return force(mean), "–"
-    if se < 1e-6 * abs(mean):
+    half = (high - low) / 2
+    if half < 1e-6 * abs(mean):
         return force(mean), "no scatter"
     factor, unit = style.scale([mean], "N")
-    error = style.short(se / factor, 2)
-    digits = len(error.partition(".")[2])
-    low, high = ((mean + k * 1.96 * se) / factor for k in (-1, 1))
-    return f"{mean / factor:.{digits}f} ± {error} {unit}", f"{low:.{digits}f} to {high:.{digits}f} {unit}"
+    digits = len(style.short(half / factor, 2).partition(".")[2])
+    return f"{mean / factor:.{digits}f} {unit}", f"{low / factor:.{digits}f} to {high / factor:.{digits}f} {unit}"
 
 
 def share(value):
@@ -87,33 +86,45 @@ def pictures(run):
     return out
 
 
+def start_peak(run):
+    """What the tension was before the window, in words."""
+    before = run.number("start_peak_line_tension_n")
+    return f"; in the start before it {force(before)}" if np.isfinite(before) else ""
+
+
 def figures(run):
     """The few numbers at the head of the page: (label, number, what stands below it)."""
     if run.towed is None:
         return []
     n = run.number
-    mean, interval = with_error(n("mean_ice_resistance_n"), n("mean_ice_resistance_se_n"))
-    window = f"steady window {style.short(run.window[0])} to {style.short(run.window[1])} s" if run.window else "no steady window"
-    out = [("mean ice resistance", mean, (f"95 % interval {interval}; " if interval != "–" else "no standard error; ") + window),
-           ("mean tow force", with_error(n("mean_tow_force_n"), n("mean_tow_force_se_n"))[0], f"95 % interval {with_error(n('mean_tow_force_n'), n('mean_tow_force_se_n'))[1]}"),
+    window = f"{run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s" if run.window else "no window"
+    name = run.mean_name
+    (ice, ice_range), (tow, tow_range) = (with_interval(*run.interval(key)) for key in ("ice_resistance", "tow_force"))
+    out = [(f"ice resistance, {name}", ice, (f"95 % interval {ice_range}; " if ice_range != "–" else "no interval; ") + window),
+           (f"tow force, {name}", tow, f"95 % interval {tow_range}"),
            ("largest ice resistance in a step", force(n("peak_ice_resistance_n")), run.summary.get("peak_conversion") or "")]
     if np.isfinite(n("peak_line_tension_n")):
-        out.append(("largest line tension", force(n("peak_line_tension_n")), "mean over a step, whole run, start included"))
+        out.append(("largest line tension", force(n("peak_line_tension_n")), "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("impacts.largest.peak_n")):
-        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")), run.summary["impacts"]["conversion"] + ", steady window"))
+        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")), f"{run.summary['impacts']['conversion']}, from {style.short(n('impacts.from_s'))} s on"))
     if np.isfinite(n("reference.mean_force_n")):
         out.append(("simulated / measured", style.short(n("reference.ratio")), f"measured {force(n('reference.mean_force_n'))}: {run.summary['reference'].get('source') or 'source not stated'}"))
     return out
 
 
 def forces(run):
-    """Rows (quantity, value, interval, remark) of the steady window."""
+    """Rows (quantity, value, interval, remark) of the window."""
     if run.towed is None:
         return []
     n, rows = run.number, []
-    for label, key, remark in (("ice resistance", "ice_resistance", "contact force of ice and walls on the body against the tow"), ("tow force", "tow_force", "along the tow")):
-        value, interval = with_error(n(f"mean_{key}_n"), n(f"mean_{key}_se_n"))
-        rows.append((f"mean {label}", value, interval, remark))
+    for label, key, remark in (("ice resistance", "ice_resistance", "contact force of ice and walls on the body against the tow"), ("tow force", "tow_force", "along the tow"),
+                               ("line tension", "line_tension", ""), ("tension of the second branch", "line_tension_2", ""), ("vessel thrust", "vessel_thrust", "along its course")):
+        if np.isfinite(n(f"mean_{key}_n")) or key in ("ice_resistance", "tow_force"):
+            value, interval = with_interval(*run.interval(key))
+            rows.append((f"{label}, {run.mean_name}", value, interval, remark))
+    quarters = ((run.summary.get("window") or {}).get("series") or {}).get("ice_resistance", {}).get("quarters_n")
+    if quarters:
+        rows.append(("ice resistance by quarters of the window", ", ".join(force(q) for q in quarters), "", ""))
     rows.append(("open-water and air drag, mean", force(n("mean_drag_force_n")), "", "of water and air on the body"))
     for label, key in (("Coriolis force", "coriolis"), ("force of the sea-surface tilt", "tilt"), ("inertia", "inertia")):
         if n(f"mean_{key}_force_n", 0.0):
@@ -122,7 +133,7 @@ def forces(run):
     rows += [("standard deviation of the ice resistance", force(n("sd_ice_resistance_n")), "", conversion), ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
              ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion), ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion)]
     if np.isfinite(n("peak_line_tension_n")):
-        rows.append(("largest line tension", force(n("peak_line_tension_n")), "", "whole run, start included"))
+        rows.append(("largest line tension", force(n("peak_line_tension_n")), "", "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("reference.mean_force_n")):
         rows.append(("measured mean force (reference)", force(n("reference.mean_force_n")), "", run.summary["reference"].get("source") or "source not stated"))
         rows.append(("simulated / measured", style.short(n("reference.ratio")), "", ""))
@@ -164,7 +175,7 @@ def quality(run):
     n, rows = run.number, []
     if run.window:
         rule = {"given": "begin given in the case", "mser5": "begin found from the series (MSER-5)"}.get(run.summary["window"].get("rule"), "")
-        rows += [("steady window", f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples", rule),
+        rows += [("verdict", run.verdict[0], run.verdict[1]), (run.window_name, f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples", rule),
                  ("independent samples in it", style.short(n("window.n_independent")), f"correlation time {style.short(n('window.correlation_time_s'))} s")]
     if run.towed is not None:
         rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)", share(n("budget.closure_relative")), "relative to the largest of them"),
@@ -226,7 +237,7 @@ def context(run, limit=LIMIT, compress=True):
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
     return {"title": breakable(run.summary.get("title") or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
-            "warnings": [str(w) for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"], "figures": figures(run), "forces": forces(run),
+            "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name, "warnings": [str(w) for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"], "figures": figures(run), "forces": forces(run),
             "estimates": estimates(run), "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run), "events": happened,
             "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values), "values": values, "kinds": report_case.KINDS,
             "n_assumed": sum(v.kind in ("assumed", "memory") for v in values), "preface": report_case.preface(run.case_text), "case_text": run.case_text,

@@ -20,14 +20,18 @@ static const struct { const char *name, *key; bt_column column; } reported[BT_N_
     {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST},
 };
 
+/// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window too short.
 __attribute__((format(printf, 3, 4))) static void decide(bt_steady *s, bt_verdict verdict, const char *text, ...)
 {
-    if (s->verdict != BT_STEADY) return; // the first reason stands
+    if (s->verdict == BT_NOT_STEADY && verdict == BT_TOO_SHORT) return;
+    if (s->verdict != verdict) s->reason[0] = '\0';
+    s->verdict = verdict;
+    size_t used = strlen(s->reason);
+    if (used > 0 && used + 2 < sizeof s->reason) memcpy(s->reason + used, "; ", 3), used += 2;
     va_list ap;
     va_start(ap, text);
-    vsnprintf(s->reason, sizeof s->reason, text, ap);
+    vsnprintf(s->reason + used, sizeof s->reason - used, text, ap);
     va_end(ap);
-    s->verdict = verdict;
 }
 
 static int64_t first_at_or_after(const bt_history *h, double time)
@@ -60,6 +64,7 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c, d
     s->earliest = s->given ? c->output.window_start : ramp;
     const int64_t earliest = first_at_or_after(h, s->earliest);
     int64_t first = earliest;
+    const char *settles = NULL;
     if (s->given || earliest >= h->n) return first;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
@@ -68,9 +73,11 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c, d
         first = start > first ? start : first;
         // A minimum at the far end of the search means that the variance still falls where the search stops.
         if (start > earliest && start + 5 > h->n / 2)
-            decide(s, BT_NOT_STEADY, "the %s still settles in the first half of the run, and the window begins at its middle (%g s); run longer",
-                   reported[k].name, h->column[BT_COL_TIME][start]);
+            settles = reported[k].name;
     }
+    if (settles)
+        decide(s, BT_NOT_STEADY, "the %s still settles in the first half of the run, and the window begins at its middle (%g s): run longer", settles,
+               h->column[BT_COL_TIME][first]);
     return first;
 }
 
@@ -97,10 +104,10 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
     const double speed = t->tolerance / c->solver.tolerance;
     if (s->unconverged > BT_STEADY_UNCONVERGED)
-        decide(s, BT_NOT_STEADY, "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears; raise solver.max_sweeps or "
+        decide(s, BT_NOT_STEADY, "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise solver.max_sweeps or "
                "lower run.dt", 100 * s->unconverged, 100 * BT_STEADY_UNCONVERGED);
     if (s->residual > BT_STEADY_RESIDUAL * speed)
-        decide(s, BT_NOT_STEADY, "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of %.3g m/s; raise "
+        decide(s, BT_NOT_STEADY, "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of %.3g m/s: raise "
                "solver.max_sweeps or lower run.dt", s->residual, BT_STEADY_RESIDUAL, speed);
 }
 
@@ -110,7 +117,7 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++) {
         if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= s->start || p[2 * i] >= s->end) continue;
-        decide(s, BT_NOT_STEADY, "the speed programme goes from %g to %g m/s within the window, %g to %g s; end the run before, or read the series",
+        decide(s, BT_NOT_STEADY, "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read the series",
                p[2 * i + 1], p[2 * i + 3], s->start, s->end);
     }
     for (int64_t i = 0; t->events && i < t->events->n; i++) {
@@ -123,7 +130,7 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     if (!t->window) return;
     const double places = (double)(t->window->renewed + t->window->missed);
     if (places > 0 && (double)t->window->missed > BT_STEADY_MISSED * places)
-        decide(s, BT_NOT_STEADY, "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or carries it along; take a "
+        decide(s, BT_NOT_STEADY, "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or carries it along: take a "
                "longer domain", 100 * (double)t->window->missed / places);
 }
 
@@ -132,14 +139,15 @@ static void judge_series(bt_steady *s)
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
         if (!r->present || !r->trend.significant || !(fabs(r->trend.change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
-        decide(s, BT_NOT_STEADY, "the %s %s over the window by %.3g N (95 %%: %.3g to %.3g), %.0f %% of its mean; run longer, or begin the window later",
+        decide(s, BT_NOT_STEADY, "the %s %s over the window by %.3g N (95 %%: %.3g to %.3g), %.0f %% of its mean: run longer, or begin the window later",
                r->name, r->trend.change > 0 ? "rises" : "falls", fabs(r->trend.change), bt_min(fabs(r->trend.low), fabs(r->trend.high)),
                bt_max(fabs(r->trend.low), fabs(r->trend.high)), 100 * fabs(r->trend.change / r->mean.mean));
+        break; // the others follow from it, mostly
     }
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
         if (r->present && !(r->mean.n_eff >= BT_STEADY_INDEPENDENT))
-            decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d; run longer",
+            decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run longer",
                    s->end - s->start, r->mean.n_eff, r->name, s->n > 1 ? r->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN,
                    BT_STEADY_INDEPENDENT);
     }
@@ -152,7 +160,7 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     s->first = find_start(s, h, c, ramp);
     s->n = h->n - s->first;
     if (s->n == 0) {
-        decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s; run longer, or %s", s->earliest,
+        decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s", s->earliest,
                h->n ? time[h->n - 1] : 0, s->given ? "lower output.window_start" : "shorten tow.ramp");
     } else {
         s->start = time[s->first];
@@ -162,9 +170,9 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     if (s->n == 0) return;
     s->correlation_time = s->n > 1 ? s->series[0].mean.tau * t->dt : NAN;
     if (!isfinite(s->series[0].mean.mean) || !isfinite(s->series[1].mean.mean))
-        decide(s, BT_NOT_STEADY, "the forces on the body are not finite within the window: the run is not usable; lower run.dt");
+        decide(s, BT_NOT_STEADY, "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
     if (s->start < ramp * (1 - 1e-12))
-        decide(s, BT_NOT_STEADY, "the window begins at %g s, before the ramp of the tow ends at %g s; raise output.window_start", s->start, ramp);
+        decide(s, BT_NOT_STEADY, "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start", s->start, ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
     judge_series(s);

@@ -17,6 +17,7 @@ sys.path.insert(0, str(POSTPROC))
 import bergtow_read  # noqa: E402
 import plot_field  # noqa: E402
 import plot_force  # noqa: E402
+import report_run  # noqa: E402
 import style  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 
@@ -94,7 +95,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
         f.create_dataset("bodies/names", data=["towed body", "wall y low"], dtype=h5py.string_dtype())
     summary = {"title": "Square", "n_floes": 2, "n_steps": n, "concentration": 0.8, "mean_ice_resistance_n": 10.0,
                "mean_ice_resistance_se_n": 0.5, "mean_tow_force_n": 12.0, "unconverged_steps": 0, "tolerance_m_s": 1e-6,
-               "window": {"start_s": 3.0, "end_s": 10.0, "warning": None},
+               "window": {"start_s": 3.0, "end_s": 10.0, "verdict": "steady", "reason": None, "warning": None},
                "reference": {"mean_force_n": 9.0, "source": "a test"}, "stopped": None,
                "warnings": ["first doubt", "second doubt", "third doubt"]}
     (folder / "summary.json").write_text(json.dumps(summary))
@@ -316,7 +317,7 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
     with Run(make_run(tmp_path / "run")) as run:
         axes = plot_force.draw(run).axes[0]
         lines = {line.get_label(): line for line in axes.lines}
-        mean = lines["mean, 95 % confidence"]
+        mean = lines["mean, 95 % interval"]
         assert list(mean.get_xdata()) == [3.0, 10.0] and list(mean.get_ydata()) == [10.0, 10.0]
         assert list(lines["reference"].get_ydata()) == [9.0, 9.0]
         assert np.array_equal(lines["each sample"].get_ydata(), run["ice_resistance"])
@@ -324,8 +325,27 @@ def test_force_figure_shows_mean_band_and_reference(tmp_path):
         assert np.isclose(band[:, 1].min(), 10 - 0.98) and np.isclose(band[:, 1].max(), 10 + 0.98)
         assert plot_force.doubts(run) == ["warning: first doubt", "warning: second doubt (1 more in summary.json)"]
         assert plot_force.draw(run, top=14.0).axes[0].get_ylim()[1] == 14.0
-        assert plot_force.findings(run) == ("mean ice resistance 10.00 ± 0.98 N (95 %); mean tow force 12.0 N; "
+        assert plot_force.findings(run) == ("mean: ice resistance 10.00 N (95 %: 9.02 to 10.98); tow force 12.0 N; "
                                             "reference 9.00 N (a test), ratio 1.11")
+
+
+def test_a_mean_of_no_steady_tow_is_called_so(tmp_path):
+    folder = make_run(tmp_path / "run")
+    summary = json.loads((folder / "summary.json").read_text())
+    summary["window"].update(verdict="not steady", reason="it rises")
+    (folder / "summary.json").write_text(json.dumps(summary))
+    with Run(folder) as run:
+        assert run.verdict == ("not steady", "it rises") and run.window_name == "window"
+        figure = plot_force.draw(run)
+        labels = [line.get_label() for line in figure.axes[0].lines]
+        assert "mean over the window, 95 % interval" in labels and "mean, 95 % interval" not in labels
+        assert plot_force.findings(run).startswith("mean over the window: ice resistance 10.00 N")
+        assert "shaded: window 3" in " ".join(t.get_text() for t in figure.texts)
+        assert report_run.figures(run)[0][0] == "ice resistance, mean over the window"
+    del summary["window"]["verdict"]  # a result of an earlier version
+    (folder / "summary.json").write_text(json.dumps(summary))
+    with Run(folder) as run:
+        assert run.verdict[0] == "not judged" and run.mean_name == "mean over the window"
 
 
 def test_force_pictures_are_written(tmp_path):
