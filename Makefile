@@ -165,7 +165,7 @@ test: deps ## every test: units, known answers, same bits, command line, short r
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
-test-long: deps ## studies that take minutes: 2,000 s in 80 % ice, halved time step, tolerance cut tenfold
+test-long: deps ## studies that take minutes: intervals over fields, 2,000 s in 80 % ice, halved time step, tolerance cut tenfold, kills, soak
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
