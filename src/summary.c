@@ -6,6 +6,7 @@
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "summary.h"
+#include "arch.h"
 #include "case_check.h"
 #include "summary_window.h"
 
@@ -73,6 +74,14 @@ static void reduce_window(bt_summary *s, const bt_history *h)
                       "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
 }
 
+static void warn_of_arches(bt_summary *s, const bt_case *c, const bt_run_totals *t)
+{
+    const bt_arch a = bt_arch_of(c, t->concentration, t->mean_size);
+    if (a.possible)
+        bt_errors_add(&s->warnings, "the domain is %.3g body widths wide, and its %s can carry arches of rigid floes at %.0f %% ice: the resistance is also a property of "
+                      "that width; compare with a wider domain (%g body widths, assumed)", a.bodies, a.sides, 100 * t->concentration, BT_ARCH_WIDTHS);
+}
+
 /// A line that broke changes what the means stand for.
 static void warn_of_events(bt_summary *s, const bt_events *e)
 {
@@ -109,6 +118,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         bt_steady_find(&s->window, h, c, t);
         reduce_window(s, h);
         warn_of_window(s, c);
+        warn_of_arches(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         bt_estimate_conditions(c, &s->estimate);
         s->estimate.concentration = t->concentration;

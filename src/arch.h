@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// Can walls or periodic images beside the body carry arches of rigid floes, so that the load is a property of the domain's width?
+//
+//     wall ─────────────────────────      Dense rigid floes wedge between the body and what holds them at the sides: a wall, or the
+//        \ \ \   arch                     next image of the body in a periodic domain. The load of such an arch has no upper bound but what
+//          ( body ) ──>                   the tow gives, and the wider the domain, the rarer it is.
+//        / / /   arch
+//     wall ─────────────────────────
+//
+// The limits are assumed, after trials with rigid floes of friction 0.05 to 0.35: at 50 % the width does not show, at 80 % in the basin of 10, 20
+// and 30 m (5, 10, 15 body widths) the mean falls from 100 to 10 and 5 N, and at 90 % at full scale from 650 kN at 15 body widths to 219 kN at 35.
+#ifndef BT_ARCH_H
+#define BT_ARCH_H
+
+#include "bergtow/case.h"
+
+#define BT_ARCH_CONCENTRATION 0.7 ///< from which on arches are looked for, assumed
+#define BT_ARCH_WIDTHS 30.0       ///< body widths of domain from which on they are not expected, assumed
+
+typedef struct bt_arch {
+    double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
+    double floes;         ///< the same in mean floe sizes; NaN without floes
+    bool possible;        ///< arches can reach from the body to the walls or to the next image of it
+    const char *sides;    ///< "walls", "periodic images" or "open sides"
+} bt_arch;
+
+/// concentration, and mean floe size in m (0 without floes): as made, or as the case asks for.
+bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size);
+
+#endif

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// When the width of the domain belongs to the answer.
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <cmocka.h>
+
+#include "arch.h"
+
+/// A body of 4 × 2 m that is towed along x, in a domain of 40 m.
+static bt_case narrow(void)
+{
+    static bt_case c;
+    if (!c.ice.size) bt_case_defaults(&c);
+    bt_case d = c;
+    d.body.shape = BT_BODY_RECTANGLE;
+    d.body.length = 4, d.body.width = 2;
+    d.domain.width = 40;
+    d.domain.sides = BT_BOUND_WALL;
+    return d;
+}
+
+static void the_width_counts_in_bodies_and_floes(void **state)
+{
+    (void)state;
+    bt_case c = narrow();
+    bt_arch a = bt_arch_of(&c, 0.8, 0.5);
+    assert_true(fabs(a.bodies - 20) < 1e-12 && fabs(a.floes - 80) < 1e-12);
+    assert_string_equal(a.sides, "walls");
+    c.body.yaw = BT_PI / 2; // broadside on
+    assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 10) < 1e-9);
+    c.tow.direction = BT_PI / 2;
+    assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 20) < 1e-9);
+}
+
+static void dense_ice_between_near_sides_can_arch(void **state)
+{
+    (void)state;
+    bt_case c = narrow();
+    assert_true(bt_arch_of(&c, 0.7, 0.5).possible);
+    assert_false(bt_arch_of(&c, 0.69, 0.5).possible);
+    assert_false(bt_arch_of(&c, 0.8, 0).possible); // no floes
+    c.domain.width = 60;
+    assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
+    c.domain.width = 59;
+    c.domain.sides = BT_BOUND_PERIODIC;
+    assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
+    assert_string_equal(bt_arch_of(&c, 0.9, 0.5).sides, "periodic images");
+    c.domain.sides = BT_BOUND_OPEN;
+    assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
+    c.domain.sides = BT_BOUND_WALL;
+    c.body.shape = BT_BODY_ABSENT;
+    assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_width_counts_in_bodies_and_floes),
+        cmocka_unit_test(dense_ice_between_near_sides_can_arch),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
