@@ -11,13 +11,13 @@
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
 
-static const struct { const char *name, *key; bt_column column; } reported[BT_N_REPORTED] = {
-    {"ice resistance", "ice_resistance", BT_COL_ICE},
-    {"tow force", "tow_force", BT_COL_TOW},
-    {"drag", "drag_force", BT_COL_DRAG},
-    {"tension of the line", "line_tension_1", BT_COL_TENSION_1},
-    {"tension of the second branch", "line_tension_2", BT_COL_TENSION_2},
-    {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST},
+static const struct { const char *name, *key; bt_column column; bool load; } reported[BT_N_REPORTED] = {
+    {"ice resistance", "ice_resistance", BT_COL_ICE, true},
+    {"tow force", "tow_force", BT_COL_TOW, true},
+    {"drag", "drag_force", BT_COL_DRAG, false},
+    {"tension of the line", "line_tension_1", BT_COL_TENSION_1, true},
+    {"tension of the second branch", "line_tension_2", BT_COL_TENSION_2, true},
+    {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true},
 };
 
 /// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window too short.
@@ -146,7 +146,7 @@ static void judge_series(bt_steady *s)
     }
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
-        if (r->present && !(r->mean.n_eff >= BT_STEADY_INDEPENDENT))
+        if (reported[k].load && r->present && !(r->mean.n_eff >= BT_STEADY_INDEPENDENT))
             decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run longer",
                    s->end - s->start, r->mean.n_eff, r->name, s->n > 1 ? r->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN,
                    BT_STEADY_INDEPENDENT);

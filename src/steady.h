@@ -9,7 +9,7 @@
 // Verdict:
 //     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within the window, or the contacts
 //                  were not solved: the mean is that of this stretch of time, and says nothing of a longer tow
-//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some reported series
+//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load
 //     steady       none of these was found
 #ifndef BT_STEADY_H
 #define BT_STEADY_H
