@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The interval is that of the program (src/stats.c, which says why): the mean square of the slowest cosine waves that the series holds is n var(mean),
-with Student's t of as many degrees of freedom [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
+Within a run. The interval is that of the program (src/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or six,
+the larger, is n var(mean), and Student's t has 4 degrees of freedom [after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
 autoregression through batch means.
 
 Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense ice are skewed; the
@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-BATCHES = 96         # as in src/stats.c, and the next two
-WAVES = 6
+BATCHES = 96         # as in src/stats.c, and the next three
+WAVES = (2, 6)
+FREEDOM = 4.0
 LEAST_CORRELATED = 12
 LEVEL = 0.95
 RESAMPLES = 1999
@@ -74,10 +75,9 @@ def series_mean(x):
     d = x - x.mean()
     sd = np.sqrt(np.sum(d * d) / (n - 1))
     z, edges = batches(d)
-    waves = min(len(z) - 1, WAVES)
-    variance = max(slow_variance(z, edges, waves) / n, (sd / n) ** 2)
+    variance = max(*(slow_variance(z, edges, min(len(z) - 1, waves)) / n for waves in WAVES), (sd / n) ** 2)
     tau = max(0.5, n * batch_variance(z) / len(z) / (2 * sd * sd))
-    return SeriesMean(x.mean(), sd, np.sqrt(variance), tau, n / (2 * tau), float(waves), n)
+    return SeriesMean(x.mean(), sd, np.sqrt(variance), tau, n / (2 * tau), FREEDOM, n)
 
 
 def t_interval(x, level=LEVEL):

@@ -296,6 +296,7 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
     printf("  %s\n", w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     print_mean("  ice resistance", &s->ice);
+    printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to use\n");
     printf("    quarters          %s,", force(a, w->series[0].quarter[0]));
     printf(" %s, %s, %s\n", force(a, w->series[0].quarter[1]), force(b, w->series[0].quarter[2]), force(d, w->series[0].quarter[3]));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95), force(b, s->p99), force(d, s->peak));

@@ -30,10 +30,10 @@ def test_95_percent_of_the_intervals_within_a_run_hold_the_mean(phi, n):
     x = series(phi, n, TRIALS, 5)
     found = [stat_mean.series_mean(row) for row in x]
     low, high = np.array([f.interval() for f in found]).T
-    assert 0.93 <= np.mean((low <= 0) & (high >= 0)) <= 0.97
-    # the standard error is right on the average: var(m) = (1 + phi)/(1 - phi)/n, less what the ends of the series lack
+    assert 0.95 <= np.mean((low <= 0) & (high >= 0)) <= 0.985  # on the safe side: the larger of two estimates
+    # the standard error is right on the average, but for that: var(m) = (1 + phi)/(1 - phi)/n, less what the ends of the series lack
     true = ((1 + phi) / (1 - phi) - 2 * phi * (1 - phi ** n) / (n * (1 - phi) ** 2)) / n
-    assert np.sqrt(np.mean([f.se ** 2 for f in found])) == pytest.approx(np.sqrt(true), rel=0.08)
+    assert 1 <= np.sqrt(np.mean([f.se ** 2 for f in found])) / np.sqrt(true) <= 1.2
     if phi > 0:  # what the degrees of freedom are for
         assert np.mean(np.abs([f.mean / f.se for f in found]) < 1.96) < np.mean((low <= 0) & (high >= 0))
 

@@ -34,9 +34,6 @@ static void ar1(double *x, int n, double phi, uint64_t *state)
     }
 }
 
-/// Largest fraction by which the mean of 400 estimates from 6 squares each differs from the truth by chance: 3 √(2/6/400).
-#define CHANCE 0.09
-
 static void check_coverage(double phi, int n)
 {
     enum { SERIES = 400 };
@@ -53,14 +50,14 @@ static void check_coverage(double phi, int n)
         tau_sum += m.tau / SERIES;
         var_sum += m.se * m.se / SERIES;
         sd_sum += m.sd / SERIES;
-        assert_true(fabs(m.high - m.mean - 2.447 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 2.447 * m.se) <= 1e-9 * m.se);
+        assert_true(fabs(m.high - m.mean - 2.776 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 2.776 * m.se) <= 1e-9 * m.se);
         assert_true(fabs(m.n_eff - n / (2 * m.tau)) <= 1e-9 * n);
     }
     free(x);
     const double covered = 100.0 * inside / SERIES, true_var = 4 * 2 * tau / n;
     print_message("phi %.2f n %d: coverage %.1f %%, variance %.3f of the true one, tau %.3f of %.3f\n", phi, n, covered, var_sum / true_var, tau_sum, tau);
-    assert_true(covered >= 92 && covered <= 98);
-    assert_true(fabs(var_sum / true_var - 1) < CHANCE);
+    assert_true(covered >= 95 && covered <= 99.5);
+    assert_true(var_sum / true_var > 1 && var_sum / true_var < 1.5); // the larger of two estimates, each right in the mean
     assert_true(fabs(tau_sum / tau - 1) < 0.15); // short series of batches see a little of the correlation as noise
     assert_true(fabs(sd_sum / 2 - 1) < 0.05);
 }
