@@ -86,14 +86,15 @@ const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT
 {
     double size = 0, area = 0;
     for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI), area += f->area[i];
-    const char *fault = bt_ice_field_fault(f->n, size, area, f->ice_area, why);
-    if (fault) return fault;
     const double mean = f->n > 0 ? size / f->n : 0, whole = c->domain.length * c->domain.width;
-    if (mean > bt_min(c->domain.length, c->domain.width))
+    if (mean > bt_min(c->domain.length, c->domain.width)) {
         snprintf(why, BT_ICE_WHY, "the mean size of the floes, %.3g m, is above that of the domain, %g x %g m; check the unit of the coordinates, or enlarge the domain", mean, c->domain.length,
                  c->domain.width);
-    else if (f->ice_area > whole * (1 + 1e-6))
+        return why;
+    }
+    if (f->ice_area > whole * (1 + 1e-6)) {
         snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %.6g m2, is above that of the domain, %.6g m2; give the domain that the field was made for", f->ice_area, whole);
-    else return NULL;
-    return why;
+        return why;
+    }
+    return bt_ice_field_fault(f->n, size, area, f->ice_area, why);
 }
