@@ -131,8 +131,12 @@ static void print_outlines(const bt_outline_counts *o, const bt_case *c)
     if (o->read)
         printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64 " double or collinear vertices dropped\n", o->read, o->turned, o->dropped);
     if (o->read) printf("coordinates          %s\n", o->crs);
-    if (o->read && isfinite(o->east)) printf("origin               %.10g m east, %.10g m north at x = y = 0\n", o->east, o->north);
-    if (o->rounded) printf("not convex           %" PRId64 " floes by rounding alone: %" PRId64 " corners left out, which adds %.3g m2\n", o->rounded, o->rounded_corners, o->rounded_area);
+    if (o->read && isfinite(o->east))
+        printf("origin               %.10g m east, %.10g m north at x = y = 0\n", o->east, o->north);
+    if (o->rounded)
+        printf("not convex           %" PRId64 " floes by rounding alone: %" PRId64
+               " corners left out, which adds %.3g m2\n",
+               o->rounded, o->rounded_corners, o->rounded_area);
     if (o->read && isfinite(o->lon)) printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI, o->lat * 180 / BT_PI);
     if (o->hulled) printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled, o->hull_area);
     if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);

@@ -29,7 +29,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option field_options[] = {
-    {"output", 'o', "FILE", 0, "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where the field is, otherwise metres east and north", 0},
+    {"output", 'o', "FILE", 0,
+     "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where "
+     "the field is, otherwise metres east and north",
+     0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};

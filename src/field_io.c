@@ -133,7 +133,8 @@ static double read_ice_area(reader *r)
         H5Aclose(a);
     }
     if (isnan(area))
-        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the concentration refers to");
+        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
+                         "concentration refers to");
     return area;
 }
 
@@ -212,7 +213,8 @@ static void read_floes(reader *r, bt_field *f)
         }
         f->concentration = sum / f->ice_area;
         char why[BT_ICE_WHY];
-        if (r->r.status == BT_OK && bt_ice_field_fault(f->n, size, sum, f->ice_area, why)) bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
+        if (r->r.status == BT_OK && bt_ice_field_fault(f->n, size, sum, f->ice_area, why))
+            bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
     }
     free(stored_area);
 }

@@ -25,8 +25,9 @@ void bt_refuse(bt_refusals *r, const char *fmt, ...)
     else bt_errors_add(r->err, "%s: %s", r->path, text);
 }
 
-// Corners that coordinates of so many digits cannot tell from convex ones: 1e-7 degrees are a centimetre. A thousandth of the extent, the overlap that the solver leaves
-// alone (solver.slop), is also what the shape of a floe is known to. Rejected: the last digit of the numbers as the measure, which a change of coordinates before takes away.
+// Corners that coordinates of so many digits cannot tell from convex ones: 1e-7 degrees are a centimetre. A thousandth
+// of the extent, the overlap that the solver leaves alone (solver.slop), is also what the shape of a floe is known to.
+// Rejected: the last digit of the numbers as the measure, which a change of coordinates before takes away.
 static const double ROUNDING = 1e-3;
 
 /// The hull, if no corner lies deeper in it than rounding; counted.
@@ -105,13 +106,20 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
 {
     if (o->unnamed)
-        bt_errors_add(warnings, "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the thickness of the case, %g m in the mean; rename the property if it is "
-                      "the thickness in metres", (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
+        bt_errors_add(warnings,
+                      "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the "
+                      "thickness of the case, %g m in the mean; rename the property if it is "
+                      "the thickness in metres",
+                      (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
     const bt_map_crs crs = bt_map_crs_of(o->crs);
     if (crs.kind != BT_MAP_PLANE) return;
     const bool turned = crs.any_north && c->domain.frame == BT_FRAME_GEOGRAPHIC;
-    bt_errors_add(warnings, "the outlines are metres of %s, used as plane coordinates: its scale factor and the angle of its north to the true one (convergence%s) are not corrected%s", crs.name,
-                  crs.any_north ? ", any angle in a polar projection" : "", turned ? "; x is the grid's north here: give wind, current and tow in that frame, or the file in degrees" : "");
+    bt_errors_add(
+        warnings,
+        "the outlines are metres of %s, used as plane coordinates: its scale factor and the angle of its north to the "
+        "true one (convergence%s) are not corrected%s",
+        crs.name, crs.any_north ? ", any angle in a polar projection" : "",
+        turned ? "; x is the grid's north here: give wind, current and tow in that frame, or the file in degrees" : "");
 }
 
 // --- places ----------------------------------------------------------------------------------------------------------

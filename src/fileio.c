@@ -65,7 +65,8 @@ static const char *kind_of(mode_t mode)
 /// text: as bt_file_read_to and bt_file_read word it; streams: pipes of one's own are let through.
 static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
 {
-    // Looked at before it is opened, since to open some devices does something to them, and after, since the name may mean another file by then.
+    // Looked at before it is opened, since to open some devices does something to them, and after, since the name may
+    // mean another file by then.
     struct stat st;
     const char *kind = NULL;
     const bool taken = streams && is_own_descriptor(path);
@@ -83,16 +84,25 @@ static int open_input(const char *path, const char *what, bool text, bool stream
     if (!reason && !kind) return fd;
     if (fd >= 0) close(fd);
     if (reason && !text) bt_file_fail(path, "read the file", reason, err);
-    else if (reason && seen) bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(reason));
+    else if (reason && seen)
+        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(reason));
     else if (reason) bt_errors_add(err, "%s: cannot be read: %s; give the path of %s", path, strerror(reason), what);
     else if (S_ISDIR(st.st_mode)) bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
-    else bt_errors_add(err, "%s: is %s and no regular file, it is not opened; write what it gives into a file, and give the path of that as %s", path, kind, what);
+    else
+        bt_errors_add(err,
+                      "%s: is %s and no regular file, it is not opened; write what it gives into a file, and give the "
+                      "path of that as %s",
+                      path, kind, what);
     return -1;
 }
 
-int bt_file_open(const char *path, const char *what, bt_errors *err) { return open_input(path, what, false, false, err); }
+int bt_file_open(const char *path, const char *what, bt_errors *err)
+{
+    return open_input(path, what, false, false, err);
+}
 
-static bt_status read_text(const char *path, const char *what, size_t most, bool streams, char **text, size_t *size, bt_errors *err)
+static bt_status read_text(const char *path, const char *what, size_t most, bool streams, char **text, size_t *size,
+                           bt_errors *err)
 {
     *text = NULL;
     *size = 0;

@@ -11,8 +11,13 @@ static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, voi
 {
     const whole *w = data;
     if (info->type != H5L_TYPE_HARD) {
-        bt_errors_add(w->err, "%s: holds what this program does not write: /%.200s is %s link, which can lead to any other file and is not followed; store the data itself there", w->path, name,
-                      info->type == H5L_TYPE_SOFT ? "a soft" : info->type == H5L_TYPE_EXTERNAL ? "an external" : "a user-defined");
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s link, which can lead to any other "
+                      "file and is not followed; store the data itself there",
+                      w->path, name,
+                      info->type == H5L_TYPE_SOFT       ? "a soft"
+                      : info->type == H5L_TYPE_EXTERNAL ? "an external"
+                                                        : "a user-defined");
         return 1;
     }
     const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
@@ -26,14 +31,19 @@ static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, voi
         if (plan >= 0) H5Pclose(plan);
     }
     H5Oclose(o);
-    if (kind) bt_errors_add(w->err, "%s: holds what this program does not write: /%.200s is %s, whose numbers lie in another file and are not read; store them in this file", w->path, name, kind);
+    if (kind)
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s, whose numbers lie in another file "
+                      "and are not read; store them in this file",
+                      w->path, name, kind);
     return kind != NULL;
 }
 
 bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
 {
     const herr_t found = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, look_at, &(whole){path, err});
-    if (found < 0) bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot go through its objects; write it anew", path);
+    if (found < 0)
+        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot go through its objects; write it anew", path);
     return found == 0 ? BT_OK : BT_ERR_CASE;
 }
 

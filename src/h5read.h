@@ -7,9 +7,9 @@
 
 #include "bergtow/base.h"
 
-/// Does the file hold all that it seems to? Refused, by the name of the object: soft and external links, datasets whose numbers lie in other files (external storage)
-/// or in other datasets (virtual). HDF5 opens and reads whatever these name: any file of the disk as raw numbers, a FIFO for ever. No other file is opened here.
-/// Errors: BT_ERR_CASE.
+/// Does the file hold all that it seems to? Refused, by the name of the object: soft and external links, datasets whose
+/// numbers lie in other files (external storage) or in other datasets (virtual). HDF5 opens and reads whatever these
+/// name: any file of the disk as raw numbers, a FIFO for ever. No other file is opened here. Errors: BT_ERR_CASE.
 bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err);
 
 /// An open file; after a failure, which is told once, every function below does nothing.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What ice may be: bounds of one floe, and of a field, from the ranges in the table of keys.
 //
-// A number that passes here can be multiplied as the mechanics do it, mass × radius², force × time, without leaving the range of a double, so that no input makes an
-// infinity or a NaN out of finite numbers. Rejected: bounds of their own in each reader, which had let an HDF5 file have floes of 800 m where a case file
-// may have 100 m.
+// A number that passes here can be multiplied as the mechanics do it, mass × radius², force × time, without leaving the
+// range of a double, so that no input makes an infinity or a NaN out of finite numbers. Rejected: bounds of their own
+// in each reader, which had let an HDF5 file have floes of 800 m where a case file may have 100 m.
 #include "ice_bounds.h"
 
 #include <math.h>
@@ -23,7 +23,10 @@ static bt_range range_of(const bt_key *keys, int n, const char *name, const char
     return r;
 }
 
-static bool within(const bt_range *r, double x) { return (r->lo_open ? x > r->lo : x >= r->lo) && (r->hi_open ? x < r->hi : x <= r->hi); }
+static bool within(const bt_range *r, double x)
+{
+    return (r->lo_open ? x > r->lo : x >= r->lo) && (r->hi_open ? x < r->hi : x <= r->hi);
+}
 
 const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice_part *part)
 {
@@ -33,7 +36,9 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
     *part = BT_ICE_THICKNESS;
     const bt_range thickness = range_of(bt_case_keys, bt_n_case_keys, "ice.thickness", &text);
     if (!within(&thickness, f->thickness) || f->thickness < BT_LEAST_THICKNESS) {
-        snprintf(why, BT_ICE_WHY, "thickness %g m is refused: it is not in %s m, or below %g m; give it in metres, without a unit", f->thickness, text, BT_LEAST_THICKNESS);
+        snprintf(why, BT_ICE_WHY,
+                 "thickness %g m is refused: it is not in %s m, or below %g m; give it in metres, without a unit",
+                 f->thickness, text, BT_LEAST_THICKNESS);
         return why;
     }
     *part = BT_ICE_POSE;
@@ -47,16 +52,22 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
     const bt_moments m = bt_shape_moments(f->n, f->v);
     const bt_range size = range_of(bt_case_keys, bt_n_case_keys, "ice.size", &text);
     if (!(m.area > 0) || !(2 * m.radius <= size.hi)) { // one floe may be smaller than the least mean: pieces are
-        snprintf(why, BT_ICE_WHY, "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices", 2 * m.radius, m.area, size.hi);
+        snprintf(why, BT_ICE_WHY,
+                 "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices", 2 * m.radius,
+                 m.area, size.hi);
         return why;
     }
     if (!(hypot(m.cx, m.cy) <= 1e-6 * m.radius)) {
-        snprintf(why, BT_ICE_WHY, "the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and add it to the pose", m.cx, m.cy);
+        snprintf(why, BT_ICE_WHY,
+                 "the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
+                 "add it to the pose",
+                 m.cx, m.cy);
         return why;
     }
     *part = BT_ICE_AREA;
     if (!isnan(f->area) && !(fabs(f->area - m.area) <= f->exact * m.area)) {
-        snprintf(why, BT_ICE_WHY, "area %g m2 is not that of its outline, %g m2; correct it or leave it out", f->area, m.area);
+        snprintf(why, BT_ICE_WHY, "area %g m2 is not that of its outline, %g m2; correct it or leave it out", f->area,
+                 m.area);
         return why;
     }
     return NULL;
@@ -65,19 +76,28 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
 const char *bt_ice_field_fault(int64_t n, double sum_size, double sum_area, double ice_area, char why[BT_ICE_WHY])
 {
     const char *text;
-    const bt_range length = range_of(bt_case_keys, bt_n_case_keys, "domain.length", &text), size = range_of(bt_case_keys, bt_n_case_keys, "ice.size", &text);
-    const double most = length.hi * length.hi, mean = n > 0 ? sum_size / (double)n : 0, concentration = sum_area / ice_area;
+    const bt_range length = range_of(bt_case_keys, bt_n_case_keys, "domain.length", &text),
+                   size = range_of(bt_case_keys, bt_n_case_keys, "ice.size", &text);
+    const double most = length.hi * length.hi, mean = n > 0 ? sum_size / (double)n : 0,
+                 concentration = sum_area / ice_area;
     if (!(ice_area > 0) || !(ice_area <= most))
-        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is beyond 0 to %g m2", ice_area, most);
+        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is beyond 0 to %g m2", ice_area,
+                 most);
     else if (n == 0) return NULL;
     else if (!within(&size, mean) || mean < BT_LEAST_SIZE)
-        snprintf(why, BT_ICE_WHY, "the mean size of the floes, %.3g m, is not in %s m, or below %g m; check the unit of the coordinates", mean, text, BT_LEAST_SIZE);
+        snprintf(why, BT_ICE_WHY,
+                 "the mean size of the floes, %.3g m, is not in %s m, or below %g m; check the unit of the coordinates",
+                 mean, text, BT_LEAST_SIZE);
     else if (!(concentration >= BT_LEAST_CONCENTRATION))
-        snprintf(why, BT_ICE_WHY, "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, below %g; check the unit of the coordinates, or make the ice region smaller",
+        snprintf(why, BT_ICE_WHY,
+                 "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, below %g; check the unit "
+                 "of the coordinates, or make the ice region smaller",
                  sum_area, ice_area, concentration, BT_LEAST_CONCENTRATION);
     else if (!(concentration <= 1 + 1e-9))
-        snprintf(why, BT_ICE_WHY, "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, above 1: make the ice region (ice.x_min and so on) as large as the ice", sum_area,
-                 ice_area, concentration);
+        snprintf(why, BT_ICE_WHY,
+                 "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, above 1: make the ice "
+                 "region (ice.x_min and so on) as large as the ice",
+                 sum_area, ice_area, concentration);
     else return NULL;
     return why;
 }
@@ -88,12 +108,17 @@ const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT
     for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI), area += f->area[i];
     const double mean = f->n > 0 ? size / f->n : 0, whole = c->domain.length * c->domain.width;
     if (mean > bt_min(c->domain.length, c->domain.width)) {
-        snprintf(why, BT_ICE_WHY, "the mean size of the floes, %.3g m, is above that of the domain, %g x %g m; check the unit of the coordinates, or enlarge the domain", mean, c->domain.length,
-                 c->domain.width);
+        snprintf(why, BT_ICE_WHY,
+                 "the mean size of the floes, %.3g m, is above that of the domain, %g x %g m; check the unit of the "
+                 "coordinates, or enlarge the domain",
+                 mean, c->domain.length, c->domain.width);
         return why;
     }
     if (f->ice_area > whole * (1 + 1e-6)) {
-        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %.6g m2, is above that of the domain, %.6g m2; give the domain that the field was made for", f->ice_area, whole);
+        snprintf(why, BT_ICE_WHY,
+                 "the area that the concentration refers to, %.6g m2, is above that of the domain, %.6g m2; give the "
+                 "domain that the field was made for",
+                 f->ice_area, whole);
         return why;
     }
     return bt_ice_field_fault(f->n, size, area, f->ice_area, why);

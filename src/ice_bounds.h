@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What ice may be, whatever way it comes in: one gate for floes given by hand, GeoJSON outlines, HDF5 fields and checkpoints.
+// What ice may be, whatever way it comes in: one gate for floes given by hand, GeoJSON outlines, HDF5 fields and
+// checkpoints.
 #ifndef BT_ICE_BOUNDS_H
 #define BT_ICE_BOUNDS_H
 
@@ -22,12 +23,14 @@ typedef struct bt_ice_floe {
 /// What of a floe is at fault.
 typedef enum { BT_ICE_THICKNESS, BT_ICE_POSE, BT_ICE_OUTLINE, BT_ICE_AREA } bt_ice_part;
 
-/// Why it cannot be a floe, in words that complete "floe 7: ", and which part of it, or NULL. Thickness, size and place are held against the ranges of
-/// ice.thickness, ice.size and floes[].x in the table of keys. That the outline is one, convex or in convex parts, has been seen before. part: may be NULL.
+/// Why it cannot be a floe, in words that complete "floe 7: ", and which part of it, or NULL. Thickness, size and place
+/// are held against the ranges of ice.thickness, ice.size and floes[].x in the table of keys. That the outline is one,
+/// convex or in convex parts, has been seen before. part: may be NULL.
 const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice_part *part);
 
-/// Why these floes together cannot be an ice field, or NULL: mean size (diameter of the circle of equal area) below BT_LEAST_SIZE, area of the ice without a meaning,
-/// concentration below BT_LEAST_CONCENTRATION or above 1. ice_area: what the concentration refers to, m². A field without floes needs a sound ice_area alone.
+/// Why these floes together cannot be an ice field, or NULL: mean size (diameter of the circle of equal area) below
+/// BT_LEAST_SIZE, area of the ice without a meaning, concentration below BT_LEAST_CONCENTRATION or above 1. ice_area:
+/// what the concentration refers to, m². A field without floes needs a sound ice_area alone.
 const char *bt_ice_field_fault(int64_t n, double sum_size, double sum_area, double ice_area, char why[BT_ICE_WHY]);
 
 /// The same of a field, and of its floes in the domain of a case: mean size and ice area no larger than that.

@@ -22,7 +22,8 @@ typedef struct bt_map_crs {
 /// The name this program gives to coordinates that are tied to no place on the earth. OGC has no name for one.
 #define BT_MAP_LOCAL_NAME "urn:x-bergtow:crs:local-metres-east-north"
 
-/// From "EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "http://www.opengis.net/def/crs/OGC/1.3/CRS84" and the like, whatever the case of the letters.
+/// From "EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "http://www.opengis.net/def/crs/OGC/1.3/CRS84" and the like,
+/// whatever the case of the letters.
 bt_map_crs bt_map_crs_of(const char *name);
 
 #endif

@@ -231,8 +231,9 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     *north = n * stretch;
 }
 
-/// The chord c follows from the distance d by Newton's method from d = c (1 + c²/(24 R²)); the point of the ellipsoid at this chord in this direction lies up·u above the tangent plane of the
-/// origin, (x² + y²)/a² + z²/b² = 1 with level = √(c² − up²) in it: Newton again from the sphere's −c²/(2R).
+/// The chord c follows from the distance d by Newton's method from d = c (1 + c²/(24 R²)); the point of the ellipsoid
+/// at this chord in this direction lies up·u above the tangent plane of the origin, (x² + y²)/a² + z²/b² = 1 with level
+/// = √(c² − up²) in it: Newton again from the sphere's −c²/(2R).
 void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat)
 {
     double o[3];
@@ -245,7 +246,8 @@ void bt_outline_unproject(double north, double east, double lon0, double lat0, d
         chord -= (chord * (1 + q) - distance) / (1 + 3 * q);
     }
     const double e = distance > 0 ? east / distance : 0, n = distance > 0 ? north / distance : 0;
-    const double out[3] = {-sl * e - sp * cl * n, cl * e - sp * sl * n, cp * n}, u[3] = {cp * cl, cp * sl, sp}; // unit vectors, in the tangent plane and up
+    const double out[3] = {-sl * e - sp * cl * n, cl * e - sp * sl * n, cp * n},
+                 u[3] = {cp * cl, cp * sl, sp}; // unit vectors, in the tangent plane and up
     const double weight[3] = {1, 1, 1 / (1 - WGS84_E2)};
     double up = -chord * chord / (2 * radius), p[3];
     memcpy(p, o, sizeof p);

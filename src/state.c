@@ -79,8 +79,12 @@ static const bt_state_row field_rows[] = {
 
 /// Not in checkpoints of before, whose fields had none of this.
 static const bt_state_row map_rows[] = {
-    FIELD(I64, "rounded", outlines.rounded), FIELD(I64, "rounded_corners", outlines.rounded_corners), FIELD(F64, "rounded_area", outlines.rounded_area),
-    FIELD(F64, "east", outlines.east), FIELD(F64, "north", outlines.north), FIELD(I64, "unnamed", outlines.unnamed),
+    FIELD(I64, "rounded", outlines.rounded),
+    FIELD(I64, "rounded_corners", outlines.rounded_corners),
+    FIELD(F64, "rounded_area", outlines.rounded_area),
+    FIELD(F64, "east", outlines.east),
+    FIELD(F64, "north", outlines.north),
+    FIELD(I64, "unnamed", outlines.unnamed),
 };
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
@@ -380,7 +384,8 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
         snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "map/nearly"));
     } else {
         f->outlines.east = f->outlines.north = NAN;
-        if (f->outlines.read) snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
+        if (f->outlines.read)
+            snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
     }
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);

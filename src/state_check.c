@@ -60,7 +60,10 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
         const int64_t a = f->offsets[i], b = f->offsets[i + 1];
         bt_snapshot_want(s, a >= 0 && a <= n_vertices && b >= a + 3 && b <= n_vertices && b - a <= BT_MAX_VERTICES, "field/offsets", i, "gives a floe too few or too many vertices");
     }
-    static const char *const names[] = {[BT_ICE_THICKNESS] = "field/thickness", [BT_ICE_POSE] = "field/pose", [BT_ICE_OUTLINE] = "field/offsets", [BT_ICE_AREA] = "field/area"};
+    static const char *const names[] = {[BT_ICE_THICKNESS] = "field/thickness",
+                                        [BT_ICE_POSE] = "field/pose",
+                                        [BT_ICE_OUTLINE] = "field/offsets",
+                                        [BT_ICE_AREA] = "field/area"};
     double sum = 0, size = 0;
     char why[BT_ICE_WHY];
     for (bt_idx i = 0; i < f->n && !s->faulty; i++) {
@@ -76,11 +79,16 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     }
     if (s->faulty) return;
     // A field without floes may have no ice region, and so no area.
-    if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(f->n, size, sum, f->ice_area, why)) want_ice(s, "field/ice_area", -1, why);
-    bt_snapshot_want(s, f->concentration >= 0 && f->concentration <= 1 + 1e-9, "field/concentration", -1, "is no concentration");
+    if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(f->n, size, sum, f->ice_area, why))
+        want_ice(s, "field/ice_area", -1, why);
+    bt_snapshot_want(s, f->concentration >= 0 && f->concentration <= 1 + 1e-9, "field/concentration", -1,
+                     "is no concentration");
     const bt_outline_counts *c = &f->outlines;
-    bt_snapshot_want(s, counts(c->read) && counts(c->turned) && counts(c->dropped) && counts(c->hulled) && counts(c->split) && counts(c->parts) && counts(c->rounded) && counts(c->rounded_corners) && counts(c->unnamed), "field/read", -1,
-                     "and what was done to outlines are not all counts");
+    bt_snapshot_want(s,
+                     counts(c->read) && counts(c->turned) && counts(c->dropped) && counts(c->hulled) &&
+                         counts(c->split) && counts(c->parts) && counts(c->rounded) && counts(c->rounded_corners) &&
+                         counts(c->unnamed),
+                     "field/read", -1, "and what was done to outlines are not all counts");
 }
 
 // --- tiles -----------------------------------------------------------------------------------------------------------

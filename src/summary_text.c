@@ -246,7 +246,8 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     const bt_outline_counts *o = &t->outlines;
     if (o->read) printf("  outlines            %lld, coordinates %s\n", (long long)o->read, o->crs);
     if (o->rounded)
-        printf("  outlines            %lld not convex by rounding alone, %lld corners left out, which adds %.3g m2\n", (long long)o->rounded, (long long)o->rounded_corners, o->rounded_area);
+        printf("  outlines            %lld not convex by rounding alone, %lld corners left out, which adds %.3g m2\n",
+               (long long)o->rounded, (long long)o->rounded_corners, o->rounded_area);
     if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
     if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, h, c);
