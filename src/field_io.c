@@ -213,7 +213,7 @@ static void read_floes(reader *r, bt_field *f)
         }
         f->concentration = sum / f->ice_area;
         char why[BT_ICE_WHY];
-        if (r->r.status == BT_OK && bt_ice_field_fault(f->n, size, sum, f->ice_area, why))
+        if (r->r.status == BT_OK && bt_ice_field_fault(false, f->n, size, sum, f->ice_area, why))
             bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
     }
     free(stored_area);

@@ -14,47 +14,61 @@
 #include "schema.h"
 #include "value.h"
 
-static bt_range range_of(const bt_key *keys, int n, const char *name, const char **text)
+static const double LEAST = 0.99; // a field that was made for the least concentration meets it but nearly
+
+/// The ranges that are asked for each floe, read from their texts once.
+typedef struct limits { bt_range thickness, size, corner, length; } limits;
+
+static bt_range range_of(const char *name)
 {
-    const bt_key *k = &keys[bt_schema_find(keys, n, name)];
     bt_range r;
-    bt_value_range(k, &r);
-    *text = k->range;
+    bt_value_range(&bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)], &r);
     return r;
 }
 
-static bool within(const bt_range *r, double x)
+static const limits *known(void)
 {
-    return (r->lo_open ? x > r->lo : x >= r->lo) && (r->hi_open ? x < r->hi : x <= r->hi);
+    static limits l;
+    static bool read = false;
+    if (!read) {
+        l = (limits){range_of("ice.thickness"), range_of("ice.size"), range_of("domain.x0"), range_of("domain.length")};
+        read = true;
+    }
+    return &l;
+}
+
+void bt_ice_thickness_range(double *least, double *most)
+{
+    *least = BT_LEAST_THICKNESS;
+    *most = known()->thickness.hi;
 }
 
 const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice_part *part)
 {
     bt_ice_part unasked;
     if (!part) part = &unasked;
-    const char *text;
+    const limits *l = known();
     *part = BT_ICE_THICKNESS;
-    const bt_range thickness = range_of(bt_case_keys, bt_n_case_keys, "ice.thickness", &text);
-    if (!within(&thickness, f->thickness) || f->thickness < BT_LEAST_THICKNESS) {
-        snprintf(why, BT_ICE_WHY,
-                 "thickness %g m is refused: it is not in %s m, or below %g m; give it in metres, without a unit",
-                 f->thickness, text, BT_LEAST_THICKNESS);
+    if (!(f->thickness >= BT_LEAST_THICKNESS) || !(f->thickness <= l->thickness.hi)) {
+        snprintf(why, BT_ICE_WHY, "thickness %g m is refused: give %g to %g, in metres and without a unit",
+                 f->thickness, BT_LEAST_THICKNESS, l->thickness.hi);
         return why;
     }
     *part = BT_ICE_POSE;
-    const bt_range place = range_of(bt_floe_keys, bt_n_floe_keys, "x", &text);
+    const double low = l->corner.lo, high = l->corner.hi + l->length.hi; // wherever a domain can be
     if (!isfinite(f->x) || !isfinite(f->y) || !isfinite(f->yaw)) return "its pose is not finite";
-    if (!within(&place, f->x) || !within(&place, f->y)) {
-        snprintf(why, BT_ICE_WHY, "its place, (%g, %g) m, is not in %s m; move it", f->x, f->y, text);
+    if (!(f->x >= low && f->x <= high) || !(f->y >= low && f->y <= high)) {
+        snprintf(why, BT_ICE_WHY, "its place, (%g, %g) m, is not within %g to %g m, where a domain can be; move it",
+                 f->x, f->y, low, high);
         return why;
     }
     *part = BT_ICE_OUTLINE;
     const bt_moments m = bt_shape_moments(f->n, f->v);
-    const bt_range size = range_of(bt_case_keys, bt_n_case_keys, "ice.size", &text);
-    if (!(m.area > 0) || !(2 * m.radius <= size.hi)) { // one floe may be smaller than the least mean: pieces are
+    // Only the mean has the range of ice.size: a single floe of a law, or a piece, is larger or smaller.
+    if (!(m.area > 0) || !(2 * m.radius <= l->length.hi)) {
         snprintf(why, BT_ICE_WHY,
                  "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices", 2 * m.radius,
-                 m.area, size.hi);
+                 m.area, l->length.hi);
         return why;
     }
     if (!(hypot(m.cx, m.cy) <= 1e-6 * m.radius)) {
@@ -73,22 +87,21 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
     return NULL;
 }
 
-const char *bt_ice_field_fault(int64_t n, double sum_size, double sum_area, double ice_area, char why[BT_ICE_WHY])
+const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum_area, double ice_area,
+                               char why[BT_ICE_WHY])
 {
-    const char *text;
-    const bt_range length = range_of(bt_case_keys, bt_n_case_keys, "domain.length", &text),
-                   size = range_of(bt_case_keys, bt_n_case_keys, "ice.size", &text);
-    const double most = length.hi * length.hi, mean = n > 0 ? sum_size / (double)n : 0,
-                 concentration = sum_area / ice_area;
+    const limits *l = known();
+    const double most = l->length.hi * l->length.hi, mean = n > 0 ? sum_size / (double)n : 0;
+    const double concentration = sum_area / ice_area;
     if (!(ice_area > 0) || !(ice_area <= most))
         snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is beyond 0 to %g m2", ice_area,
                  most);
     else if (n == 0) return NULL;
-    else if (!within(&size, mean) || mean < BT_LEAST_SIZE)
+    else if (!kept && !(mean >= BT_LEAST_SIZE && mean <= l->size.hi))
         snprintf(why, BT_ICE_WHY,
-                 "the mean size of the floes, %.3g m, is not in %s m, or below %g m; check the unit of the coordinates",
-                 mean, text, BT_LEAST_SIZE);
-    else if (!(concentration >= BT_LEAST_CONCENTRATION))
+                 "the mean size of the floes, %.3g m, is not within %g to %g m; check the unit of the coordinates",
+                 mean, BT_LEAST_SIZE, l->size.hi);
+    else if (!kept && !(concentration >= LEAST * BT_LEAST_CONCENTRATION))
         snprintf(why, BT_ICE_WHY,
                  "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, below %g; check the unit "
                  "of the coordinates, or make the ice region smaller",
@@ -121,5 +134,5 @@ const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT
                  f->ice_area, whole);
         return why;
     }
-    return bt_ice_field_fault(f->n, size, area, f->ice_area, why);
+    return bt_ice_field_fault(false, f->n, size, area, f->ice_area, why);
 }

@@ -90,7 +90,7 @@ const bt_key bt_case_keys[] = {
     REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
          "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
     REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
-    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes"),
+    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes; lognormal: cut at the ends of its range"),
     REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
     REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
     REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",

@@ -79,7 +79,7 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     }
     if (s->faulty) return;
     // A field without floes may have no ice region, and so no area.
-    if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(f->n, size, sum, f->ice_area, why))
+    if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(true, f->n, size, sum, f->ice_area, why))
         want_ice(s, "field/ice_area", -1, why);
     bt_snapshot_want(s, f->concentration >= 0 && f->concentration <= 1 + 1e-9, "field/concentration", -1,
                      "is no concentration");
