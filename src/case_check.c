@@ -7,6 +7,7 @@
 
 #include "bergtow/shape.h"
 #include "bergtow/environment.h"
+#include "ice_bounds.h"
 #include "largest.h"
 #include "schema.h"
 
@@ -241,7 +242,18 @@ static void check_region(const check *k)
 static void check_sizes(const check *k)
 {
     const bt_case *c = k->c;
+    if (sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
+        fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
+              BT_LEAST_THICKNESS);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
+    if (sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
+        fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water", c->ice.concentration,
+              BT_LEAST_CONCENTRATION);
+    if (c->ice.size_law != BT_SIZE_POWER && sound(k, "ice.size") && c->ice.size < BT_LEAST_SIZE)
+        fault(k, "ice.size", "%g m is below %g m; check the unit", c->ice.size, BT_LEAST_SIZE);
+    if (c->ice.size_law == BT_SIZE_POWER && sound(k, "ice.size_min") && c->ice.size_min > 0 &&
+        c->ice.size_min < BT_LEAST_SIZE)
+        fault(k, "ice.size_min", "%g m is below %g m; check the unit", c->ice.size_min, BT_LEAST_SIZE);
     if (!sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
     double lo = c->ice.size_min, hi = c->ice.size_max;
     bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
@@ -265,12 +277,31 @@ static void check_sizes(const check *k)
 static void check_outlines(const check *k)
 {
     const bt_case *c = k->c;
-    if (!sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.nonconvex")) return;
+    if (!sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.origin_east "
+                  "ice.origin_north ice.nonconvex"))
+        return;
     if (c->ice.field && c->ice.outlines) fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
-    const bool lonlat = c->ice.outlines && c->ice.outlines_crs == BT_CRS_LONLAT, lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat);
+    const bool lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat), east = !isnan(c->ice.origin_east),
+               north = !isnan(c->ice.origin_north);
+    const bt_crs crs = c->ice.outlines_crs;
     if (lon != lat) fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
-    else if (lon && !lonlat) fault(k, "ice.origin_lon", "has no effect unless ice.outlines are read with ice.outlines_crs: lonlat; remove the origin or set it");
-    if (c->ice.outlines_crs == BT_CRS_LONLAT && !c->ice.outlines) fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
+    if (east != north)
+        fault(k, east ? "ice.origin_east" : "ice.origin_north",
+              "is given without the other coordinate of the origin; give both or none");
+    if (lon && east)
+        fault(
+            k, "ice.origin_east",
+            "and ice.origin_lon both say where x = y = 0 is; keep those of the file's coordinates, metres or degrees");
+    if (c->ice.outlines && lon && crs != BT_CRS_FILE && crs != BT_CRS_LONLAT)
+        fault(k, "ice.origin_lon",
+              "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin");
+    if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME || crs == BT_CRS_METRES))
+        fault(k, "ice.origin_east",
+              "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
+              "ice.outlines_crs: plane");
+    // Every resolved case of before has metres, with outlines or without.
+    if (crs != BT_CRS_FILE && crs != BT_CRS_METRES && !c->ice.outlines)
+        fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
     if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
         fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
 }
@@ -396,6 +427,15 @@ static void check_floe(const check *k, int index)
     int n = outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, &why);
     if (why) {
         bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
+        return;
+    }
+    char text[BT_ICE_WHY];
+    const bt_moments m = bt_shape_moments(n, v);
+    const bt_ice_floe given = {n, v, f->x, f->y, f->yaw, f->thickness, NAN, 0};
+    why = sqrt(4 * m.area / BT_PI) < BT_LEAST_SIZE ? "it is less than a millimetre in size; check the unit"
+                                                   : bt_ice_floe_fault(&given, text, NULL);
+    if (why) {
+        bt_errors_add(k->err, "%s: %s", where, why);
         return;
     }
     if (!sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return;

@@ -124,13 +124,24 @@ static void print_line(const bt_case *c)
            c->tow.vessel.bollard_pull * (1 - r * r));
 }
 
-static void print_outlines(const bt_outline_counts *o)
+static void print_outlines(const bt_outline_counts *o, const bt_case *c)
 {
     if (o->read)
         printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64 " double or collinear vertices dropped\n", o->read, o->turned, o->dropped);
+    if (o->read) printf("coordinates          %s\n", o->crs);
+    if (o->read && isfinite(o->east))
+        printf("origin               %.10g m east, %.10g m north at x = y = 0\n", o->east, o->north);
+    if (o->rounded)
+        printf("not convex           %" PRId64 " floes by rounding alone: %" PRId64
+               " corners left out, which adds %.3g m2\n",
+               o->rounded, o->rounded_corners, o->rounded_area);
     if (o->read && isfinite(o->lon)) printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI, o->lat * 180 / BT_PI);
     if (o->hulled) printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled, o->hull_area);
     if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);
+    bt_errors warnings = {0};
+    bt_outline_warn(o, c, &warnings);
+    for (size_t i = 0; i < warnings.n; i++) printf("warning: %s\n", warnings.text[i]);
+    bt_errors_free(&warnings);
 }
 
 static void print_body(const bt_case *c)
@@ -232,7 +243,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
     print_crushing(c, &n);
-    print_outlines(&f->outlines);
+    print_outlines(&f->outlines, c);
     print_body(c);
     print_window(c);
     print_environment(c);

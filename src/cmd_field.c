@@ -29,7 +29,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option field_options[] = {
-    {"output", 'o', "FILE", 0, "file to write: HDF5 (FIELD.h5), or outlines in metres (FIELD.geojson)", 0},
+    {"output", 'o', "FILE", 0,
+     "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where "
+     "the field is, otherwise metres east and north",
+     0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
@@ -64,6 +67,10 @@ int bt_cmd_field(int argc, char **argv)
     if (status == BT_OK)
         printf("%s: %d floes, concentration %.4f of %.6g m2, %s in %.2f s\n", o.output, f.n, f.concentration, f.ice_area, c.ice.outlines || c.ice.field ? "read" : "made",
                bt_clock() - start);
+    bt_errors warnings = {0};
+    if (status == BT_OK) bt_outline_warn(&f.outlines, &c, &warnings);
+    for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);
+    bt_errors_free(&warnings);
     bt_field_free(&f);
     bt_case_free(&c);
     free(o.file.set);

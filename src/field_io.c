@@ -23,7 +23,9 @@
 #include "bergtow/outline.h"
 #include "field_load.h"
 #include "fileio.h"
+#include "h5read.h"
 #include "h5util.h"
+#include "ice_bounds.h"
 #include "largest.h"
 #include "seal.h"
 
@@ -130,8 +132,9 @@ static double read_ice_area(reader *r)
         H5Sclose(space);
         H5Aclose(a);
     }
-    if (!(area > 0) || !isfinite(area))
-        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or not a positive number; give the area in m2 that the concentration refers to");
+    if (isnan(area))
+        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
+                         "concentration refers to");
     return area;
 }
 
@@ -167,16 +170,10 @@ static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *sto
         bt_refuse(&r->r, "floe %d: its outline is refused: %s", i, fault);
         return;
     }
-    bt_moments m = bt_shape_moments(n, v);
-    if (hypot(m.cx, m.cy) > 1e-6 * m.radius)
-        bt_refuse(&r->r, "floe %d: the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
-               "add it to the pose", i, m.cx, m.cy);
-    if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) bt_refuse(&r->r, "floe %d: its pose is not finite", i);
-    if (!(f->thickness[i] > 0) || !isfinite(f->thickness[i]))
-        bt_refuse(&r->r, "floe %d: thickness %g m is refused: it must be positive", i, f->thickness[i]);
-    if (stored_area && !(fabs(stored_area[i] - m.area) <= 1e-9 * m.area))
-        bt_refuse(&r->r, "floe %d: area %g m2 is not that of its outline, %g m2; correct /floes/area or leave it out", i, stored_area[i], m.area);
-    f->area[i] = stored_area ? stored_area[i] : m.area;
+    char why[BT_ICE_WHY];
+    const bt_ice_floe given = {n, v, p[0], p[1], p[2], f->thickness[i], stored_area ? stored_area[i] : NAN, 1e-9};
+    if ((fault = bt_ice_floe_fault(&given, why, NULL))) bt_refuse(&r->r, "floe %d: %s", i, fault);
+    f->area[i] = stored_area ? stored_area[i] : bt_shape_moments(n, v).area;
 }
 
 static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)
@@ -208,12 +205,16 @@ static void read_floes(reader *r, bt_field *f)
         f->n = f->cap = (bt_idx)n;
         f->cap_vertices = (int64_t)n_vertices;
         f->area = bt_alloc((size_t)n, sizeof *f->area);
-        double sum = 0;
+        double sum = 0, size = 0;
         for (bt_idx i = 0; i < f->n; i++) {
             check_floe(r, f, i, stored_area);
             sum += f->area[i];
+            size += sqrt(4 * f->area[i] / BT_PI);
         }
         f->concentration = sum / f->ice_area;
+        char why[BT_ICE_WHY];
+        if (r->r.status == BT_OK && bt_ice_field_fault(false, f->n, size, sum, f->ice_area, why))
+            bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
     }
     free(stored_area);
 }
@@ -248,15 +249,6 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err) { return 
 
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
-    // The system's own reason first: HDF5 says "unable to open file" for all of them.
-    FILE *probe = fopen(path, "rb");
-    char byte;
-    if (!probe || (fread(&byte, 1, 1, probe) != 1 && ferror(probe))) {
-        int reason = errno;
-        if (probe) fclose(probe);
-        return bt_file_fail(path, "read the ice field", reason, err);
-    }
-    fclose(probe);
     bool bare;
     const bt_status sealed = bt_seal_check(path, BT_SEAL_FIELD, &bare, err);
     if (sealed != BT_OK) return sealed;
@@ -271,10 +263,11 @@ bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex
         bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
         return BT_ERR_CASE;
     }
-    read_floes(&r, f);
+    if (bt_h5_whole(r.file, path, err) == BT_OK) read_floes(&r, f);
+    else r.r.status = BT_ERR_CASE;
     H5Fclose(r.file);
     if (r.r.status == BT_OK) {
-        if (r.counts.hulled) take_hulls(f);
+        if (r.counts.hulled || r.counts.rounded) take_hulls(f);
         f->outlines = r.counts;
     } else {
         bt_field_free(f);

@@ -5,21 +5,53 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "bergtow/outline.h"
 #include "field_make.h"
+#include "ice_bounds.h"
+#include "map_crs.h"
 
 void bt_refuse(bt_refusals *r, const char *fmt, ...)
 {
     r->status = BT_ERR_CASE;
     if (r->said > BT_MOST_MESSAGES) return;
-    char text[400];
+    char text[640];
     va_list ap;
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
     if (r->said++ == BT_MOST_MESSAGES) bt_errors_add(r->err, "%s: more of the same; only the first %d are shown", r->path, BT_MOST_MESSAGES);
     else bt_errors_add(r->err, "%s: %s", r->path, text);
+}
+
+// Corners that coordinates of so many digits cannot tell from convex ones: 1e-7 degrees are a centimetre. A thousandth
+// of the extent, the overlap that the solver leaves alone (solver.slop), is also what the shape of a floe is known to.
+// Rejected: the last digit of the numbers as the measure, which a change of coordinates before takes away.
+static const double ROUNDING = 1e-3;
+
+/// The hull, if no corner lies deeper in it than rounding; counted.
+static bool smooth(int *n, double *v, bt_outline_counts *counts)
+{
+    double hull[2 * BT_MAX_VERTICES], extent = 0, deepest = 0;
+    memcpy(hull, v, 2 * (size_t)*n * sizeof *v);
+    const int m = bt_shape_hull(*n, hull);
+    for (int i = 0; i < *n; i++) {
+        double depth = INFINITY; // distance to the nearest edge of the hull
+        for (int k = 0; k < m; k++) {
+            const double *p = hull + 2 * k, *q = hull + 2 * ((k + 1) % m), ex = q[0] - p[0], ey = q[1] - p[1];
+            depth = bt_min(depth, (ex * (v[2 * i + 1] - p[1]) - ey * (v[2 * i] - p[0])) / hypot(ex, ey));
+            extent = bt_max(extent, hypot(hull[2 * k] - v[2 * i], hull[2 * k + 1] - v[2 * i + 1]));
+        }
+        deepest = bt_max(deepest, depth);
+    }
+    if (!(deepest <= ROUNDING * extent)) return false;
+    counts->rounded++;
+    counts->rounded_corners += *n - m;
+    counts->rounded_area += 0.5 * (bt_outline_area2(m, hull) - bt_outline_area2(*n, v));
+    memcpy(v, hull, 2 * (size_t)m * sizeof *v);
+    *n = m;
+    return true;
 }
 
 const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outline_counts *counts)
@@ -30,7 +62,10 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
     if (fault) return fault;
     if (!many && bt_outline_convex(*n, v)) return NULL;
     switch (nonconvex) {
-    case BT_NONCONVEX_REFUSE: return "it is not convex; set ice.nonconvex to hull or split, or mend it";
+    case BT_NONCONVEX_REFUSE: {
+        if (!smooth(n, v, counts)) return "it is not convex; set ice.nonconvex to hull or split, or mend it";
+        return bt_shape_fault(*n, v);
+    }
     case BT_NONCONVEX_HULL: {
         const double before = 0.5 * bt_outline_area2(*n, v);
         *n = bt_shape_hull(*n, v);
@@ -53,8 +88,38 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
 {
     if (c->ice.outlines) return bt_field_read_outlines(c, f, err);
-    if (c->ice.field) return bt_field_read_as(f, c->ice.field, c->ice.nonconvex, err);
-    return bt_field_generate(c, f, err);
+    if (!c->ice.field) return bt_field_generate(c, f, err);
+    const bt_status status = bt_field_read_as(f, c->ice.field, c->ice.nonconvex, err);
+    if (status != BT_OK) return status;
+    bt_refusals r = {.path = c->ice.field, .err = err, .status = BT_OK};
+    char why[BT_ICE_WHY];
+    if (bt_ice_domain_fault(c, f, why)) bt_refuse(&r, "%s", why);
+    else bt_field_check_inside(c, f, "floe", &r);
+    if (r.status == BT_OK) return BT_OK;
+    bt_field_free(f);
+    bt_field_init(f);
+    return r.status;
+}
+
+// --- what is told ----------------------------------------------------------------------------------------------------
+
+void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
+{
+    if (o->unnamed)
+        bt_errors_add(warnings,
+                      "%lld of %lld outlines have no property `thickness` but %s, which is not read: they have the "
+                      "thickness of the case, %g m in the mean; rename the property if it is "
+                      "the thickness in metres",
+                      (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
+    const bt_map_crs crs = bt_map_crs_of(o->crs);
+    if (crs.kind != BT_MAP_PLANE) return;
+    const bool turned = crs.any_north && c->domain.frame == BT_FRAME_GEOGRAPHIC;
+    bt_errors_add(
+        warnings,
+        "the outlines are metres of %s, used as plane coordinates: its scale factor and the angle of its north to the "
+        "true one (convergence%s) are not corrected%s",
+        crs.name, crs.any_north ? ", any angle in a polar projection" : "",
+        turned ? "; x is the grid's north here: give wind, current and tow in that frame, or the file in degrees" : "");
 }
 
 // --- places ----------------------------------------------------------------------------------------------------------
@@ -133,8 +198,17 @@ static void check_bounds(const bt_case *c, const place *p, bt_idx i)
                   low[1], high[1], c->domain.y0, y1);
 }
 
+void bt_field_check_inside(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+{
+    double *outline = bt_field_outlines(f);
+    const place p = {.f = f, .outline = outline, .noun = noun, .r = r};
+    for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
+    free(outline);
+}
+
 void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
 {
+    bt_field_check_inside(c, f, noun, r);
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
@@ -154,7 +228,6 @@ void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun
         p.parts[i] = bt_alloc(1, sizeof *p.parts[i]);
         bt_outline_split(n, v, p.parts[i]);
     }
-    for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
     bt_field_visit_pairs(&y, f, outline, 1, visit, &p);
     for (bt_idx i = 0; i < f->n; i++) {
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "field_make.h"
+#include "ice_bounds.h"
 #include "largest.h"
 #include "rng.h"
 
@@ -221,7 +222,9 @@ double bt_field_thickness(const bt_case *c, bt_idx i)
     double h = c->ice.thickness, s2 = log1p(c->ice.thickness_spread * c->ice.thickness_spread);
     if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
     bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
-    return h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2);
+    double least, most;
+    bt_ice_thickness_range(&least, &most);
+    return bt_min(most, bt_max(least, h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2)));
 }
 
 static void set_thickness(const bt_case *c, bt_field *f)

@@ -49,30 +49,72 @@ char *bt_file_join(const char *dir, const char *name)
     return path;
 }
 
-bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
+/// A descriptor that this process was given, as the shell's pipes are: opening it waits for nobody.
+static bool is_own_descriptor(const char *path)
 {
-    return bt_file_read_to(path, what, BT_MOST_TEXT_BYTES, text, size, err);
+    return !strcmp(path, "/dev/stdin") || !strncmp(path, "/dev/fd/", 8) || !strncmp(path, "/proc/self/fd/", 14);
 }
 
-bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err)
+/// "a folder", ..., or NULL for a regular file.
+static const char *kind_of(mode_t mode)
+{
+    if (S_ISREG(mode)) return NULL;
+    return S_ISDIR(mode) ? "a folder" : S_ISFIFO(mode) ? "a pipe (FIFO)" : S_ISSOCK(mode) ? "a socket" : "a device";
+}
+
+/// text: as bt_file_read_to and bt_file_read word it; streams: pipes of one's own are let through.
+static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
+{
+    // Looked at before it is opened, since to open some devices does something to them, and after, since the name may
+    // mean another file by then.
+    struct stat st;
+    const char *kind = NULL;
+    const bool taken = streams && is_own_descriptor(path);
+    int fd = -1, reason = stat(path, &st) != 0 ? errno : 0;
+    const bool seen = reason == 0;
+    if (seen && !(kind = kind_of(st.st_mode))) {
+        fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+        if (fd < 0 || fstat(fd, &st) != 0) reason = errno;
+        else kind = kind_of(st.st_mode);
+    } else if (seen && taken && !S_ISDIR(st.st_mode)) {
+        kind = NULL;
+        fd = open(path, O_RDONLY | O_CLOEXEC);
+        if (fd < 0) reason = errno;
+    }
+    if (!reason && !kind) return fd;
+    if (fd >= 0) close(fd);
+    if (reason && !text) bt_file_fail(path, "read the file", reason, err);
+    else if (reason && seen)
+        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(reason));
+    else if (reason) bt_errors_add(err, "%s: cannot be read: %s; give the path of %s", path, strerror(reason), what);
+    else if (S_ISDIR(st.st_mode)) bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
+    else
+        bt_errors_add(err,
+                      "%s: is %s and no regular file, it is not opened; write what it gives into a file, and give the "
+                      "path of that as %s",
+                      path, kind, what);
+    return -1;
+}
+
+int bt_file_open(const char *path, const char *what, bt_errors *err)
+{
+    return open_input(path, what, false, false, err);
+}
+
+static bt_status read_text(const char *path, const char *what, size_t most, bool streams, char **text, size_t *size,
+                           bt_errors *err)
 {
     *text = NULL;
     *size = 0;
-    struct stat st;
-    if (stat(path, &st)) {
-        bt_errors_add(err, "%s: cannot be read: %s; give the path of %s", path, strerror(errno), what);
-        return BT_ERR_IO;
-    }
-    if (S_ISDIR(st.st_mode)) {
-        bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
-        return BT_ERR_IO;
-    }
-    FILE *f = fopen(path, "rb");
+    const int fd = open_input(path, what, true, streams, err);
+    FILE *f = fd < 0 ? NULL : fdopen(fd, "rb");
     if (!f) {
-        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(errno));
-        return BT_ERR_IO;
+        if (fd < 0) return BT_ERR_IO;
+        const int reason = errno;
+        close(fd);
+        return bt_file_fail(path, "read the file", reason, err);
     }
-    // Read to the end rather than st_size bytes: /dev/stdin and pipes have no size.
+    // Read to the end rather than st_size bytes: a pipe has no size.
     size_t cap = 1 << 14, n = 0;
     *text = bt_alloc(cap, 1);
     for (size_t got; n <= most && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
@@ -92,6 +134,16 @@ bt_status bt_file_read_to(const char *path, const char *what, size_t most, char 
         return BT_ERR_CASE;
     }
     return BT_OK;
+}
+
+bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
+{
+    return read_text(path, what, BT_MOST_TEXT_BYTES, true, text, size, err);
+}
+
+bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err)
+{
+    return read_text(path, what, most, false, text, size, err);
 }
 
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err)

@@ -11,11 +11,18 @@ bt_status bt_file_fail(const char *path, const char *action, int errnum, bt_erro
 /// What a user can do about an errno value of a failed file operation.
 const char *bt_file_remedy(int errnum);
 
-/// Whole text of a file of at most 16 MiB, terminated; the caller frees it (also after an error). what: "a case file", for the
-/// messages. Errors: BT_ERR_IO, BT_ERR_CASE (too large).
+/// Open an input for reading; −1 and a message otherwise, the error is BT_ERR_IO. what: "a case file", for the
+/// messages. Only regular files (and links to them) are opened: to open a FIFO would wait for a writer, for ever if
+/// there is none, and a device has no end.
+int bt_file_open(const char *path, const char *what, bt_errors *err);
+
+/// Whole text of a file of at most 16 MiB, terminated; the caller frees it (also after an error). what: "a case file",
+/// for the messages. Also from a pipe that the shell has opened for this process (/dev/stdin, /dev/fd/N: `generate |
+/// bergtow check /dev/stdin`), which no other input is: they are read by name, some of them more than once. Errors:
+/// BT_ERR_IO, BT_ERR_CASE (too large).
 bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err);
 
-/// The same, of at most so many bytes.
+/// The same of at most so many bytes, from a regular file alone.
 bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err);
 
 /// Write text to path by way of a temporary name and a rename: path holds the old or the new text, never a part.

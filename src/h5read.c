@@ -4,6 +4,49 @@
 
 #include "seal.h"
 
+typedef struct { const char *path; bt_errors *err; } whole;
+
+/// 0: goes on; 1: refused and told; −1: HDF5 fails.
+static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, void *data)
+{
+    const whole *w = data;
+    if (info->type != H5L_TYPE_HARD) {
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s link, which can lead to any other "
+                      "file and is not followed; store the data itself there",
+                      w->path, name,
+                      info->type == H5L_TYPE_SOFT       ? "a soft"
+                      : info->type == H5L_TYPE_EXTERNAL ? "an external"
+                                                        : "a user-defined");
+        return 1;
+    }
+    const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
+    if (o < 0) return -1;
+    const char *kind = NULL;
+    if (H5Iget_type(o) == H5I_DATASET) {
+        // The space is not asked for: that opens the sources of a virtual dataset.
+        const hid_t plan = H5Dget_create_plist(o);
+        if (plan >= 0 && H5Pget_layout(plan) == H5D_VIRTUAL) kind = "a virtual dataset";
+        else if (plan < 0 || H5Pget_external_count(plan) != 0) kind = "a dataset with external storage";
+        if (plan >= 0) H5Pclose(plan);
+    }
+    H5Oclose(o);
+    if (kind)
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s, whose numbers lie in another file "
+                      "and are not read; store them in this file",
+                      w->path, name, kind);
+    return kind != NULL;
+}
+
+bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
+{
+    const herr_t found = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, look_at, &(whole){path, err});
+    if (found < 0)
+        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot go through its objects; write it anew", path);
+    return found == 0 ? BT_OK : BT_ERR_CASE;
+}
+
 static void fail(bt_h5_reader *r, const char *name)
 {
     if (r->status != BT_OK) return;
@@ -19,6 +62,7 @@ bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_err
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
     if (r->file < 0) fail(r, "as HDF5 it");
+    else r->status = bt_h5_whole(r->file, path, err);
     return r->status;
 }
 

@@ -7,6 +7,11 @@
 
 #include "bergtow/base.h"
 
+/// Does the file hold all that it seems to? Refused, by the name of the object: soft and external links, datasets whose
+/// numbers lie in other files (external storage) or in other datasets (virtual). HDF5 opens and reads whatever these
+/// name: any file of the disk as raw numbers, a FIFO for ever. No other file is opened here. Errors: BT_ERR_CASE.
+bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err);
+
 /// An open file; after a failure, which is told once, every function below does nothing.
 typedef struct bt_h5_reader {
     hid_t file;
@@ -15,7 +20,7 @@ typedef struct bt_h5_reader {
     bt_errors *err;
 } bt_h5_reader;
 
-/// Check the seal, then open. path must stay valid. Errors: those of bt_seal_check.
+/// Check the seal, open, and bt_h5_whole. path must stay valid. Errors: those of bt_seal_check and bt_h5_whole.
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
 bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 

@@ -31,6 +31,10 @@ enum {
     BT_MOST_LISTS = 40000000,          ///< `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes while it is read
 };
 
+// What is less is no ice, but a slip of units; and products of smaller numbers leave the range of a double.
+static const double BT_LEAST_CONCENTRATION = 1e-6; ///< of ice that is there at all
+static const double BT_LEAST_SIZE = 1e-3;          ///< mean diameter of the floes, m
+static const double BT_LEAST_THICKNESS = 1e-6;     ///< m
 static const double BT_MOST_RESULT_BYTES = 20e12;  ///< series and frames
 static const double BT_MOST_CORE_SECONDS = 1e10;   ///< estimated work of a run: 300 years of a core
 

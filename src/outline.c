@@ -230,3 +230,37 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     *east = e * stretch;
     *north = n * stretch;
 }
+
+/// The chord c follows from the distance d by Newton's method from d = c (1 + c²/(24 R²)); the point of the ellipsoid
+/// at this chord in this direction lies up·u above the tangent plane of the origin, (x² + y²)/a² + z²/b² = 1 with level
+/// = √(c² − up²) in it: Newton again from the sphere's −c²/(2R).
+void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat)
+{
+    double o[3];
+    on_ellipsoid(lon0, lat0, o);
+    const double sl = sin(lon0), cl = cos(lon0), sp = sin(lat0), cp = cos(lat0);
+    const double radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * sp * sp), distance = hypot(north, east);
+    double chord = distance;
+    for (int k = 0; k < 8; k++) {
+        const double q = chord * chord / (24 * radius * radius);
+        chord -= (chord * (1 + q) - distance) / (1 + 3 * q);
+    }
+    const double e = distance > 0 ? east / distance : 0, n = distance > 0 ? north / distance : 0;
+    const double out[3] = {-sl * e - sp * cl * n, cl * e - sp * sl * n, cp * n},
+                 u[3] = {cp * cl, cp * sl, sp}; // unit vectors, in the tangent plane and up
+    const double weight[3] = {1, 1, 1 / (1 - WGS84_E2)};
+    double up = -chord * chord / (2 * radius), p[3];
+    memcpy(p, o, sizeof p);
+    for (int k = 0; k < 8; k++) {
+        const double level = sqrt(bt_max(0, chord * chord - up * up));
+        double f = -WGS84_A * WGS84_A, slope = 0;
+        for (int a = 0; a < 3; a++) {
+            p[a] = o[a] + level * out[a] + up * u[a];
+            f += weight[a] * p[a] * p[a];
+            slope += 2 * weight[a] * p[a] * (u[a] - (level > 0 ? up / level * out[a] : 0));
+        }
+        up -= f / slope;
+    }
+    *lon = atan2(p[1], p[0]);
+    *lat = atan2(p[2], (1 - WGS84_E2) * hypot(p[0], p[1]));
+}

@@ -25,7 +25,7 @@ static const char *const bounds[] = {"wall", "periodic", "open", NULL};
 static const char *const end_bounds[] = {"wall", "periodic", "open", "moving", NULL};
 static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NULL};
 static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
-static const char *const crss[] = {"metres", "lonlat", NULL};
+static const char *const crss[] = {"file", "lonlat", "plane", "frame", "metres", NULL};
 static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
@@ -59,7 +59,7 @@ const bt_key bt_case_keys[] = {
     INT("run.threads", run.threads, "0", "[0, 1024]", "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
 
     CHOICE("domain.frame", domain.frame, frames, "basin",
-           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
+           "basin: origin at the middle of the short side, x along, y across, on a map x east and y north; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
     REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "extent along x; the default is HSVA's large ice tank, from memory"),
     REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
@@ -90,7 +90,7 @@ const bt_key bt_case_keys[] = {
     REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
          "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
     REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
-    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes"),
+    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes; lognormal: cut at the ends of its range"),
     REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
     REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
     REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",
@@ -109,13 +109,17 @@ const bt_key bt_case_keys[] = {
     REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
     TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
     TEXT("ice.outlines", ice.outlines, "none",
-         "GeoJSON file of floe outlines (FeatureCollection of Polygons; properties thickness in m and id are optional) read instead of making a field; relative to the folder of the case file"),
-    CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "metres",
-           "coordinates of the outlines: metres in the case's frame, or longitude and latitude in degrees (WGS84), projected about ice.origin_lon, ice.origin_lat (azimuthal equidistant, within 100 km)"),
-    REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]", "longitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
-    REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0 for outlines_crs lonlat; none: the middle of the outlines"),
+         "GeoJSON file of floe outlines (FeatureCollection of Polygons, positions [east, north]; properties thickness in m and id are optional) read instead of making a field; relative to the folder of the case file"),
+    CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "file",
+           "coordinates of the outlines: what the file's crs says, degrees without one [RFC 7946]; for a file without crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case; metres: its old name)"),
+    REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]",
+         "longitude of x = y = 0: of outlines in degrees (none: their middle), projected about it (azimuthal equidistant, within 100 km), and of what bergtow field writes as GeoJSON"),
+    REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0, as ice.origin_lon"),
+    REAL("ice.origin_east", ice.origin_east, LENGTH, "none", "[-1e8, 1e8]",
+         "east of x = y = 0 in the plane of outlines in metres; none: the middle of the outlines where their crs is a projection, otherwise 0"),
+    REAL("ice.origin_north", ice.origin_north, LENGTH, "none", "[-1e8, 1e8]", "north of x = y = 0 in the plane of outlines in metres, as ice.origin_east"),
     CHOICE("ice.nonconvex", ice.nonconvex, nonconvexes, "refuse",
-           "outlines of a file that are not convex: refused, replaced by their hull (the area grows), or split into convex parts that move as one floe"),
+           "outlines of a file that are not convex by more than a thousandth of their extent: refused, replaced by their hull (the area grows), or split into convex parts that move as one floe"),
 
     CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
     REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]", "length of a named shape along its own x, assumed"),

@@ -98,9 +98,12 @@ bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_error
     char block[BT_SEAL_BYTES] = "", wanted[BT_SEAL_BYTES];
     struct stat st;
     if (bare) *bare = false;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    char what[48];
+    snprintf(what, sizeof what, "a %.*s file of bergtow", (int)strcspn(kind, " "), kind);
+    const int fd = bt_file_open(path, what, err);
+    if (fd < 0) return BT_ERR_IO;
     bt_status status = BT_OK;
-    int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : S_ISDIR(st.st_mode) ? EISDIR : 0;
+    int reason = fstat(fd, &st) != 0 ? errno : 0;
     if (!reason && !read_at(fd, block, st.st_size < BT_SEAL_BYTES ? (size_t)st.st_size : sizeof block, 0)) reason = errno;
     if (!reason && bare) *bare = is_bare(fd, st.st_size, block);
     if (!reason && !(bare && *bare)) {
@@ -115,6 +118,6 @@ bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_error
             status = refuse(path, kind, block, st.st_size, err);
         }
     }
-    if (fd >= 0) close(fd);
+    close(fd);
     return reason ? bt_file_fail(path, "read the file", reason, err) : status;
 }

@@ -4,6 +4,7 @@
 
 #include <assert.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -74,6 +75,16 @@ static const bt_state_row field_rows[] = {
     FIELD(F64, "ice_area", ice_area), FIELD(F64, "concentration", concentration), FIELD(I64, "read", outlines.read), FIELD(I64, "turned", outlines.turned),
     FIELD(I64, "dropped", outlines.dropped), FIELD(I64, "hulled", outlines.hulled), FIELD(F64, "hull_area", outlines.hull_area), FIELD(I64, "split", outlines.split),
     FIELD(I64, "parts", outlines.parts), FIELD(F64, "lon", outlines.lon), FIELD(F64, "lat", outlines.lat),
+};
+
+/// Not in checkpoints of before, whose fields had none of this.
+static const bt_state_row map_rows[] = {
+    FIELD(I64, "rounded", outlines.rounded),
+    FIELD(I64, "rounded_corners", outlines.rounded_corners),
+    FIELD(F64, "rounded_area", outlines.rounded_area),
+    FIELD(F64, "east", outlines.east),
+    FIELD(F64, "north", outlines.north),
+    FIELD(I64, "unnamed", outlines.unnamed),
 };
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
@@ -351,6 +362,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
 void bt_state_save_field(const bt_field *f, bt_snapshot *s)
 {
     bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
+    bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
+    bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
+    bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
     bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
     bt_snapshot_add(s, "field/vertices", BT_ITEM_F64, f->offsets[f->n], 2, f->vertices);
     bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
@@ -364,6 +378,15 @@ void bt_state_load_field(bt_field *f, bt_snapshot *s)
     bt_field_init(f);
     int64_t n = 0, n_vertices = 0;
     bt_snapshot_take_rows(s, "field", field_rows, N_OF(field_rows), f);
+    if (bt_snapshot_find(s, "map/crs")) {
+        bt_snapshot_take_rows(s, "map", map_rows, N_OF(map_rows), f);
+        snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "map/crs"));
+        snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "map/nearly"));
+    } else {
+        f->outlines.east = f->outlines.north = NAN;
+        if (f->outlines.read)
+            snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
+    }
     free(f->offsets);
     f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
     f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);

@@ -8,6 +8,7 @@
 #include "state_check.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "bergtow/crush.h"
@@ -16,6 +17,7 @@
 #include "bergtow/shape.h"
 #include "bergtow/tow.h"
 #include "bergtow/window.h"
+#include "ice_bounds.h"
 #include "largest.h"
 
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
@@ -42,6 +44,13 @@ static bool is_floe(const bt_field *f, bt_idx i)
     return f->outlines.split > 0 && !bt_outline_fault(n, v) && bt_outline_split(n, v, &p);
 }
 
+static void want_ice(bt_snapshot *s, const char *name, int64_t row, const char *why)
+{
+    char text[BT_ICE_WHY + 16];
+    snprintf(text, sizeof text, "is refused: %s", why); // completes "/field/area, row 3, "
+    bt_snapshot_want(s, false, name, row, text);
+}
+
 void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s)
 {
     bt_snapshot_want(s, n_offsets >= 1 && n_offsets <= BT_MOST_FLOES + 1, "field/offsets", -1, "has no number of rows that a field can have");
@@ -51,21 +60,35 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
         const int64_t a = f->offsets[i], b = f->offsets[i + 1];
         bt_snapshot_want(s, a >= 0 && a <= n_vertices && b >= a + 3 && b <= n_vertices && b - a <= BT_MAX_VERTICES, "field/offsets", i, "gives a floe too few or too many vertices");
     }
+    static const char *const names[] = {[BT_ICE_THICKNESS] = "field/thickness",
+                                        [BT_ICE_POSE] = "field/pose",
+                                        [BT_ICE_OUTLINE] = "field/offsets",
+                                        [BT_ICE_AREA] = "field/area"};
+    double sum = 0, size = 0;
+    char why[BT_ICE_WHY];
     for (bt_idx i = 0; i < f->n && !s->faulty; i++) {
         const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
         bt_snapshot_want(s, all_finite(f->vertices + 2 * first, 2 * n) && is_floe(f, i), "field/offsets", i, "begins an outline that is no floe");
         if (s->faulty) return;
-        const bt_moments m = bt_shape_moments((int)n, f->vertices + 2 * first);
-        bt_snapshot_want(s, hypot(m.cx, m.cy) <= 1e-6 * m.radius, "field/offsets", i, "begins an outline that is not about its centroid");
-        bt_snapshot_want(s, fabs(f->area[i] - m.area) <= 1e-6 * m.area, "field/area", i, "is not the area of the outline");
-        bt_snapshot_want(s, all_finite(f->pose + 3 * (size_t)i, 3), "field/pose", i, "is not finite");
-        bt_snapshot_want(s, f->thickness[i] > 0 && isfinite(f->thickness[i]), "field/thickness", i, "is not a thickness");
+        const double *p = f->pose + 3 * (size_t)i;
+        const bt_ice_floe floe = {(int)n, f->vertices + 2 * first, p[0], p[1], p[2], f->thickness[i], f->area[i], 1e-6};
+        bt_ice_part part;
+        const char *fault = bt_ice_floe_fault(&floe, why, &part);
+        if (fault) want_ice(s, names[part], i, fault);
+        sum += f->area[i], size += sqrt(4 * f->area[i] / BT_PI);
     }
-    bt_snapshot_want(s, isfinite(f->ice_area) && f->ice_area >= 0, "field/ice_area", -1, "is not an area");
-    bt_snapshot_want(s, isfinite(f->concentration), "field/concentration", -1, "is not finite");
+    if (s->faulty) return;
+    // A field without floes may have no ice region, and so no area.
+    if ((f->n > 0 || f->ice_area != 0) && bt_ice_field_fault(true, f->n, size, sum, f->ice_area, why))
+        want_ice(s, "field/ice_area", -1, why);
+    bt_snapshot_want(s, f->concentration >= 0 && f->concentration <= 1 + 1e-9, "field/concentration", -1,
+                     "is no concentration");
     const bt_outline_counts *c = &f->outlines;
-    bt_snapshot_want(s, counts(c->read) && counts(c->turned) && counts(c->dropped) && counts(c->hulled) && counts(c->split) && counts(c->parts), "field/read", -1,
-                     "and what was done to outlines are not all counts");
+    bt_snapshot_want(s,
+                     counts(c->read) && counts(c->turned) && counts(c->dropped) && counts(c->hulled) &&
+                         counts(c->split) && counts(c->parts) && counts(c->rounded) && counts(c->rounded_corners) &&
+                         counts(c->unnamed),
+                     "field/read", -1, "and what was done to outlines are not all counts");
 }
 
 // --- tiles -----------------------------------------------------------------------------------------------------------

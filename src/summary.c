@@ -156,6 +156,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
+    bt_outline_warn(&t->outlines, c, &s->warnings);
     warn_of_events(s, t->events);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)

@@ -50,12 +50,19 @@ static void json_outlines(bt_json *j, const bt_outline_counts *o)
     bt_json_int(j, "read", o->read);
     bt_json_int(j, "turned", o->turned);
     bt_json_int(j, "dropped_vertices", o->dropped);
+    bt_json_int(j, "rounded", o->rounded);
+    bt_json_int(j, "rounded_corners", o->rounded_corners);
+    bt_json_number(j, "rounded_area_added_m2", o->rounded_area);
     bt_json_int(j, "hulled", o->hulled);
     bt_json_number(j, "hull_area_added_m2", o->hull_area);
     bt_json_int(j, "split", o->split);
     bt_json_int(j, "parts", o->parts);
     bt_json_number(j, "origin_lon_deg", o->read ? o->lon * 180 / BT_PI : NAN);
     bt_json_number(j, "origin_lat_deg", o->read ? o->lat * 180 / BT_PI : NAN);
+    bt_json_number(j, "origin_east_m", o->read ? o->east : NAN);
+    bt_json_number(j, "origin_north_m", o->read ? o->north : NAN);
+    bt_json_string(j, "crs", o->read ? o->crs : "");
+    bt_json_int(j, "nearly_thickness", o->unnamed);
     bt_json_close(j, '}');
 }
 
@@ -326,6 +333,10 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
            (long long)t->n_steps, t->dt, s->sim_time);
     bt_lead_stats_print(&t->lead);
     const bt_outline_counts *o = &t->outlines;
+    if (o->read) printf("  outlines            %lld, coordinates %s\n", (long long)o->read, o->crs);
+    if (o->rounded)
+        printf("  outlines            %lld not convex by rounding alone, %lld corners left out, which adds %.3g m2\n",
+               (long long)o->rounded, (long long)o->rounded_corners, o->rounded_area);
     if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
     if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, c);

@@ -51,7 +51,7 @@ def main():
         features = json.loads(convex.read_text())["features"]
     rng = np.random.default_rng(1)
     for k, feature in enumerate(features):
-        ring = bays(np.array(feature["geometry"]["coordinates"][0][:-1]), rng)  # metres north, east
+        ring = bays(np.array(feature["geometry"]["coordinates"][0][:-1])[::-1, ::-1], rng)  # metres north, east; the file has east, north
         lonlat = [[round(c, 8) for c in place(x, y)] for x, y in ring]
         if k % 10 == 0:
             lonlat.insert(1, lonlat[0])

@@ -15,7 +15,8 @@ typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // b
 typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING } bt_bound; // wall, periodic, open, moving (ends only)
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
-typedef enum { BT_CRS_METRES, BT_CRS_LONLAT } bt_crs;                            // metres, lonlat
+/// Coordinates of outlines: file, lonlat, plane, frame, metres.
+typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME, BT_CRS_METRES } bt_crs;
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
 typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
@@ -100,7 +101,8 @@ typedef struct bt_case {
         char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
         char *outlines;                 ///< GeoJSON file of outlines instead of a generator, or NULL; relative to the case file
         bt_crs outlines_crs;            ///< what its coordinates are
-        double origin_lon, origin_lat;  ///< place of x = y = 0 for crs lonlat, rad; NaN: the middle of the outlines
+        double origin_lon, origin_lat; ///< place of x = y = 0 on the earth, rad; NaN: the middle of outlines in degrees
+        double origin_east, origin_north; ///< of x = y = 0 in the plane of the outlines, m; NaN: as the keys say
         bt_nonconvex nonconvex;         ///< what is done with an outline that is not convex
     } ice;
     bt_floe_def *floes;   ///< [n_floes] given by hand

@@ -12,11 +12,18 @@ typedef struct bt_outline_counts {
     int64_t read;     ///< outlines of a GeoJSON file; 0 for other fields
     int64_t turned;   ///< listed clockwise, and turned round
     int64_t dropped;  ///< vertices left out: double, or in the middle of a straight line
+    int64_t rounded;  ///< floes not convex by rounding alone, which was taken for convex
+    int64_t rounded_corners; ///< corners that this left out
+    double rounded_area; ///< area that it added, m²
     int64_t hulled;   ///< floes replaced by their convex hull
     double hull_area; ///< area that this added, m²
     int64_t split;    ///< floes in convex parts
     int64_t parts;    ///< their parts
     double lon, lat;  ///< place of x = y = 0 for longitude and latitude, rad; NaN otherwise
+    double east, north; ///< coordinates of x = y = 0 in the plane of the file, m; NaN otherwise
+    char crs[32];     ///< of the file: "OGC:CRS84" (degrees), "EPSG:32633", "local" (metres); "" for other fields
+    int64_t unnamed;  ///< features without a thickness that have a property of nearly this name
+    char nearly[96];  ///< such names, the first few
 } bt_outline_counts;
 
 typedef struct bt_field {
@@ -46,13 +53,21 @@ bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err);
 /// The field of a case, made or read as it says (ice.field, ice.outlines). Errors: those of the function it calls.
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err);
 
-/// Floes of the case's GeoJSON file ice.outlines. Refused with the number of the feature, from 0: what is no polygon, has holes, too few or
-/// too many vertices, no area, edges that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body
-/// (both are named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+/// Floes of the case's GeoJSON file ice.outlines, positions [east, north] in what its crs says (src/geojson.c). Refused
+/// with the number of the feature, from 0: what is no polygon, has holes, too few or too many vertices, no area, edges
+/// that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body (both are
+/// named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
 
-/// Outlines where they lie, in metres of the case's frame, as GeoJSON that ice.outlines reads back. A complete file or none.
+/// Outlines where they lie, as GeoJSON that ice.outlines reads back: longitude and latitude where the place of x = y =
+/// 0 on the earth is known (of outlines that were read in degrees, or ice.origin_lon and ice.origin_lat), the crs of
+/// outlines that were read in another, and otherwise metres [east, north] of x = y = 0, with a crs that says that they
+/// are local. A complete file or none.
 bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
+
+/// Warnings of outlines that were read: properties that are nearly called thickness, what a projection leaves
+/// uncorrected.
+void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings);
 
 /// Thickness of floe i by the law of the case, m.
 double bt_field_thickness(const bt_case *c, bt_idx i);

@@ -42,4 +42,8 @@ bool bt_outline_split(int n, const double *v, bt_parts *p);
 /// No latitude is special, nor the 180th meridian. Against geodesics, from 60° to 89° N: within 1 mm at 10 km, 2 cm at 100 km.
 void bt_outline_project(double lon, double lat, double lon0, double lat0, double *north, double *east);
 
+/// The place (lon, lat), rad, longitude from −π to π, of metres north and east of (lon0, lat0): the inverse of
+/// bt_outline_project, to rounding, within a tenth of the earth's radius.
+void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat);
+
 #endif

@@ -12,7 +12,7 @@ from harness import CASE, DONE, IO, area, call, changed, placed, run, write_case
 BASE = {
     "run": {"dt": 0.1, "duration": 2},
     "domain": {"length": 20, "width": 10},
-    "ice": {"outlines": "floes.geojson", "thickness": 0.25},
+    "ice": {"outlines": "floes.geojson", "outlines_crs": "plane", "thickness": 0.25},
     "body": {"x": 2, "length": 2},
 }
 SQUARE = [[0, 0], [1, 0], [1, 1], [0, 1]]
@@ -297,9 +297,10 @@ def test_projected_distances_and_azimuths(tmp_path, frame, lat0, distance, error
         lat = lat0 + d * math.cos(azimuth) / 111.6e3 * (0.9 if lat0 < 89 else 0.5)
         rings.append(triangle(LON + d * math.sin(azimuth) / (111.3e3 * math.cos(math.radians(lat))), lat, distance / 20))
     write(tmp_path, *(feature(r) for r in rings))
-    case = changed(LONLAT, domain__frame=frame, ice__origin_lat=lat0)
+    size = 2.3 * distance
+    case = changed(LONLAT, domain__frame=frame, domain__length=size, domain__width=size, ice__origin_lat=lat0)
     if frame == "basin":
-        case["domain"] |= {"x0": -105e3}
+        case["domain"] |= {"x0": -size / 2}
     got, *_ = field(tmp_path, case)
     for ring, drawn in zip(got, rings):
         assert area(ring) > 0
@@ -316,7 +317,7 @@ def test_origin_in_the_middle(tmp_path):
     """Also across the 180th meridian."""
     for lon in (20.0, 179.999):
         write(tmp_path, feature(triangle(lon - 0.004, 70, 50)), feature([[x if x <= 180 else x - 360, y] for x, y in triangle(lon + 0.004, 70.002, 50)]))
-        case = changed(LONLAT, ice__origin_lon=None, ice__origin_lat=None)
+        case = changed(LONLAT, domain__length=2e3, domain__width=2e3, ice__origin_lon=None, ice__origin_lat=None)
         got, *_ = field(tmp_path, case)
         corners = np.vstack(got)
         assert np.abs(corners.min(axis=0) + corners.max(axis=0)).max() < 0.1

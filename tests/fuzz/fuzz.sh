@@ -24,7 +24,7 @@ case | setup | study)
     build/release/bergtow --list-keys | awk '$1 ~ /^[a-z][a-z_0-9.]*$/ {n = split($1, p, "."); print p[n] ": "; print $1; for (i = 3; i < 9; i++) if ($i ~ /^[a-z]+$/) print $i}' | sort -u |
         awk '{print "\"" $0 "\""}' >"$words"
     printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' 'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>"$words" ;;
-outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame '[[0,0],[9,0],[0,9]]' null 1e308 >"$words" ;;
+outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame crs name EPSG:32633 EPSG:3413 EPSG:3857 CRS84 origin coordinates metres '[[0,0],[9,0],[0,9]]' null 1e308 >"$words" ;;
 table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >"$words" ;;
 *) printf '"%s"\n' '\x00' >"$words" ;;
 esac

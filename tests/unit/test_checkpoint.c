@@ -114,7 +114,7 @@ static const struct scenario {
     {"floes in parts, floes by hand, a pier",
      "run: {dt: 0.2, duration: 20}\n"
      "domain: {length: 20, width: 10, ends: open, sides: open}\n"
-     "ice: {outlines: bays.geojson, nonconvex: split, thickness: 0.25, x_min: 0, x_max: 20}\n"
+     "ice: {outlines: bays.geojson, outlines_crs: plane, nonconvex: split, thickness: 0.25, x_min: 0, x_max: 20}\n"
      "floes: [{shape: square, length: 1, x: 18, y: 3, vx: -0.6, thickness: 0.3}, {shape: square, length: 1, x: 9, y: 4.2, thickness: 0.3, fixed: true}]\n"
      "body: {length: 2, x: 2}\n"
      "tow: {mode: speed, speed: 0.8, ramp: 1}\n"

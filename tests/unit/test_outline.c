@@ -168,9 +168,28 @@ static void projection_of_known_lengths(void **state)
     CHECK_CLOSE(east, 38187, 5);
 }
 
+/// There and back, at every latitude, across 180° and at the poles themselves; the way out is checked against geodesics elsewhere.
+static void the_inverse_of_the_projection(void **state)
+{
+    (void)state;
+    const double d = BT_PI / 180, latitude[] = {-90, -89.99, -60, 0, 45, 76.5, 89.9, 90}, longitude[] = {-180, -90, 0, 20, 179.99}, far[] = {0, 1e-3, 30, 5e3, 100e3};
+    for (int i = 0; i < 8; i++)
+        for (int j = 0; j < 5; j++)
+            for (int k = 0; k < 5; k++)
+                for (int a = 0; a < 12; a++) {
+                    const double n = far[k] * cos(a * BT_PI / 6), e = far[k] * sin(a * BT_PI / 6);
+                    double lon, lat, north, east;
+                    bt_outline_unproject(n, e, longitude[j] * d, latitude[i] * d, &lon, &lat);
+                    bt_outline_project(lon, lat, longitude[j] * d, latitude[i] * d, &north, &east);
+                    assert_true(fabs(lon) <= BT_PI && fabs(lat) <= BT_PI / 2);
+                    if (!(hypot(north - n, east - e) <= 3e-9 + 2e-14 * far[k])) fail_msg("%g, %g from %g, %g: back to %g, %g", n, e, longitude[j], latitude[i], north - n, east - e);
+                }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_inverse_of_the_projection),
         cmocka_unit_test(cleaning_keeps_the_corners), cmocka_unit_test(faults), cmocka_unit_test(moments_of_what_is_not_convex),
         cmocka_unit_test(parts_fill_the_outline_once), cmocka_unit_test(projection_of_known_lengths),
     };

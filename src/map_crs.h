@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// What the name of a coordinate reference system says about the numbers of a GeoJSON file.
+#ifndef BT_MAP_CRS_H
+#define BT_MAP_CRS_H
+
+#include <stdbool.h>
+
+typedef enum {
+    BT_MAP_DEGREES, ///< longitude, latitude
+    BT_MAP_PLANE,   ///< metres east and north of a projection
+    BT_MAP_LOCAL,   ///< metres east and north of x = y = 0 of a case: BT_MAP_LOCAL_NAME
+    BT_MAP_WARPED,  ///< metres that are none on the ground
+    BT_MAP_UNKNOWN,
+} bt_map_kind;
+
+typedef struct bt_map_crs {
+    bt_map_kind kind;
+    char name[32];   ///< "OGC:CRS84", "EPSG:32633", "local"; of an unknown one as it is given, cut
+    bool any_north;  ///< the grid's north can differ from the true one by any angle: polar projections
+} bt_map_crs;
+
+/// The name this program gives to coordinates that are tied to no place on the earth. OGC has no name for one.
+#define BT_MAP_LOCAL_NAME "urn:x-bergtow:crs:local-metres-east-north"
+
+/// From "EPSG:32633", "urn:ogc:def:crs:EPSG::32633", "http://www.opengis.net/def/crs/OGC/1.3/CRS84" and the like,
+/// whatever the case of the letters.
+bt_map_crs bt_map_crs_of(const char *name);
+
+#endif
