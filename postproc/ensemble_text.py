@@ -3,6 +3,7 @@
 import numpy as np
 
 import style
+from ensemble_read import listed
 
 SHORT = {"lichey_hellmer": "Lichey–Hellmer", "marchenko_compaction": "compaction", "marchenko_rafting": "rafting", "marchenko_momentum": "momentum",
          "dilute_limit": "dilute", "open_water_drag": "open water"}
@@ -156,22 +157,28 @@ def report(s, markdown=False):
     mark = "## " if markdown else ""
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [f"{mark}{s['title']}", "", (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."]
-    waiting = sum(c["members"]["waiting"] for c in s["conditions"])
-    if waiting:
-        lines.append(f"The ensemble is not complete: {counted(waiting)} to come, and in no number. The longest are run first, so conditions have unlike numbers of fields.")
+    if s["waiting"]:
+        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number ({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields.")
+    if s["unsound"]:
+        name, why = next(iter(s["unsound"].items()))
+        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: {name}: {why}. `bergtow ensemble` again runs what is damaged anew.")
+    if s["without_mean"]:
+        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no steady window, or no body.")
+    if not s["checked"]:
+        lines.append("Whether the files are as they were written was not checked: this machine has neither libxxhash nor the Python package xxhash.")
     if s["behind"]:
         lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in.")
     for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
-            lines.append(f"{counted(len(s[kind]))} {told}; the first: {name}: {why}")
+            lines.append(f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the first: {name}: {why}")
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " + ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
     if s["members_without_folder"]:
-        lines.append(f"{counted(s['members_without_folder'])} {'has' if s['members_without_folder'] == 1 else 'have'} no folder here: their warnings are known by numbers alone, their peaks not at all.")
+        lines.append(f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their peaks not at all.")
     heavy = [c["label"] for c in s["conditions"] if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")

@@ -4,6 +4,7 @@
 The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the same.
 """
 import argparse
+import sys
 from dataclasses import replace
 from itertools import groupby
 
@@ -128,6 +129,8 @@ def context(folder):
     """Everything that page/ensemble.html sets. Errors: RunError."""
     e, options = Ensemble(folder), argparse.Namespace(**OPTIONS)
     s = ensemble.statistics(e, options)
+    if s["holes"]:
+        print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
     rows, other_builds = provenance(e)
     title = report_run.breakable(e.title)

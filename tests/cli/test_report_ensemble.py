@@ -99,6 +99,7 @@ def test_page_stands_alone_and_text_stays_text(page):
 def test_members_of_other_builds_and_lost_folders_are_told(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
+    made_up.record(study / "members/c001-r001", Ensemble(study).study)
     e = Ensemble(study)
     assert "2 builds" in report_ensemble.provenance(e)[1]
     (study / "members/c001-r002").rename(study / "members/lost")
