@@ -57,10 +57,16 @@ static double of_frame(double bytes, double left, bool packed) { return packed &
 
 static double entries_of(const bt_case *c) { return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every)); }
 
+double bt_cost_frames(const bt_case *c)
+{
+    const double steps = (double)bt_case_steps(c), due = c->output.frame_interval > 0 ? c->run.duration / c->output.frame_interval : 0, whole = floor(due * (1 + 1e-12));
+    return 1 + bt_min(steps, due - whole > 1e-9 * due ? whole + 1 : whole);
+}
+
 bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ranks)
 {
     const bool packed = ranks == 1;
-    const double frames = c->output.frame_interval > 0 ? floor(c->run.duration / c->output.frame_interval * (1 + 1e-12)) + 1 : 0;
+    const double frames = bt_cost_frames(c);
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
     const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) + 2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
     const double outlines = 24 * n + 16 * corners + 4 * (corners + 2 * n);

@@ -23,6 +23,9 @@ double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here
 /// in the cases of cases/), and those given by hand.
 double bt_cost_corners(const bt_case *c, const bt_field *f, double n);
 
+/// Frames of a run: the start, the first step at or after each multiple of the interval, the end; one a step at most.
+double bt_cost_frames(const bt_case *c);
+
 /// What a run leaves on disk, B.
 typedef struct bt_cost_disk {
     double result;      ///< result.h5: series, frames, outlines

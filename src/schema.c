@@ -59,7 +59,8 @@ const bt_key bt_case_keys[] = {
     INT("run.threads", run.threads, "0", "[0, 1024]", "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
 
     CHOICE("domain.frame", domain.frame, frames, "basin",
-           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
+           "basin: origin at the middle of the short side, x along; geographic: origin at the body, x north, y east, and concentration, size and thickness of the ice, "
+           "length and draft of the body have no defaults [Yulmetov & Løset 2017]"),
     REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "extent along x; the default is HSVA's large ice tank, from memory"),
     REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),

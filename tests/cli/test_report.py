@@ -31,7 +31,7 @@ from bergtow_read import Run  # noqa: E402
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
 CASE = changed(TOW, run__title=HOSTILE, ice__concentration=0.7, reference__mean_force=3.0, reference__source="<b>nobody</b>", output__window_start=8)
 #: in the map's frame, within a window that goes along, on a line that breaks
-MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2}, run__duration=60,
+MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2, "draft": 0.5}, run__duration=60,
                  tow={"mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000, "line": {"breaking_load": 1e6}})
 
 
