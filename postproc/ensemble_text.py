@@ -51,7 +51,7 @@ def unit_of(s):
 
 def means(s, markdown):
     factor, unit = unit_of(s)
-    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields", "se in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
+    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields", "standard error in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
     rows = []
     for c in s["conditions"]:
         r = c["resistance"]
@@ -62,7 +62,7 @@ def means(s, markdown):
                      number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–", number(r["sd_between"] / factor), number(r["se_within"] / factor),
                      f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth of the fields at each end (from 8 fields on). "
-            "Sd of fields: between the means of runs; se in a run: of one run's mean, by its correlation time. "
+            "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by its correlation time. "
             "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, S short window, X stopped early, O other warning.")
     return table(head, rows, markdown) + "\n\n" + note
 

@@ -8,10 +8,17 @@ import re
 import shlex
 from dataclasses import dataclass
 
+import numpy as np
 import yaml
 
 #: kind: what the label says
-KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default"}
+KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default", "field": "as read",
+         "unused": "not used"}
+
+#: keys of ice that is made, which mean nothing where it is read
+MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread", "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
+#: used where outlines have no thickness of their own; a field file always has one
+THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
 
 @dataclass(frozen=True)
@@ -95,11 +102,45 @@ def of_default(meaning):
     return ("source", f"default: {source[1]}") if source else ("default", "")
 
 
+def source_of_ice(run):
+    """(key, file) by which the ice was read, or None where it was made."""
+    return next(((key, run.case[key]) for key in ("ice.outlines", "ice.field") if run.case.get(key, "none") not in ("", "none")), None)
+
+
+def not_used(key, ice):
+    """Why a key of ice that is made says nothing of this run, or None."""
+    if ice is None or key not in MADE + THICKNESS:
+        return None
+    return None if ice[0] == "ice.outlines" and key in THICKNESS else f"not used: the ice is read by {ice[0]}"
+
+
+def spread(values, unit):
+    """Mean and range of a quantity over the floes, in words."""
+    low, mean, high = np.min(values), np.mean(values), np.max(values)
+    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
+
+
+def of_field(run):
+    """[Value] of the ice as it was, where it was read from a file: the keys for ice that is made say nothing of it."""
+    ice = source_of_ice(run)
+    if ice is None or not run.n_floes:
+        return []
+    said = f"counted in the ice that {ice[0]} read"
+    rows = (("floes", str(run.n_floes), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}", "area fraction of ice in the ice region at the start, before a lead"),
+            ("floe size", spread(np.sqrt(4 * run.area / np.pi), "m"), "diameter of the circle of a floe's area: mean and range"),
+            ("floe thickness", spread(run.thickness, "m"), "mean and range"))
+    return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
+
+
 def values(run):
     """[Value] of every key of the resolved case, in its order."""
+    ice = source_of_ice(run)
     given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), of_study(run), []
     for key, (value, meaning) in annotated(run.resolved_text).items():
-        if key in by_hand:
+        unused = not_used(key, ice)
+        if unused:
+            kind, origin = "unused", unused
+        elif key in by_hand:
             kind, origin = "set", "set on the command line; no source stated"
         elif key in study:
             kind = classify(study[key]) or "study"
