@@ -17,7 +17,7 @@ KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "giv
 
 #: keys of ice that is made, which mean nothing where it is read
 MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread", "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
-#: used where outlines have no thickness of their own; a field file always has one
+#: used for outlines that have no thickness of their own; a field file always has one
 THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
 
@@ -102,16 +102,19 @@ def of_default(meaning):
     return ("source", f"default: {source[1]}") if source else ("default", "")
 
 
-def source_of_ice(run):
-    """(key, file) by which the ice was read, or None where it was made."""
-    return next(((key, run.case[key]) for key in ("ice.outlines", "ice.field") if run.case.get(key, "none") not in ("", "none")), None)
+def source_of_ice(case):
+    """Key by which the ice was read, or None where it was made; case: {key: text}."""
+    return next((key for key in ("ice.outlines", "ice.field") if case.get(key, "none") not in ("", "none")), None)
 
 
-def not_used(key, ice):
-    """Why a key of ice that is made says nothing of this run, or None."""
-    if ice is None or key not in MADE + THICKNESS:
-        return None
-    return None if ice[0] == "ice.outlines" and key in THICKNESS else f"not used: the ice is read by {ice[0]}"
+def not_used(run, case):
+    """{key: why} of the keys of ice that is made, which say nothing of a run that read its ice; case: {key: text}."""
+    ice = source_of_ice(case)
+    if ice is None:
+        return {}
+    thickness = run.value("ice.thickness")
+    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
+    return {key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness") for key in (MADE if asked else MADE + THICKNESS)}
 
 
 def spread(values, unit):
@@ -122,10 +125,10 @@ def spread(values, unit):
 
 def of_field(run):
     """[Value] of the ice as it was, where it was read from a file: the keys for ice that is made say nothing of it."""
-    ice = source_of_ice(run)
+    ice = source_of_ice(run.case)
     if ice is None or not run.n_floes:
         return []
-    said = f"counted in the ice that {ice[0]} read"
+    said = f"counted in the ice that {ice} read"
     rows = (("floes", str(run.n_floes), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}", "area fraction of ice in the ice region at the start, before a lead"),
             ("floe size", spread(np.sqrt(4 * run.area / np.pi), "m"), "diameter of the circle of a floe's area: mean and range"),
             ("floe thickness", spread(run.thickness, "m"), "mean and range"))
@@ -134,12 +137,12 @@ def of_field(run):
 
 def values(run):
     """[Value] of every key of the resolved case, in its order."""
-    ice = source_of_ice(run)
+    resolved = annotated(run.resolved_text)
+    unused = not_used(run, {key: value for key, (value, _) in resolved.items()})
     given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), of_study(run), []
-    for key, (value, meaning) in annotated(run.resolved_text).items():
-        unused = not_used(key, ice)
-        if unused:
-            kind, origin = "unused", unused
+    for key, (value, meaning) in resolved.items():
+        if key in unused:
+            kind, origin = "unused", unused[key]
         elif key in by_hand:
             kind, origin = "set", "set on the command line; no source stated"
         elif key in study:
