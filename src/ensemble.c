@@ -99,14 +99,17 @@ static int check_member(ensemble *e, entry *x, bt_errors *told_of)
     bt_status status = bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &why);
     if (status == BT_ERR_CASE) {
         const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
-        if (fd >= 0 && bt_member_take_lock(fd, false)) { // another process may have taken it away, and even finished it, meanwhile
-            bt_errors again = {0};
-            if (bt_ensemble_state(x->folder, NULL, NULL) == BT_MEMBER_FINISHED && bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) != BT_OK) {
-                status = bt_member_record_forget(x->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
-                journal(e, "unsound", &x->m, 0, (int)status);
-            }
-            bt_errors_free(&again);
+        bt_errors again = {0};
+        if (fd < 0 || !bt_member_take_lock(fd, false) || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+            bt_errors_free(&why); // another process has found it out, too
+        } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
+            bt_errors_free(&why); // and made it good meanwhile
+            status = BT_OK;
+        } else {
+            status = bt_member_record_forget(x->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
+            journal(e, "unsound", &x->m, 0, (int)status);
         }
+        bt_errors_free(&again);
         if (fd >= 0) close(fd);
     }
     for (size_t k = 0; k < why.n && k < 1; k++)

@@ -187,3 +187,28 @@ def test_a_failed_member_stays_a_hole(tmp_path):
     write_case(tmp_path, BASE, "base.yml")
     (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "parameters": {"run.duration": [8, 3]}}))
     assert [ensemble(tmp_path).returncode for _ in range(2)] == [CASE, CASE]
+
+
+def test_damage_while_a_call_is_at_work(tmp_path):
+    """A member that was sound when the call began is looked at again when it is taken in."""
+    write_case(tmp_path, BASE, "base.yml")
+    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "variants": {"long": {"run.duration": "150 s", "tow.speed": 0.04}, "short": {"run.duration": 6}}}))
+    short, long_one = (tmp_path / "all/members" / name for name in ("c002-r001", "c001-r001"))
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    assert child.wait(timeout=60) == DONE
+    (long_one / "finished").unlink()
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    while started(tmp_path).count(long_one.name) < 2:
+        time.sleep(0.01)
+    flip(short / "result.h5", -1)
+    told = child.communicate(timeout=60)[1]
+    assert child.returncode == IO and "member c002-r001 is not sound: all/members/c002-r001/result.h5: has changed since the member finished; the same call runs it again" in told
+    with h5py.File(tmp_path / "all/ensemble.h5") as f:
+        assert list(f["members/status"][()]) == [1, 0] and f.attrs["complete"] == 0 and "is not sound and is made again" in f["members/reason"].asstr()[1]
+    assert ensemble(tmp_path).returncode == DONE
+
+
+def test_ensemble_file_is_made_anew_whatever_it_was(quiet, copy):
+    flip(copy / "all/ensemble.h5", -1)
+    assert ensemble(copy).returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == [] and (copy / "all/ensemble.h5").read_bytes().startswith(b"bergtow sealed file\nkind: ensemble 1\n")
