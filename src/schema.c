@@ -73,7 +73,7 @@ const bt_key bt_case_keys[] = {
     REAL("domain.ahead", domain.ahead, LENGTH, "= from body.x to the end ahead of the tow; 0.6 domain.length where that and body.x are open and the ends moving", "(0, 1e7]",
          "distance from the body to the end ahead of it, which ends: moving keeps; without body.x it says where the body stands; the default is assumed"),
 
-    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "area fraction of ice in the ice region less the body's footprint, 0 = open water; no default in the geographic frame"),
+    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "area fraction of ice in the ice region less the body's footprint, 0 = open water; as ice.size and ice.thickness, no default in the geographic frame"),
     REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
     REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
@@ -89,7 +89,7 @@ const bt_key bt_case_keys[] = {
     REAL("ice.size_max", ice.size_max, LENGTH, "0 m", "[0, 1e5]", "largest diameter, needed by law power; 0 = no limit"),
     REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
          "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
-    REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness; no default in the geographic frame; assumed"),
+    REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
     CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes"),
     REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
     REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
