@@ -81,8 +81,8 @@ def members(e, s):
     by_name, out = {row["name"]: row for row in s["members"]}, []
     for m in range(e.n):
         row = by_name.get(e.name[m])
-        mean, interval = report_run.with_error(row["mean"], row["se_within"]) if row else ("–", "–")
-        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean,
+        mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
+        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
                     "doubts": ", ".join(sorted(e.doubts(m))), "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []})
     return out
 

@@ -140,9 +140,21 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
                       0.1 * s.size / bt_case_reference_speed(c));
 }
 
+/// Is the ramp long for the body on its line, or a programme given instead?
+static bool start_is_slow(const bt_case *c) { return c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12); }
+
+static void warn_of_start(const bt_case *c, bt_errors *warnings)
+{
+    const bool line = c->body.shape != BT_BODY_ABSENT && (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST);
+    if (line && !start_is_slow(c))
+        bt_errors_add(warnings, "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks it; take at least %.3g s", c->tow.ramp, bt_case_line_period(c),
+                      BT_RAMP_PERIODS * bt_case_line_period(c));
+}
+
 void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
     warn_of_step(c, n, warnings);
+    warn_of_start(c, warnings);
 }
 
 static void print_ice(const bt_case *c, const bt_check_ice *n)
@@ -164,9 +176,8 @@ static void print_line(const bt_case *c)
     if (c->tow.line.type != BT_ROPE_NUMBERS)
         printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
                rope.stiffness, rope.breaking, rope.source);
-    const double period = bt_case_line_period(c);
-    const char *verdict = c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * period * (1 - 1e-12) ? "ok" : "TOO SHORT: the start jerks the line";
-    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", period, c->tow.ramp, BT_RAMP_PERIODS, verdict);
+    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
+           start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
     printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,

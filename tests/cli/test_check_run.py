@@ -66,6 +66,13 @@ def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
     assert good.splitlines()[0].endswith("case.yml: valid") and "warning" not in good
 
 
+def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
+    line = {"mode": "line", "speed": 0.13, "line_length": 3, "line_stiffness": 1000}
+    lines = call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 1}))).stdout.splitlines()
+    assert lines[0].endswith("valid, with 1 warning") and lines[-1] == lines[0] and lines[-2].startswith("warning              tow.ramp: 1 s is short for a body that swings on its line")
+    assert "warning" not in call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 100}))).stdout
+
+
 def test_warnings_of_a_study(tmp_path):
     write_case(tmp_path, TOW, "base.yml")
     (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2]}}')

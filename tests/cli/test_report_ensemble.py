@@ -79,7 +79,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
 def test_every_member_stands_there_with_its_doubts(page, study):
     rows = {row[0]: row for row in tables(page)["Members"][1:]}
     assert len(rows) == 10
-    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][5] == "jammed" and rows["c001-r001"][5] == "none"
+    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][6] == "jammed" and rows["c001-r001"][6] == "none"
     details = {d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent") for d in page.find_elements("css selector", "#members details")}
     assert set(details) == {"c001-r004: failed", "c002-r002: 1 warning"} and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
     warning = page.find_element("css selector", ".warning").text
