@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Statistics of an ensemble: means with intervals, estimates beside them, distributions, extreme peaks, sensitivity; as text, CSV and JSON.
 
-Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder.
+Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder. Where members of the study are in no number
+(they wait, failed, are not sound, or have no mean), all is written, they are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
 """
 import argparse
 import csv
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import command
 import ensemble_text
+import soundness
 import stat_extreme
 import stat_fit
 import stat_mean
@@ -119,9 +121,16 @@ def nothing_to_count(e, dropped):
     failed = e.reasons(FAILED)
     name, why = next(iter(failed.items()), (None, None))
     told = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
+    if e.unsound:
+        return RunError(e.file, f"has no sound member{told}; {e.holes()}", "run `bergtow ensemble` again: it runs them anew")
     if np.any(e.status == FINISHED):
         return RunError(e.file, f"has no member with a mean ice resistance{told}", "tow a body, for longer than output.window_start")
     return RunError(e.file, f"has no member that has finished{told}", "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
+
+
+def waiting(e):
+    """Names of members that are still to come."""
+    return [e.name[m] for m in np.flatnonzero(e.status == WAITING) if e.name[m] not in e.unsound]
 
 
 def statistics(e, options):
@@ -132,7 +141,7 @@ def statistics(e, options):
     members = {int(m): member(e, m) for m in e.used}
     conditions = [condition(e, c, members, options) for c in e.conditions()]
     return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error, "excluded": dropped, "exclude": sorted(options.exclude),
-            "failed": e.reasons(FAILED), "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": int(e.texts_missing), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
+            "failed": e.reasons(FAILED), "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder, "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(), "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
             "members": list(members.values())}
 
 
@@ -207,6 +216,7 @@ def main(argv=None):
     p.add_argument("--gap", type=float, metavar="S", help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
     p.add_argument("--blocks", type=whole, metavar="K", help="blocks a field for block maxima (default: so many that there are 20)")
     p.add_argument("--resamples", type=whole, default=stat_fit.RESAMPLES, metavar="B", help="resamples for p-values and return levels (default %(default)s)")
+    p.add_argument("--partial", action="store_true", help="exit with 0 even where members of the study are in no number")
     a = p.parse_args(argv)
     e = Ensemble(a.folder)
     s = statistics(e, a)
@@ -214,6 +224,8 @@ def main(argv=None):
     write(s, folder)
     print(ensemble_text.report(s, a.markdown))
     print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
+    if s["holes"] and not a.partial:
+        raise RunError(e.path, s["holes"], "run `bergtow ensemble` again, with --retry-failed for those that failed, or take what there is with --partial")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,8 @@
     time, ice = e.series(m)                        # of member m, all of its run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
-ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. Errors: RunError.
+ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. It is read only under a sound seal, and a member whose files do not
+fit the record of its end (soundness.py) counts as waiting: it is in no number until `bergtow ensemble` has run it again. Errors: RunError.
 """
 import json
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+import soundness
 from bergtow_read import Run, RunError
 
 WAITING, FINISHED, FAILED = 0, 1, 2
@@ -61,8 +63,13 @@ def short_key(key):
     return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
 
 
+def listed(names, most=8):
+    """Names in a row, the first of many."""
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
 class Ensemble:
-    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M]."""
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M]; unsound: {name: why}."""
 
     def __init__(self, path):
         self.path = Path(path)
@@ -73,11 +80,15 @@ class Ensemble:
             raise RunError(self.path, "holds no ensemble.h5", "give the folder that `bergtow ensemble -o` wrote, or run it again")
         try:
             self._read()
+            self.unsound = self._unsound()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
             raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})", "run `bergtow ensemble` again: it makes the file anew") from None
         self._dropped = {}
 
     def _read(self):
+        fault = soundness.broken_seal(self.file, "ensemble 1") if soundness.available() else None
+        if fault:
+            raise RunError(self.file, fault, "run `bergtow ensemble` again: it makes the file anew")
         with h5py.File(self.file, "r") as f:
             self.attributes = dict(f.attrs)
             for key in ("id", "condition", "repeat", "seed", "status"):
@@ -95,6 +106,16 @@ class Ensemble:
         self.n = len(self.name)
         title = self.attributes.get("title", b"")
         self.title = (title.decode() if isinstance(title, bytes) else str(title)) or self.path.resolve().name
+
+    def _unsound(self):
+        """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
+        out = {self.name[m]: self.reason[m].strip() for m in np.flatnonzero(self.status == WAITING) if self.reason[m].startswith("its result")}
+        for m in np.flatnonzero(self.status == FINISHED) if soundness.available() else ():
+            why = soundness.fault_of_member(self.folder(m), self.name[m], self.study.encode()) if self.folder(m).is_dir() else None
+            if why:
+                out[self.name[m]] = why
+                self.status[m], self.reason[m] = WAITING, f"its result is not sound: {why}"
+        return out
 
     def number(self, key, m):
         """A number of a member's summary, NaN where there is none."""
@@ -160,16 +181,30 @@ class Ensemble:
     @cached_property
     def behind(self):
         """Members that have finished since ensemble.h5 was made."""
-        return [self.name[m] for m in np.flatnonzero(self.status == WAITING) if (self.folder(m) / "finished").exists()]
+        return [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()]
 
     def reasons(self, status):
         """{name: why} of the members that failed, or of the waiting ones whose process died."""
-        return {self.name[m]: self.reason[m].strip() or "no reason recorded" for m in np.flatnonzero(self.status == status) if self.reason[m] or status == FAILED}
+        return {self.name[m]: self.reason[m].strip() or "no reason recorded" for m in np.flatnonzero(self.status == status)
+                if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound}
+
+    @cached_property
+    def without_folder(self):
+        """Finished members whose folder is not there: their warnings are known by numbers alone."""
+        return [self.name[m] for m in np.flatnonzero(self.status == FINISHED) if not self.folder(m).is_dir()]
 
     @property
-    def texts_missing(self):
-        """Finished members whose summary.json is not there: their warnings are known by numbers alone."""
-        return sum(not (self.folder(m) / "summary.json").exists() for m in np.flatnonzero(self.status == FINISHED))
+    def without_mean(self):
+        """Finished members that have no mean ice resistance."""
+        mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
+        return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(mean))]
+
+    def holes(self):
+        """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where nothing is missing."""
+        waiting = [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound]
+        kinds = (("not sound", list(self.unsound)), ("waiting", waiting), ("failed", [self.name[m] for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
+        parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
+        return f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}" if parts else ""
 
     def exclude(self, kinds):
         """Leave members with these doubts out from here on; returns {name: kinds} of those dropped."""

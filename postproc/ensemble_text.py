@@ -3,6 +3,7 @@
 import numpy as np
 
 import style
+from ensemble_read import listed
 
 SHORT = {"lichey_hellmer": "Lichey–Hellmer", "marchenko_compaction": "compaction", "marchenko_rafting": "rafting", "marchenko_momentum": "momentum",
          "dilute_limit": "dilute", "open_water_drag": "open water"}
@@ -50,7 +51,7 @@ def unit_of(s):
 
 def means(s, markdown):
     factor, unit = unit_of(s)
-    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields", "se in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
+    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields", "standard error in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
     rows = []
     for c in s["conditions"]:
         r = c["resistance"]
@@ -61,7 +62,7 @@ def means(s, markdown):
                      number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–", number(r["sd_between"] / factor), number(r["se_within"] / factor),
                      f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth of the fields at each end (from 8 fields on). "
-            "Sd of fields: between the means of runs; se in a run: of one run's mean, by its correlation time. "
+            "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by its correlation time. "
             "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, S short window, X stopped early, O other warning.")
     return table(head, rows, markdown) + "\n\n" + note
 
@@ -156,22 +157,28 @@ def report(s, markdown=False):
     mark = "## " if markdown else ""
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [f"{mark}{s['title']}", "", (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."]
-    waiting = sum(c["members"]["waiting"] for c in s["conditions"])
-    if waiting:
-        lines.append(f"The ensemble is not complete: {counted(waiting)} to come, and in no number. The longest are run first, so conditions have unlike numbers of fields.")
+    if s["waiting"]:
+        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number ({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields.")
+    if s["unsound"]:
+        name, why = next(iter(s["unsound"].items()))
+        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: {name}: {why}. `bergtow ensemble` again runs what is damaged anew.")
+    if s["without_mean"]:
+        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no steady window, or no body.")
+    if not s["checked"]:
+        lines.append("Whether the files are as they were written was not checked: this machine has neither libxxhash nor the Python package xxhash.")
     if s["behind"]:
         lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in.")
     for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
-            lines.append(f"{counted(len(s[kind]))} {told}; the first: {name}: {why}")
+            lines.append(f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the first: {name}: {why}")
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " + ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
     if s["members_without_folder"]:
-        lines.append(f"{counted(s['members_without_folder'])} {'has' if s['members_without_folder'] == 1 else 'have'} no folder here: their warnings are known by numbers alone, their peaks not at all.")
+        lines.append(f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their peaks not at all.")
     heavy = [c["label"] for c in s["conditions"] if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")

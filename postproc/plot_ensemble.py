@@ -8,6 +8,7 @@
     sensitivity.png   Sobol indices and partial rank correlations
 """
 import argparse
+import sys
 from pathlib import Path
 
 import command
@@ -410,6 +411,8 @@ def main(argv=None):
         print(f"left out: {name} ({', '.join(kinds)})")
     if not len(e.used):
         raise nothing_to_count(e, dropped)
+    if e.holes():
+        print(f"plot_ensemble.py: warning: {e.holes()}", file=sys.stderr)
     drawn = pictures(e, a)
     if not drawn:
         raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")

@@ -8,10 +8,17 @@ import re
 import shlex
 from dataclasses import dataclass
 
+import numpy as np
 import yaml
 
 #: kind: what the label says
-KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default"}
+KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default", "field": "as read",
+         "unused": "not used"}
+
+#: keys of ice that is made, which mean nothing where it is read
+MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread", "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
+#: used for outlines that have no thickness of their own; a field file always has one
+THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
 
 @dataclass(frozen=True)
@@ -95,11 +102,48 @@ def of_default(meaning):
     return ("source", f"default: {source[1]}") if source else ("default", "")
 
 
+def source_of_ice(case):
+    """Key by which the ice was read, or None where it was made; case: {key: text}."""
+    return next((key for key in ("ice.outlines", "ice.field") if case.get(key, "none") not in ("", "none")), None)
+
+
+def not_used(run, case):
+    """{key: why} of the keys of ice that is made, which say nothing of a run that read its ice; case: {key: text}."""
+    ice = source_of_ice(case)
+    if ice is None:
+        return {}
+    thickness = run.value("ice.thickness")
+    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
+    return {key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness") for key in (MADE if asked else MADE + THICKNESS)}
+
+
+def spread(values, unit):
+    """Mean and range of a quantity over the floes, in words."""
+    low, mean, high = np.min(values), np.mean(values), np.max(values)
+    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
+
+
+def of_field(run):
+    """[Value] of the ice as it was, where it was read from a file: the keys for ice that is made say nothing of it."""
+    ice = source_of_ice(run.case)
+    if ice is None or not run.n_floes:
+        return []
+    said = f"counted in the ice that {ice} read"
+    rows = (("floes", str(run.n_floes), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}", "area fraction of ice in the ice region at the start, before a lead"),
+            ("floe size", spread(np.sqrt(4 * run.area / np.pi), "m"), "diameter of the circle of a floe's area: mean and range"),
+            ("floe thickness", spread(run.thickness, "m"), "mean and range"))
+    return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
+
+
 def values(run):
     """[Value] of every key of the resolved case, in its order."""
+    resolved = annotated(run.resolved_text)
+    unused = not_used(run, {key: value for key, (value, _) in resolved.items()})
     given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), of_study(run), []
-    for key, (value, meaning) in annotated(run.resolved_text).items():
-        if key in by_hand:
+    for key, (value, meaning) in resolved.items():
+        if key in unused:
+            kind, origin = "unused", unused[key]
+        elif key in by_hand:
             kind, origin = "set", "set on the command line; no source stated"
         elif key in study:
             kind = classify(study[key]) or "study"

@@ -4,6 +4,7 @@
 The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the same.
 """
 import argparse
+import sys
 from dataclasses import replace
 from itertools import groupby
 
@@ -80,8 +81,8 @@ def members(e, s):
     by_name, out = {row["name"]: row for row in s["members"]}, []
     for m in range(e.n):
         row = by_name.get(e.name[m])
-        mean, interval = report_run.with_error(row["mean"], row["se_within"]) if row else ("–", "–")
-        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean,
+        mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
+        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
                     "doubts": ", ".join(sorted(e.doubts(m))), "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []})
     return out
 
@@ -128,6 +129,8 @@ def context(folder):
     """Everything that page/ensemble.html sets. Errors: RunError."""
     e, options = Ensemble(folder), argparse.Namespace(**OPTIONS)
     s = ensemble.statistics(e, options)
+    if s["holes"]:
+        print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
     rows, other_builds = provenance(e)
     title = report_run.breakable(e.title)

@@ -220,7 +220,7 @@ def key_values(run, values):
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
-        out[heading] = [by_key[k] for k in keys if k in by_key and by_key[k].value not in ("", "none", UNSET.get(k))
+        out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in ("", "none", UNSET.get(k))
                         and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())]
     return out
 

@@ -274,6 +274,27 @@ static void check_sizes(const check *k)
         fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n, BT_MOST_FLOES);
 }
 
+// The defaults of ice and body are those of a model basin. At full scale a number that nobody gave would look like an answer.
+static void check_geographic(const check *k)
+{
+    const bt_case *c = k->c;
+    if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !sound(k, "domain.frame")) return;
+    const bool read = c->ice.field || c->ice.outlines, made = !read && !(given(k, "ice.concentration") && c->ice.concentration == 0), body = c->body.shape != BT_BODY_ABSENT;
+    bool by_hand = false; // floes of the list without a thickness of their own
+    for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || c->floes[i].thickness == c->ice.thickness;
+    const struct {
+        const char *key, *what;
+        bool needed;
+    } keys[] = {{"ice.concentration", "area fraction of ice, as in 50 %, or 0 for open water", !read},
+                {"ice.size", "mean floe diameter, as in 30 m", made && c->ice.size_law != BT_SIZE_POWER}, // that asks for both its ends
+                {"ice.thickness", "mean floe thickness, as in 1 m", made || by_hand},
+                {"body.length", "length of the towed body, as in 80 m, or set body.shape: none", body && c->body.shape != BT_BODY_POLYGON},
+                {"body.draft", "its depth below the waterline, as in 60 m, or set body.shape: none", body}};
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        if (keys[i].needed && !given(k, keys[i].key))
+            fault(k, keys[i].key, "missing, and in domain.frame: geographic it has no default (that would be a model basin's); add it (%s)", keys[i].what);
+}
+
 static void check_outlines(const check *k)
 {
     const bt_case *c = k->c;
@@ -460,6 +481,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check_run(&k);
     check_domain(&k);
     check_region(&k);
+    check_geographic(&k);
     check_sizes(&k);
     check_outlines(&k);
     double v[2 * BT_MAX_VERTICES];

@@ -5,8 +5,9 @@
 // much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
 #include "bergtow/environment.h"
 #include "bergtow/field.h"
-#include "bergtow/rope.h"
 #include "bergtow/lead.h"
+#include "bergtow/rope.h"
+#include "bergtow/setup.h"
 #include "bergtow/shape.h"
 #include "case_check.h"
 #include "cmd.h"
@@ -80,7 +81,12 @@ static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)
     return n;
 }
 
-bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f) { return c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c); }
+bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f)
+{
+    bt_check_ice n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    n.corners = bt_cost_corners(c, f, n.count);
+    return n;
+}
 
 bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
 {
@@ -94,7 +100,62 @@ bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
 
 double bt_check_seconds(const bt_case *c, const bt_check_ice *n) { return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration); }
 
-bt_status bt_check_read_ice(const bt_case *c, bt_field *f, bt_errors *err) { return c->ice.field || c->ice.outlines ? bt_field_load(c, f, err) : BT_OK; }
+// --- refusals and warnings -------------------------------------------------------------------------------------------
+
+static bool reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
+
+/// Bodies, walls and floes that are known, as the run sets them up.
+static bt_status try_setup(const bt_case *c, const bt_field *f, bt_errors *err)
+{
+    bt_world *w = NULL;
+    bt_roster r = {0};
+    const bt_status status = bt_setup_world(c, f, &w, &r, err);
+    bt_roster_free(&r);
+    bt_world_free(w);
+    return status;
+}
+
+bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run, bt_lead_stats *lead, bt_errors *err)
+{
+    const double machine = bt_cost_machine();
+    bt_status status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, machine, err);
+    if (status == BT_OK && reads_field(c)) status = bt_field_load(c, f, err);
+    if (status == BT_OK && reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
+    if (status != BT_OK) return status;
+    *n = *run = bt_check_ice_of(c, f);
+    if (reads_field(c) && c->lead.mode != BT_LEAD_NONE) {
+        status = bt_lead_open(c, f, lead, err);
+        if (status == BT_OK) *run = bt_check_ice_of(c, f);
+    }
+    return status == BT_OK ? try_setup(c, f, err) : status;
+}
+
+static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+{
+    const bt_check_step s = bt_check_step_of(c, n);
+    if (!s.contact)
+        bt_errors_add(warnings, "run.dt: %g s is longer than a collision lasts %s; take at most %g s", c->run.dt, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", s.longest);
+    if (!s.floes)
+        bt_errors_add(warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s", c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed,
+                      0.1 * s.size / bt_case_reference_speed(c));
+}
+
+/// Is the ramp long for the body on its line, or a programme given instead?
+static bool start_is_slow(const bt_case *c) { return c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12); }
+
+static void warn_of_start(const bt_case *c, bt_errors *warnings)
+{
+    const bool line = c->body.shape != BT_BODY_ABSENT && (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST);
+    if (line && !start_is_slow(c))
+        bt_errors_add(warnings, "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks it; take at least %.3g s", c->tow.ramp, bt_case_line_period(c),
+                      BT_RAMP_PERIODS * bt_case_line_period(c));
+}
+
+void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+{
+    warn_of_step(c, n, warnings);
+    warn_of_start(c, warnings);
+}
 
 static void print_ice(const bt_case *c, const bt_check_ice *n)
 {
@@ -115,9 +176,8 @@ static void print_line(const bt_case *c)
     if (c->tow.line.type != BT_ROPE_NUMBERS)
         printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
                rope.stiffness, rope.breaking, rope.source);
-    const double period = bt_case_line_period(c);
-    const char *verdict = c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * period * (1 - 1e-12) ? "ok" : "TOO SHORT: the start jerks the line";
-    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", period, c->tow.ramp, BT_RAMP_PERIODS, verdict);
+    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
+           start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
     printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,
@@ -184,19 +244,15 @@ static void print_window(const bt_case *c)
            c->domain.length - c->domain.ahead, way / c->domain.length);
 }
 
-/// With a field file as it will be; of a field that is still to be made, the strip.
-static bt_status print_lead(const bt_case *c, bt_field *f, bt_errors *err)
+/// With a field that was read as it will be; of a field that is still to be made, the strip.
+static void print_lead(const bt_case *c, const bt_lead_stats *lead)
 {
-    if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
+    if (c->lead.mode == BT_LEAD_NONE) return;
     printf("lead                 %s, %.4g m wide, %.4g m long, %.4g m2 of strip", c->lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed", c->lead.width, c->lead.length,
            c->lead.width * c->lead.length);
     if (c->lead.mode == BT_LEAD_MANAGED) printf(", pieces of at most %.4g m", c->lead.floe_size);
     printf("\n");
-    if (!c->ice.field) return BT_OK;
-    bt_lead_stats s;
-    bt_status status = bt_lead_open(c, f, &s, err);
-    if (status == BT_OK) bt_lead_stats_print(&s);
-    return status;
+    if (reads_field(c)) bt_lead_stats_print(lead);
 }
 
 static void print_environment(const bt_case *c)
@@ -226,19 +282,49 @@ static void print_step(const bt_case *c, const bt_check_ice *n)
     printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed, s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, verdict(s.floes));
 }
 
-static void print_cost(const bt_case *c, const bt_check_ice *n)
+static const char *bytes(double b, char out[32])
+{
+    snprintf(out, 32, b < 999.5e6 ? "%.3g MB" : b < 999.5e9 ? "%.3g GB" : "%.3g TB", b < 999.5e6 ? b / 1e6 : b < 999.5e9 ? b / 1e9 : b / 1e12);
+    return out;
+}
+
+/// n: the ice of the run, with its lead.
+static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice *n)
 {
     const double per_step = bt_cost_floe_step(n->concentration), seconds = bt_check_seconds(c, n);
-    double frames = c->run.duration / c->output.frame_interval;
-    printf("memory               about %.3g MB\n", bt_cost_memory(c, n->count, 1, 1) / 1e6);
-    printf("frames               %.0f, about %.3g MB on disk\n", floor(frames) + 1, frames * n->count * 32 / 1e6);
-    printf("wall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
+    const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size), several = bt_cost_disk_of(c, n->count, n->corners, 2);
+    char a[32], b[32], e[32];
+    printf("memory               about %s\n", bytes(bt_cost_memory(c, n->count, comm->size, comm->ranks_here), a));
+    printf("frames               %.0f\n", bt_cost_frames(c));
+    printf("disk                 about %s, up to %s while it runs", bytes(bt_cost_left(&d), a), bytes(d.most, b));
+    if (comm->size == 1) printf("; %s from several ranks, which do not compress", bytes(bt_cost_left(&several), e));
+    printf("\nwall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
+}
+
+static const char *warned(size_t n, char out[64])
+{
+    snprintf(out, 64, n ? ", with %zu warning%s" : "", n, n > 1 ? "s" : "");
+    return out;
+}
+
+static void print_warnings(const char *path, const bt_errors *w)
+{
+    char text[64];
+    for (size_t i = 0; i < w->n; i++) printf("warning              %s\n", w->text[i]);
+    if (w->n) printf("%s: valid%s\n", path, warned(w->n, text));
 }
 
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
-    const bt_check_ice n = bt_check_ice_of(c, f);
-    printf("%s: valid\n", path);
+    const bt_comm *comm = bt_comm_world();
+    bt_check_ice n, run;
+    bt_lead_stats lead = {0};
+    const bt_status status = bt_check_ready(c, comm, f, &n, &run, &lead, err);
+    if (status != BT_OK) return status;
+    bt_errors warnings = {0};
+    char text[64];
+    bt_check_warn(c, &n, &warnings);
+    printf("%s: valid%s\n", path, warned(warnings.n, text));
     if (c->run.title) printf("title                %s\n", c->run.title);
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
@@ -247,10 +333,12 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     print_body(c);
     print_window(c);
     print_environment(c);
-    const bt_status status = print_lead(c, f, err);
+    print_lead(c, &lead);
     print_step(c, &n);
-    print_cost(c, &n);
-    return status;
+    print_cost(c, comm, &run);
+    print_warnings(path, &warnings);
+    bt_errors_free(&warnings);
+    return BT_OK;
 }
 
 static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
@@ -286,7 +374,6 @@ int bt_cmd_check(int argc, char **argv)
     }
     bt_field_init(&f);
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK) status = bt_check_read_ice(&c, &f, &err);
     if (status == BT_OK && o.scale > 0) status = print_twin(&c, o.scale, &err);
     else if (status == BT_OK) status = print_numbers(o.file.path, &c, &f, &err);
     bt_field_free(&f);

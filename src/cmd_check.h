@@ -5,9 +5,11 @@
 
 #include "bergtow/case.h"
 #include "bergtow/field.h"
+#include "bergtow/lead.h"
 
 typedef struct bt_check_ice {
     double count, size, thickness, concentration; ///< number, mean diameter m, mean thickness m, area fraction
+    double corners; ///< of all floes
 } bt_check_ice;
 
 /// The time step against the rule in cmd_check.c.
@@ -18,8 +20,13 @@ typedef struct bt_check_step {
     bool contact, floes; ///< is the step short enough for a collision; for the floes
 } bt_check_step;
 
-/// The field that the case reads, if any. Errors: BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_check_read_ice(const bt_case *c, bt_field *f, bt_errors *err);
+/// Everything for which `run` would refuse the case before its first step, in the same words, as far as it shows without making a field: size against memory and
+/// disk, the field that is read, its lead, bodies that meet or have no room. f: the field that was read, or none; n: of the ice before the lead is opened, and
+/// how it is for the run: *run. lead: of a field that was read. Errors: BT_ERR_CASE, BT_ERR_IO.
+struct bt_comm;
+bt_status bt_check_ready(const bt_case *c, const struct bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run, bt_lead_stats *lead, bt_errors *err);
+/// What a run would go through and a user should know before: appended to the list, a sentence each.
+void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings);
 /// Of the field that was read, or expected of the one that will be made.
 bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f);
 bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n);

@@ -24,8 +24,9 @@ enum {
 
 // Of the first member of a condition.
 typedef struct {
-    double floes, steps, seconds, memory, result; // number, number, s of one core, B, B
+    double floes, steps, seconds, memory, disk; // number, number, s of one core, B, B
     bool step_good;
+    int warnings;
 } numbers;
 
 typedef struct {
@@ -100,16 +101,21 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
     bt_member m;
     bt_case c;
     bt_field f;
-    bt_lead_stats lead;
     bt_field_init(&f);
     bt_study_member(s, condition * s->repeats, &m);
+    const bt_comm ranks = {.mpi = MPI_COMM_NULL, .size = (int)s->ranks, .ranks_here = (int)s->ranks};
+    bt_check_ice n, run;
+    bt_lead_stats lead = {0};
     bt_status status = bt_member_case(s, &m, &c, err);
-    if (status == BT_OK) status = bt_check_read_ice(&c, &f, err);
-    if (status == BT_OK && c.ice.field && c.lead.mode != BT_LEAD_NONE) status = bt_lead_open(&c, &f, &lead, err);
+    if (status == BT_OK) status = bt_check_ready(&c, &ranks, &f, &n, &run, &lead, err);
     if (status == BT_OK) {
-        const bt_check_ice n = bt_check_ice_of(&c, &f);
         const bt_check_step step = bt_check_step_of(&c, &n);
-        *x = (numbers){n.count, (double)bt_case_steps(&c), bt_check_seconds(&c, &n), bt_cost_memory(&c, n.count, (int)s->ranks, (int)s->ranks), bt_cost_result(&c, n.count), step.contact && step.floes};
+        const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
+        bt_errors warnings = {0};
+        bt_check_warn(&c, &n, &warnings);
+        *x = (numbers){n.count, (double)bt_case_steps(&c), bt_check_seconds(&c, &n), bt_cost_memory(&c, n.count, ranks.size, ranks.size), bt_cost_member(&c, &disk),
+                       step.contact && step.floes, (int)warnings.n};
+        bt_errors_free(&warnings);
     }
     bt_field_free(&f);
     bt_case_free(&c);
@@ -245,13 +251,17 @@ static void print_range(const bt_study *s, const numbers *x)
 
 static void print_study(const bt_study *s, const numbers *x)
 {
-    double seconds = 0, memory = 0, result = 0;
+    double seconds = 0, memory = 0, disk = 0;
+    int64_t warned = 0;
     for (int64_t k = 0; k < s->n_conditions; k++) {
         seconds += x[k].seconds * (double)s->repeats;
-        result += x[k].result * (double)s->repeats;
+        disk += x[k].disk * (double)s->repeats;
+        warned += x[k].warnings > 0;
         memory = bt_max(memory, x[k].memory);
     }
-    printf("%s: valid\n", s->path);
+    char verdict_of_all[96] = "valid";
+    if (warned) snprintf(verdict_of_all, sizeof verdict_of_all, "valid, with warnings in %" PRId64 " of %" PRId64 " conditions", warned, s->n_conditions);
+    printf("%s: %s\n", s->path, verdict_of_all);
     if (s->title) printf("title                %s\n", s->title);
     printf("base                 %s\n", s->base);
     print_sets("set", s->set, s->n_set);
@@ -264,8 +274,9 @@ static void print_study(const bt_study *s, const numbers *x)
     else print_range(s, x);
     char text[CELL];
     printf("memory               about %.3g MB for one member\n", memory / 1e6);
-    printf("disk                 at most about %.3g %s\n", result / (result < 1e9 ? 1e6 : 1e9), result < 1e9 ? "MB" : "GB");
+    printf("disk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9), disk < 1e9 ? "MB" : "GB");
     printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
+    if (warned) printf("%s: %s; `bergtow check` of the base with --set says which\n", s->path, verdict_of_all);
 }
 
 bt_status bt_check_study(const char *path, bt_errors *err)

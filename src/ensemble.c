@@ -17,6 +17,7 @@
 #include "bergtow/run.h"
 #include "cost.h"
 #include "ensemble_member.h"
+#include "ensemble_record.h"
 #include "fileio.h"
 #include "json.h"
 
@@ -27,6 +28,7 @@ enum { MOST_TOLD = 10 };    // failed members that are told one by one
 
 typedef struct {
     bt_member m;
+    int64_t index; ///< among the members of the study
     char *folder;
     double cost;   ///< estimated, s of one core
     bool settled;  ///< finished or failed, as far as this process knows
@@ -43,6 +45,7 @@ typedef struct {
     int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
     int alone;          ///< descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int64_t lost;       ///< members whose failure could not be recorded
+    bt_member_records records;
     double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
     bt_errors *err;
 } ensemble;
@@ -85,6 +88,76 @@ static void look(entry *x)
     if (!x->settled) x->settled = bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_WAITING;
 }
 
+// --- soundness -------------------------------------------------------------------------------------------------------
+
+enum { SOUND, DAMAGED, UNREADABLE };
+
+/// Check a member that says it has finished. What is damaged is taken away, unless somebody is at it already.
+static int check_member(ensemble *e, entry *x, bt_errors *told_of)
+{
+    bt_errors why = {0};
+    bt_status status = bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &why);
+    if (status == BT_ERR_CASE) {
+        const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
+        bt_errors again = {0};
+        if (fd < 0 || !bt_member_take_lock(fd, false) || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+            bt_errors_free(&why); // another process has found it out, too
+        } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
+            bt_errors_free(&why); // and made it good meanwhile
+            status = BT_OK;
+        } else {
+            status = bt_member_record_forget(x->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
+            journal(e, "unsound", &x->m, 0, (int)status);
+        }
+        bt_errors_free(&again);
+        if (fd >= 0) close(fd);
+    }
+    for (size_t k = 0; k < why.n && k < 1; k++)
+        bt_errors_add(told_of, "warning: member %s is not sound%s: %s%s", x->m.name, status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k], why.n > 1 ? ", ..." : "");
+    bt_errors_free(&why);
+    return status == BT_OK ? SOUND : status == BT_ERR_CASE ? DAMAGED : UNREADABLE;
+}
+
+static void print_warnings(bt_errors *list)
+{
+    const size_t more = list->n > MOST_TOLD ? list->n - MOST_TOLD : 0;
+    for (size_t k = 0; k < list->n - more; k++) fprintf(stderr, "bergtow: %s\n", list->text[k]);
+    if (more) fprintf(stderr, "bergtow: warning: and %zu more members that are not sound; see journal.jsonl\n", more);
+}
+
+/// Collective. Each rank makes what it knows of sound files known to the others, so that none reads them again.
+static void share_records(ensemble *e)
+{
+    bt_comm_reduce(e->world, NULL, 0, NULL, 0, e->records.seen, (int)e->records.n);
+}
+
+/// Collective. Every finished member is read once, by one of the ranks; the list is still in the order of the study.
+static void check_members(ensemble *e)
+{
+    enum { PER_WORD = 32 }; // two bits each
+    const int n = (int)(e->n / PER_WORD + 1);
+    uint64_t *found = bt_alloc((size_t)n, sizeof *found);
+    memset(found, 0, (size_t)n * sizeof *found);
+    bt_errors told_of = {0};
+    for (int64_t i = e->world->rank; i < e->n; i += e->world->size) {
+        entry *x = &e->list[i];
+        if (bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
+        found[i / PER_WORD] |= (uint64_t)check_member(e, x, &told_of) << 2 * (i % PER_WORD);
+    }
+    bt_comm_reduce(e->world, NULL, 0, NULL, 0, found, n);
+    share_records(e);
+    for (int64_t i = 0; i < e->n; i++) {
+        const int how = (int)(found[i / PER_WORD] >> 2 * (i % PER_WORD) & 3);
+        if (how == DAMAGED) e->list[i].settled = false;
+        if (how == UNREADABLE) e->list[i].settled = true; // nothing can be done about it here
+    }
+    bt_comm_errors(e->world, &told_of);
+    if (e->world->rank == 0) print_warnings(&told_of);
+    bt_errors_free(&told_of);
+    free(found);
+}
+
+/// Collective.
 static void make_list(ensemble *e)
 {
     e->n = bt_study_n_members(e->s);
@@ -93,6 +166,7 @@ static void make_list(ensemble *e)
     int64_t priced = -1;
     for (int64_t i = 0; i < e->n; i++) {
         entry *x = &e->list[i];
+        x->index = i;
         bt_study_member(e->s, i, &x->m);
         if (asprintf(&x->folder, "%s/members/%s", e->o->dir, x->m.name) < 0) abort();
         if (x->m.condition != priced) { // fields of one condition cost the same; a case that cannot be read fails when its turn comes
@@ -106,10 +180,12 @@ static void make_list(ensemble *e)
         x->cost = cost;
         x->attempts = bt_member_attempts(x->folder);
         look(x);
-        if (x->settled) {
-            e->before++;
-            e->cost_before += cost;
-        }
+    }
+    check_members(e);
+    for (int64_t i = 0; i < e->n; i++) {
+        if (!e->list[i].settled) continue;
+        e->before++;
+        e->cost_before += e->list[i].cost;
     }
     qsort(e->list, (size_t)e->n, sizeof *e->list, by_cost);
 }
@@ -248,7 +324,7 @@ static bt_status gather(ensemble *e, bool wait)
     const double t0 = bt_clock();
     const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
     if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
-    else if (fd >= 0 && bt_member_take_lock(fd, wait)) status = bt_ensemble_gather(e->s, e->o->dir, wait ? e->err : &unheard);
+    else if (fd >= 0 && bt_member_take_lock(fd, wait)) status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
     e->gathered = bt_clock();
@@ -286,9 +362,7 @@ static bt_status run_member(ensemble *e, entry *x)
         const double wall = bt_clock() - t0;
         bt_member_forget_attempts(x->folder);
         if (status == BT_OK) {
-            char *done = bt_file_join(x->folder, "finished");
-            status = bt_file_write(done, "", &why);
-            free(done);
+            status = bt_member_record_write(&e->records, x->index, x->m.name, x->folder, &why);
             if (status == BT_OK) bt_checkpoint_remove(x->folder);
         }
         if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
@@ -316,34 +390,61 @@ static bt_status work(ensemble *e)
     }
 }
 
-/// What became of the members: the worst status of the failed, each with its first reason.
-static bt_status tell_end(const ensemble *e, bt_status status, bt_errors *err)
+typedef struct {
+    int64_t finished, failed, left, at_work, unsound;
+} counts;
+
+/// One member's part in the end: counted, and told where it is a hole.
+static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *err)
 {
-    int64_t count[3] = {0}, at_work = 0;
-    bt_status worst = status;
-    for (int64_t m = 0; m < e->n; m++) {
-        bt_member member;
-        bt_study_member(e->s, m, &member);
-        char *folder = NULL, *why;
-        if (asprintf(&folder, "%s/members/%s", e->o->dir, member.name) < 0) abort();
-        int code;
-        const bt_member_state state = bt_ensemble_state(folder, &code, &why);
-        count[state]++;
-        at_work += state == BT_MEMBER_WAITING && bt_member_held(folder);
-        if (state == BT_MEMBER_FINISHED && bt_checkpoint_there(folder)) bt_checkpoint_remove(folder); // killed between the two
-        if (state == BT_MEMBER_FAILED) {
-            if (why) why[strcspn(why, "\n")] = 0;
-            if (count[BT_MEMBER_FAILED] <= MOST_TOLD) bt_errors_add(err, "member %s failed (%d): %s", member.name, code, why ? why : "no reason recorded");
-            if (worst == BT_OK) worst = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
-        }
-        free(why);
-        free(folder);
-        bt_member_free(&member);
+    int code;
+    char *why;
+    bt_errors damage = {0};
+    bt_status status = BT_OK;
+    const bt_member_state state = bt_ensemble_state(x->folder, &code, &why);
+    const bt_status sound = state == BT_MEMBER_FINISHED ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage) : BT_OK;
+    if (sound != BT_OK) {
+        if (n->unsound++ < MOST_TOLD) bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0], sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
+        status = BT_ERR_IO;
+    } else if (state == BT_MEMBER_FINISHED) {
+        n->finished++;
+        if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
+    } else if (state == BT_MEMBER_FAILED) {
+        if (why) why[strcspn(why, "\n")] = 0;
+        if (n->failed++ < MOST_TOLD) bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
+        status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
+    } else {
+        n->left++;
+        n->at_work += bt_member_held(x->folder);
     }
-    if (count[BT_MEMBER_FAILED] > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", count[BT_MEMBER_FAILED] - MOST_TOLD, e->o->dir);
-    if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", count[BT_MEMBER_WAITING]);
-    else if (at_work && !e->o->quiet) printf("%" PRId64 " members are being worked on by other processes\n", at_work);
-    if (!e->o->quiet) printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left; %s/ensemble.h5\n", count[BT_MEMBER_FINISHED], count[BT_MEMBER_FAILED], count[BT_MEMBER_WAITING], e->o->dir);
+    free(why);
+    bt_errors_free(&damage);
+    return status;
+}
+
+static int by_index(const void *a, const void *b) { return ((const entry *)a)->index < ((const entry *)b)->index ? -1 : 1; }
+
+/// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no hole.
+static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
+{
+    counts n = {0};
+    bt_status worst = status;
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_index);
+    for (int64_t i = 0; i < e->n; i++) {
+        const bt_status of = tell_member(e, &e->list[i], &n, err);
+        if (worst == BT_OK) worst = of;
+    }
+    if (n.failed > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_TOLD, e->o->dir);
+    if (n.unsound > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
+    if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", n.left);
+    else if (n.at_work) bt_errors_add(err, "%" PRId64 " members are being worked on by other processes; the same call takes them in when those have ended", n.at_work);
+    else if (n.left && worst == BT_OK) bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
+    if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
+    if (!e->o->quiet) {
+        printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
+        if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
+        printf("; %s/ensemble.h5\n", e->o->dir);
+    }
     return worst;
 }
 
@@ -356,6 +457,34 @@ static void forget_failures(const ensemble *e)
     }
 }
 
+/// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or die. told_of: that has been said.
+static bool wait_for_others(ensemble *e, bool told_of)
+{
+    int64_t n = 0;
+    for (int64_t i = 0; e->world->rank == 0 && i < e->n; i++) {
+        look(&e->list[i]);
+        n += !e->list[i].settled;
+    }
+    bt_comm_bcast(e->world, &n, sizeof n);
+    if (n == 0) return false;
+    if (!told_of && !e->o->quiet && e->world->rank == 0) {
+        printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
+        fflush(stdout);
+    }
+    nanosleep(&(struct timespec){.tv_nsec = 500000000}, NULL);
+    return true;
+}
+
+/// As for a run of the base case.
+static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads, bt_errors *err)
+{
+    bt_case c;
+    const bt_status status = bt_study_base_case(s, &c, err);
+    if (status == BT_OK) *threads = bt_run_threads(comm, &c, o->threads);
+    bt_case_free(&c);
+    return status;
+}
+
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
 {
     bt_status status = BT_OK;
@@ -363,15 +492,23 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         bt_errors_add(err, "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it", s->path, s->ranks, comm->size);
         status = BT_ERR_CASE;
     }
+    bt_member_records records = {0};
+    int threads = 1;
+    if (status == BT_OK) status = choose_threads(comm, s, o, &threads, err);
     if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
+    if (status == BT_OK) status = bt_member_records_begin(&records, s, err);
     status = bt_comm_agree(comm, status);
-    if (status != BT_OK) return status;
+    if (status != BT_OK) {
+        bt_member_records_end(&records);
+        return status;
+    }
 
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
     const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
     ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks, .alone = -1};
-    e.threads = o->threads > 0 ? o->threads : (int)bt_max(1, (double)(sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here));
+    e.threads = threads;
+    e.records = records;
     make_list(&e);
     if (o->retry && comm->rank == 0) forget_failures(&e);
     if (o->retry) bt_comm_rest(comm);
@@ -386,11 +523,16 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     sigemptyset(&act.sa_mask);
     told = 0;
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
-    if (!idle) status = work(&e);
+    bool others = false;
+    do {
+        if (!idle) status = work(&e);
+        bt_comm_rest(comm);
+        status = bt_comm_agree(comm, status);
+        others = status == BT_OK && !o->leave && wait_for_others(&e, others);
+    } while (others);
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
     if (e.alone >= 0) close(e.alone);
-    bt_comm_rest(comm);
-    status = bt_comm_agree(comm, status);
+    share_records(&e);
     if (comm->rank == 0) {
         const bt_status gathered = gather(&e, true);
         status = tell_end(&e, status, err);
@@ -402,5 +544,6 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         free(e.list[i].folder);
     }
     free(e.list);
+    bt_member_records_end(&e.records);
     return bt_comm_agree(comm, status);
 }

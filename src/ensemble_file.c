@@ -2,14 +2,16 @@
 // ensemble.h5: one row a member, gathered from the members' folders.
 //
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
-//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, or that a waiting member's process died
+//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a waiting member's process died, or that its
+//                                                        result is not sound
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or machine; nested ones as A_B; NaN where
 //                                                        there is none
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members, n_finished, n_failed
 //
-// Made whole each time under a temporary name and renamed: a reader finds the old or the new one. Members are written in their order, columns in
+// Made whole each time under a temporary name, sealed and renamed: a reader finds the old or the new one. Only members whose files fit their
+// record (ensemble_record.h) are taken in. Members are written in their order, columns in
 // that of their first appearance, so the file depends on the set of finished members alone.
 #include <errno.h>
 #include <inttypes.h>
@@ -21,9 +23,11 @@
 #include <unistd.h>
 
 #include "bergtow/ensemble.h"
+#include "ensemble_record.h"
 #include "fileio.h"
 #include "h5util.h"
 #include "schema.h"
+#include "seal.h"
 #include "units.h"
 #include "value.h"
 
@@ -197,7 +201,25 @@ static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
     free(value);
 }
 
-static void fill(table *t, const bt_study *s, const char *dir)
+/// Status of a member that says it has finished: it has when its files are sound, and else waits, with the reason.
+static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt_member_records *records)
+{
+    bt_errors why = {0};
+    bt_status status = bt_member_record_check(records, m, t->name[m], folder, &why);
+    if (status == BT_OK && !take_summary(t, m, folder)) {
+        bt_errors_add(&why, "%s/summary.json: cannot be read as JSON", folder);
+        status = BT_ERR_CASE;
+    }
+    if (status != BT_OK) {
+        free(t->reason[m]);
+        t->reason[m] = NULL;
+        if (asprintf(&t->reason[m], "its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again", why.n ? why.text[0] : "no reason given") < 0) abort();
+    }
+    bt_errors_free(&why);
+    return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
+}
+
+static void fill(table *t, const bt_study *s, const char *dir, bt_member_records *records)
 {
     t->n = bt_study_n_members(s);
     int64_t **numbers[] = {&t->id, &t->condition, &t->repeat, &t->seed, &t->status};
@@ -216,8 +238,7 @@ static void fill(table *t, const bt_study *s, const char *dir)
         t->name[m] = strdup(member.name);
         t->hash[m] = strdup("");
         t->status[m] = bt_ensemble_state(folder, NULL, &t->reason[m]);
-        // A summary that cannot be read is a member without one: it will be run again.
-        if (t->status[m] == BT_MEMBER_FINISHED && !take_summary(t, m, folder)) t->status[m] = BT_MEMBER_WAITING;
+        if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
         if (!t->reason[m]) t->reason[m] = strdup("");
         free(folder);
         bt_member_free(&member);
@@ -282,17 +303,18 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     bt_h5_attr_int(h, "/", "complete", finished + failed == t->n);
 }
 
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_errors *err)
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err)
 {
     table t = {0};
-    fill(&t, s, dir);
+    fill(&t, s, dir, records);
     char *path = bt_file_join(dir, "ensemble.h5"), *part = NULL;
     if (asprintf(&part, "%s.tmp", path) < 0) abort();
     bt_h5 h;
-    bt_status status = bt_h5_create(&h, part, err);
+    bt_status status = bt_h5_create_with_room(&h, part, err);
     if (status == BT_OK) {
         write_all(&h, &t, s, dir);
         status = bt_h5_close(&h);
+        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_ENSEMBLE, err);
         if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
         if (status != BT_OK) unlink(part);
     }

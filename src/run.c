@@ -252,10 +252,9 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     return status;
 }
 
-/// As the user says; otherwise the cores of the node, or those that mpirun has bound this rank to, for the ranks there.
-static int choose_threads(const bt_comm *comm, const bt_case *c, const bt_run_options *o)
+int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked)
 {
-    if (o->threads > 0) return o->threads;
+    if (asked > 0) return asked;
     if (c->run.threads > 0) return (int)c->run.threads;
     if (comm->size == 1 || getenv("OMP_NUM_THREADS")) return omp_get_max_threads();
     const int bound = omp_get_num_procs(), share = (int)sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here;
@@ -323,7 +322,7 @@ typedef struct {
 static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_options *o, manner *m, bt_errors *err)
 {
     bt_snapshot *kept = m->kept;
-    const int threads = choose_threads(comm, c, o);
+    const int threads = bt_run_threads(comm, c, o->threads);
     start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
     r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .told = o->told, .first = comm->rank == 0, .started = m->start};

@@ -32,25 +32,51 @@ static bool read_at(int fd, void *to, size_t bytes, off_t at)
     return true;
 }
 
-/// The seal that the bytes behind it ask for.
-static bool make(int fd, off_t size, const char *kind, char block[BT_SEAL_BYTES])
+static void print_digest(XXH128_hash_t h, char out[BT_SEAL_DIGEST]) { snprintf(out, BT_SEAL_DIGEST, "%016" PRIx64 "%016" PRIx64, (uint64_t)h.high64, (uint64_t)h.low64); }
+
+/// Digest of the bytes from `at` on.
+static bool digest(int fd, off_t at, off_t size, char out[BT_SEAL_DIGEST])
 {
     enum { PIECE = 1 << 20 };
     XXH3_state_t *state = XXH3_createState();
     char *buffer = bt_alloc(PIECE, 1);
     bool good = state && XXH3_128bits_reset(state) == XXH_OK;
-    for (off_t at = BT_SEAL_BYTES; good && at < size; at += PIECE) {
+    for (; good && at < size; at += PIECE) {
         const size_t n = size - at < PIECE ? (size_t)(size - at) : PIECE;
         good = read_at(fd, buffer, n, at) && XXH3_128bits_update(state, buffer, n) == XXH_OK;
     }
     free(buffer);
-    if (good) {
-        const XXH128_hash_t h = XXH3_128bits_digest(state);
-        memset(block, 0, BT_SEAL_BYTES);
-        snprintf(block, BT_SEAL_BYTES, MAGIC "kind: %s\nbytes: %" PRId64 "\nxxh128: %016" PRIx64 "%016" PRIx64 "\n", kind, (int64_t)size, (uint64_t)h.high64, (uint64_t)h.low64);
-    }
+    if (good) print_digest(XXH3_128bits_digest(state), out);
     XXH3_freeState(state);
     return good;
+}
+
+/// The seal that the bytes behind it ask for.
+static bool make(int fd, off_t size, const char *kind, char block[BT_SEAL_BYTES])
+{
+    char text[BT_SEAL_DIGEST];
+    if (!digest(fd, BT_SEAL_BYTES, size, text)) return false;
+    memset(block, 0, BT_SEAL_BYTES);
+    snprintf(block, BT_SEAL_BYTES, MAGIC "kind: %s\nbytes: %" PRId64 "\nxxh128: %s\n", kind, (int64_t)size, text);
+    return true;
+}
+
+void bt_seal_digest_text(const void *bytes, size_t n, char out[BT_SEAL_DIGEST]) { print_digest(XXH3_128bits(bytes, n), out); }
+
+bt_status bt_seal_digest_file(const char *path, char out[BT_SEAL_DIGEST], int64_t *bytes, bt_errors *err)
+{
+    struct stat st;
+    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a pipe must not keep us waiting
+    int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : 0;
+    const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
+    if (!reason && !odd && !digest(fd, 0, st.st_size, out)) reason = errno;
+    if (fd >= 0) close(fd);
+    if (gone || odd) {
+        bt_errors_add(err, "%s: %s", path, gone ? "is missing" : "is no regular file");
+        return BT_ERR_CASE;
+    }
+    *bytes = reason ? 0 : (int64_t)st.st_size;
+    return reason ? bt_file_fail(path, "read the file", reason, err) : BT_OK;
 }
 
 bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err)

@@ -14,12 +14,16 @@
 
 #include "bergtow/base.h"
 
-enum { BT_SEAL_BYTES = 512 };
+enum {
+    BT_SEAL_BYTES = 512,
+    BT_SEAL_DIGEST = 33, ///< characters of a digest as text, with its end
+};
 
 // Kinds carry the version of the format: another one is refused with both names.
 #define BT_SEAL_CHECKPOINT "checkpoint 1"
 #define BT_SEAL_RESULT "result 1"
 #define BT_SEAL_FIELD "field 1"
+#define BT_SEAL_ENSEMBLE "ensemble 1"
 
 /// Write the seal into the room at the front of a file that is complete, and bring all of it to the disk. Errors: BT_ERR_IO.
 bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err);
@@ -27,5 +31,9 @@ bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err);
 /// Does the file have a sound seal of this kind? bare: a file without seal, one that begins as HDF5, is let through (or NULL). Errors:
 /// BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_errors *err);
+
+/// Digest (XXH3, 128 bits) of n bytes, and of a whole file of any kind, in hexadecimal digits. Errors: BT_ERR_CASE, there is no regular file; BT_ERR_IO from the system.
+void bt_seal_digest_text(const void *bytes, size_t n, char out[BT_SEAL_DIGEST]);
+bt_status bt_seal_digest_file(const char *path, char out[BT_SEAL_DIGEST], int64_t *bytes, bt_errors *err);
 
 #endif

@@ -20,8 +20,8 @@ DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 TOW = {
     "run": {"dt": 0.1, "duration": 30},
     "domain": {"length": 15, "width": 8},
-    "ice": {"concentration": 0.5, "size": 0.7, "friction": 0.3},
-    "body": {"x": 3, "length": 2},
+    "ice": {"concentration": 0.5, "size": 0.7, "thickness": 0.04, "friction": 0.3},
+    "body": {"x": 3, "length": 2, "draft": 0.5},
     "tow": {"speed": 0.13, "ramp": 2},
 }
 # Walls that close on dense ice: thousands of contacts at once, so that every loop that may run in parallel does.

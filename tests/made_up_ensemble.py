@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: MIT
 """An ensemble's folder with numbers of the test's own, of the layout that src/ensemble_file.c writes."""
 import json
+import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "postproc"))
+
+import soundness  # noqa: E402
 
 FINISHED, FAILED, WAITING = 1, 2, 0
 UNITS = {"ice.concentration": "1", "tow.speed": "m/s", "ice.thickness": "m", "ice.friction": "1"}
@@ -43,12 +49,25 @@ def write_member(folder, m):
     nested["window"]["warning"] = m["window_warning"]
     nested["estimates"] |= {"curves": {"concentration": [0.0, 0.5, 1.0], "valid_range": {k: [0.0, 1.0] for k in m["estimates"]}, **{k: [0.0, f, 2 * f] for k, f in m["estimates"].items()}},
                             "thickness_m": 1.0, "width_m": 2.0, "speed_along_m_s": 0.1, "length_scale": 1.0}
+    (folder / "case.resolved.yml").write_text("ice: {}\n")
     (folder / "summary.json").write_text(json.dumps(nested | {"title": "made up", "warnings": m["warnings"], "stopped": None}))
     with h5py.File(folder / "result.h5", "w") as f:
         f["case"] = f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
         f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
         f["impacts"].attrs["conversion"] = m["conversion"]
+
+
+def seal(path, kind="ensemble 1"):
+    """The seal of a file with room for one, as src/seal.h has it."""
+    raw = path.read_bytes()
+    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw[soundness.SEAL_BYTES:])}\n".encode()
+    path.write_bytes(text.ljust(soundness.SEAL_BYTES, b"\0") + raw[soundness.SEAL_BYTES:])
+
+
+def record(folder, study):
+    """The record of a finished member."""
+    (folder / "finished").write_text(soundness.record(folder, folder.name, study.encode()))
 
 
 def write(folder, members, title="made up", sampling="grid"):
@@ -60,7 +79,8 @@ def write(folder, members, title="made up", sampling="grid"):
         rows.append((m, repeat[m["condition"]], f"c{m['condition'] + 1:03d}-r{repeat[m['condition']]:03d}"))
     n, longest = len(rows), max(len(m["series"]) for m in members)
     done = [m["status"] == FINISHED for m in members]
-    with h5py.File(folder / "ensemble.h5", "w") as f:
+    study = f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n"
+    with h5py.File(folder / "ensemble.h5", "w", userblock_size=soundness.SEAL_BYTES) as f:
         f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])
@@ -81,12 +101,14 @@ def write(folder, members, title="made up", sampling="grid"):
                 time[i, :len(m["series"])], ice[i, :len(m["series"])] = np.arange(1, len(m["series"]) + 1), m["series"]
         for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", ice)):
             f.create_dataset(f"series/{key}", data=values).attrs["units"] = "s" if key == "time" else "N"
-        f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(f"# bergtow study\nseed: 1\nsampling: {sampling}\n# base case with `set`\n")
+        f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(study)
         f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(all(m["status"] != WAITING for m in members))
         f.attrs["n_finished"], f.attrs["n_failed"] = sum(done), sum(m["status"] == FAILED for m in members)
     for (m, _, name), ok in zip(rows, done):
         if ok:
             write_member(folder / "members" / name, m)
+            record(folder / "members" / name, study)
+    seal(folder / "ensemble.h5")
     return folder
 
 

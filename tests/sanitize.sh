@@ -67,8 +67,8 @@ CASE
 cat >"$dir/window.yml" <<'CASE'
 run: {dt: 1, duration: 60}
 domain: {frame: geographic, length: 600, width: 300, ends: moving, sides: periodic}
-ice: {concentration: 0.5, size: 25, shape: rectangles, thickness_law: lognormal}
-body: {length: 40}
+ice: {concentration: 0.5, size: 25, shape: rectangles, thickness: 1, thickness_law: lognormal}
+body: {length: 40, draft: 20}
 tow: {mode: thrust, speed: 1, ramp: 10, line_length: 40, line: {branches: 2, type: dyneema, diameter: 60 mm}, vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: 7}}
 water: {latitude: 75, tilt: dynamic, tide: {major: 0.2, minor: 0.1}}
 air: {wind_x: 5}

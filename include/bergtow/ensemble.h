@@ -2,10 +2,15 @@
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
 // Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it
-// holds a file `finished` (the last thing written: a run that was stopped has a summary too), failed when it holds failed.txt (first line: exit
+// holds a file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed when it holds failed.txt (first line: exit
 // code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line
 // for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
 // order, ranks, or how often the ensemble was stopped.
+//
+// Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest (src/ensemble_record.h). Each call
+// reads them all and compares them, shared among its ranks, before it begins (as fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each
+// maker of ensemble.h5 what others have finished since. What is missing or damaged is told, taken away and run again; what the system does not let us read is left as it is,
+// told, and a hole. A call ends with 0 only when every member is finished and sound.
 //
 // Dealing. Who works on a member holds a lock on members/NAME/lock, which the system takes back when the process ends, however it
 // ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word between them:
@@ -31,20 +36,23 @@ typedef struct bt_ensemble_options {
     int threads;              ///< of each rank, 0 = the cores of the node shared by its ranks
     bool quiet;
     bool retry;               ///< failed members are tried again
+    bool leave;               ///< end when nothing is left to begin, even if other processes are still at work on members
     const char *command_line;
 } bt_ensemble_options;
 
 typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_member_state;
 
 /// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another study, the study
-/// asks for more ranks than there are), BT_ERR_IO, BT_ERR_SIGNAL (the call resumes); the worst status of a failed member when all others are done.
+/// asks for more ranks than there are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest); the worst
+/// status of a failed member when all others are done.
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
 
-/// State of a member by its files. why: text of failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
+/// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
 /// NULL; *code: the first line.
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
 
-/// Make DIR/ensemble.h5 from the members' files; the caller holds DIR/lock. Errors: BT_ERR_IO.
-bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_errors *err);
+/// Make DIR/ensemble.h5 from the files of the members that are sound; the caller holds DIR/lock. Errors: BT_ERR_IO.
+struct bt_member_records;
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, struct bt_member_records *records, bt_errors *err);
 
 #endif

@@ -31,4 +31,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
 /// run is told to be so. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is refused.
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
 
+/// OpenMP threads of each rank of comm: as asked (0 = not), else run.threads of the case, else OMP_NUM_THREADS, else the cores of the node, or those that mpirun
+/// has bound this rank to, for the ranks there.
+int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked);
+
 #endif

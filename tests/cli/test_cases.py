@@ -93,3 +93,11 @@ def test_the_bridle_of_2005_parts_as_the_vessel_speeds_up_again(tmp_path):
     before = (time > 600) & (time < 900)
     assert one[time <= when[0]].max() > 1.3 * one[before].max(), "under more than the steady tow put on it"
     assert abs(yaw[-1] - yaw[np.searchsorted(time, when[0])]) > 0.1, "the berg turns to the branch that is left"
+
+
+@pytest.mark.parametrize("path", sorted([*(ROOT / "cases").glob("*/README.md"), ROOT / "postproc/README.md"]), ids=lambda p: p.parent.name)
+def test_an_error_says_what_it_is(path):
+    """± is one standard error, and the page says so."""
+    text = path.read_text()
+    assert "±" not in text or "standard error" in text
+    assert not re.search(r"± [\d.,]+[^|\n]{0,6}(%|\(95)", text), "an interval of 95 % is written from a to b"

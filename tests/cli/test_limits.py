@@ -32,7 +32,7 @@ GREEDY = {
     "frames": ({"output__frame_interval": 1e-7}, "output.frame_interval:", "frames, at most 1000000", "lengthen it"),
     "work": ({"run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"}, "ice": {"concentration": 0.8, "size": 1}},
              "run.duration:", "s of one core, at most 1e+10", "shorten the run"),
-    "disk": ({"run": {"dt": 1, "duration": 1e5}, "domain": {"length": 1000, "width": 1000, "ends": "periodic"}, "output__frame_interval": 0.1},
+    "disk": ({"run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"}, "output__frame_interval": 0.1},
              "output.frame_interval:", "bytes, at most 2e+13", "lengthen output.frame_interval"),
     "pieces of a lead": ({"lead": {"mode": "managed", "floe_size": 1e-6}}, "lead.floe_size:", "pieces, at most 20000000"),
     "floes by hand": ({"floes": [{"x": 9, "y": 0, "length": 1}] * 10001}, "floes: has 10001 entries, at most 10000"),

@@ -13,7 +13,7 @@ import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the pa
 import style  # noqa: E402
 
 BERG = {"run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
-        "ice": {"size": 30, "size_spread": 0, "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}}
+        "ice": {"concentration": 0.8, "size": 30, "size_spread": 0, "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}}
 
 
 def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):

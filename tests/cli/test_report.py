@@ -16,7 +16,7 @@ from selenium.webdriver import ActionChains, Keys
 from selenium.webdriver.support.ui import Select
 
 from browser import browser, complaints, opened, until
-from harness import TOW, changed, run
+from harness import TOW, call, changed, run, write_case
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
@@ -31,7 +31,7 @@ from bergtow_read import Run  # noqa: E402
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
 CASE = changed(TOW, run__title=HOSTILE, ice__concentration=0.7, reference__mean_force=3.0, reference__source="<b>nobody</b>", output__window_start=8)
 #: in the map's frame, within a window that goes along, on a line that breaks
-MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2}, run__duration=60,
+MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2, "draft": 0.5}, run__duration=60,
                  tow={"mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000, "line": {"breaking_load": 1e6}})
 
 
@@ -441,8 +441,37 @@ def test_every_key_is_labelled(tow):
         values = report_case.values(r)
         assert {v.key for v in values} >= set(r.case) and {v.kind for v in values} <= set(report_case.KINDS)
         by_key = {v.key: v for v in values}
-        assert by_key["tow.ramp"].kind == "given" and by_key["body.draft"].kind == "assumed" and by_key["ice.density"].kind == "source"
+        assert by_key["tow.ramp"].kind == "given" and by_key["ice.size_spread"].kind == "assumed" and by_key["ice.density"].kind == "source"
         assert {key for keys in report_run.KEY_VALUES.values() for key in keys} <= set(by_key)
+
+
+def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
+    """Real size, thickness and concentration of the floes, not the defaults of a field that nobody made."""
+    assert call("field", write_case(tmp_path, changed(TOW, ice__concentration=0.3)), "-o", tmp_path / "made.geojson").returncode == 0
+    drawn = json.loads((tmp_path / "made.geojson").read_text())
+
+    def told(name, thicknesses):
+        for feature, t in zip(drawn["features"], thicknesses):
+            feature["properties"] = {} if t is None else {"thickness": t}
+        (tmp_path / "o.geojson").write_text(json.dumps(drawn))
+        r = run(tmp_path, changed(TOW, run__duration=4, ice={"outlines": "o.geojson", "friction": 0.3}), name=name)
+        with Run(r.dir) as opened_run:
+            values = report_case.values(opened_run)
+            groups = report_run.key_values(opened_run, values)
+        return r, {v.key: (v.value, v.kind) for v in groups["Ice"]}, {v.key: v for v in values}
+
+    n = len(drawn["features"])
+    r, ice, every = told("own", [0.5 + 0.4 * k / (n - 1) for k in range(n)])
+    assert ice["floes"] == (str(n), "field") and ice["floe thickness"] == ("0.7 m, 0.5 to 0.9 m", "field") and ice["concentration"] == (f"{r.summary['concentration']:.4g}", "field")
+    assert 0.29 < r.summary["concentration"] < 0.31
+    size = np.sqrt(4 * r.dataset("floes/area") / np.pi)
+    assert ice["floe size"] == (f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m", "field") and 0.6 < size.mean() < 0.8
+    assert not {"ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.seed"} & set(ice) and "ice.friction" in ice
+    assert every["ice.size"].kind == "unused" and every["ice.size"].origin == "not used: the ice is read by ice.outlines"
+    text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
+    assert ice["floe size"][0] in text and "as read" in text
+    some = told("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first
+    assert some["floe thickness"][0].endswith(", 0.04 to 0.5 m") and some["ice.thickness"][0] == "0.04 m" and "ice.size" not in some
 
 
 def test_numbers_survive_packing():

@@ -79,7 +79,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
 def test_every_member_stands_there_with_its_doubts(page, study):
     rows = {row[0]: row for row in tables(page)["Members"][1:]}
     assert len(rows) == 10
-    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][5] == "jammed" and rows["c001-r001"][5] == "none"
+    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][6] == "jammed" and rows["c001-r001"][6] == "none"
     details = {d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent") for d in page.find_elements("css selector", "#members details")}
     assert set(details) == {"c001-r004: failed", "c002-r002: 1 warning"} and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
     warning = page.find_element("css selector", ".warning").text
@@ -99,6 +99,7 @@ def test_page_stands_alone_and_text_stays_text(page):
 def test_members_of_other_builds_and_lost_folders_are_told(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
+    made_up.record(study / "members/c001-r001", Ensemble(study).study)
     e = Ensemble(study)
     assert "2 builds" in report_ensemble.provenance(e)[1]
     (study / "members/c001-r002").rename(study / "members/lost")

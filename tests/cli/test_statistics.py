@@ -2,6 +2,8 @@
 """postproc/ensemble.py, plot_ensemble.py and plot_chains.py: made-up ensembles with known answers, and a small one that the program runs."""
 import csv
 import json
+import os
+import shutil
 
 import h5py
 import matplotlib
@@ -16,6 +18,7 @@ from test_postproc import done, pixels, script
 import ensemble  # noqa: E402  (test_postproc has put postproc/ on the path)
 import plot_chains  # noqa: E402
 import plot_ensemble  # noqa: E402
+import soundness  # noqa: E402
 import stat_mean  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
@@ -48,7 +51,7 @@ def plain(tmp_path_factory):
             return {"status": made_up.FAILED, "reason": "base.yml: too short"} if r == 0 else {"status": made_up.WAITING} if r == 1 else {}
         return {"window_warning": "no steady state was found", "warnings": ["no steady state was found", "floes left"]} if (c, r) == (2, 0) else {}
     folder = grid(tmp_path_factory.mktemp("plain") / "all", change=change)
-    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10)
+    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10, "--partial")
     assert result.returncode == 0, result.stderr
     return folder, result, json.loads((folder / "statistics.json").read_text())
 
@@ -85,7 +88,7 @@ def test_doubts_failures_and_gaps_are_counted(plain):
 
 def test_exclude_names_what_it_drops(plain, tmp_path):
     folder, _, before = plain
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude", "short")
+    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude", "short", "--partial")
     s = json.loads((tmp_path / "statistics.json").read_text())
     assert s["excluded"] == {"c001-r008": ["jammed"], "c003-r001": ["short"]} and "c001-r008 (jammed)" in result.stdout and "7 (1 excluded)" in result.stdout
     assert s["conditions"][0]["resistance"]["mean"] == pytest.approx(before["conditions"][0]["resistance"]["mean"] * np.mean(1 + 0.1 * (np.arange(7) - 3.5)))
@@ -119,7 +122,7 @@ def unlike(a, b, at=""):
 
 def test_markdown_and_stable_numbers(plain, tmp_path):
     folder, result, s = plain
-    again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown")
+    again = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 5, "--hours", 1, 10, "--markdown", "--partial")
     assert list(unlike(s, json.loads((tmp_path / "statistics.json").read_text()))) == []
     lines = again.stdout.splitlines()
     tables = [line for line in lines if line.startswith("|")]
@@ -138,7 +141,7 @@ def test_which_parameter_matters(plain):
 def test_what_is_refused(tmp_path, plain, capsys):
     result = script("ensemble.py", tmp_path / "none")
     assert result.returncode == 4 and "no such folder" in result.stderr and "Traceback" not in result.stderr
-    for arguments, words in (((tmp_path,), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5", "--resamples", "1"), "cannot be written")):
+    for arguments, words in (((tmp_path,), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5", "--resamples", "1", "--partial"), "cannot be written")):
         with pytest.raises(RunError, match=words):
             ensemble.main([str(a) for a in arguments])
     for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"), (("--blocks", "0"), "below 1")):
@@ -155,6 +158,62 @@ def test_what_is_refused(tmp_path, plain, capsys):
     mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
     ensemble.main([str(mixed)])
     assert "peaks of different conversions" in capsys.readouterr().out
+
+
+def test_no_part_is_taken_for_the_whole(plain, tmp_path):
+    """Members that fail or wait are named, and a script sees it by the exit code."""
+    folder, complete, _ = plain
+    assert complete.stderr == ""
+    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1)
+    assert result.returncode == 4 and "2 of 48 members are in no number: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr and "--partial" in result.stderr
+    assert json.loads((tmp_path / "statistics.json").read_text())["waiting"] == ["c002-r002"]
+    assert "1 member to come, and in no number (c002-r002)" in result.stdout
+
+
+DAMAGES = {
+    "a flipped bit": lambda m: flip(m / "result.h5", 700),
+    "a changed digit": lambda m: (m / "summary.json").write_text((m / "summary.json").read_text().replace("100.0", "200.0", 1)),
+    "a summary cut short": lambda m: os.truncate(m / "summary.json", 100),
+    "an empty result": lambda m: os.truncate(m / "result.h5", 0),
+    "no summary": lambda m: (m / "summary.json").unlink(),
+    "another member's files": lambda m: [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5")],
+    "another member": lambda m: [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5", "finished")],
+    "no record": lambda m: (m / "finished").unlink(),
+    "a pipe": lambda m: ((m / "result.h5").unlink(), os.mkfifo(m / "result.h5")),
+}
+
+
+def flip(path, at):
+    raw = bytearray(path.read_bytes())
+    raw[at] ^= 1
+    path.write_bytes(raw)
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_member_is_in_no_number(tmp_path, damage):
+    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + 10 * r, {}, 0, peaks=([2.0 + r], [5.0])) for r in range(3)])
+    DAMAGES[damage](folder / "members" / "c001-r001")
+    result = script("ensemble.py", folder, "--resamples", 1)
+    s = json.loads((folder / "statistics.json").read_text())
+    assert result.returncode == 4 and "1 of 3 members are in no number: 1 not sound (c001-r001)" in result.stderr and "Traceback" not in result.stderr
+    assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"] and s["checked"]
+    assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"]["fields"] == 2
+
+
+def test_a_damaged_ensemble_file_is_refused(tmp_path):
+    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0), {}, 0) for _ in range(2)])
+    assert Ensemble(folder).n == 2
+    flip(folder / "ensemble.h5", (folder / "ensemble.h5").stat().st_size - 9)
+    with pytest.raises(RunError, match="do not fit their seal; run `bergtow ensemble` again"):
+        Ensemble(folder)
+
+
+def test_what_cannot_be_checked_is_told(tmp_path, monkeypatch, capsys):
+    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + r, {}, 0) for r in range(2)])
+    monkeypatch.setattr(soundness, "_XXH3", None)
+    monkeypatch.setattr(soundness, "xxhash", None)
+    ensemble.main([str(folder), "--resamples", "1"])
+    assert "was not checked" in capsys.readouterr().out
 
 
 def test_members_without_a_folder_are_told(tmp_path, capsys):

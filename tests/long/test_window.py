@@ -9,7 +9,7 @@ from harness import changed, run
 LONG = {
     "run": {"dt": 5, "duration": 9200},
     "domain": {"frame": "geographic", "length": 7500, "x0": -1200, "width": 1500, "ends": "periodic", "sides": "periodic"},
-    "ice": {"size": 30, "thickness": 0.5},
+    "ice": {"concentration": 0.8, "size": 30, "thickness": 0.5},
     "body": {"length": 80, "draft": 30},
     "tow": {"speed": 0.5, "ramp": 60},
     "output": {"window_start": 1000},

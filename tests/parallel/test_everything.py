@@ -13,9 +13,9 @@ from test_ranks import assert_same, many
 ALL = {
     "run": {"dt": 0.1, "duration": 36},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic", "ahead": 14},
-    "ice": {"concentration": 0.5, "size": 1.2, "size_law": "lognormal", "thickness_law": "lognormal", "friction": 0.3, "restitution": 0.1,
+    "ice": {"concentration": 0.5, "size": 1.2, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal", "friction": 0.3, "restitution": 0.1,
             "crushing": {"pressure": "2 kPa", "least_length": 0.5}},
-    "body": {"length": 2},
+    "body": {"length": 2, "draft": 0.5},
     "tow": {"mode": "thrust", "programme": [[0, 0], [2, 0.8], [30, 0.8], [36, 0.5]], "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3, "line_length": 3,
             "line_stiffness": 2000, "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 150},
             "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}},

@@ -14,8 +14,8 @@ from test_ranks import assert_same, many
 SPEED = {
     "run": {"dt": 0.125, "duration": 70},
     "domain": {"length": 26, "width": 18, "ends": "moving", "sides": "periodic"},
-    "ice": {"concentration": 0.45, "size": 1, "size_law": "lognormal", "thickness_law": "lognormal", "restitution": 0.1},
-    "body": {"length": 2},
+    "ice": {"concentration": 0.45, "size": 1, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal", "restitution": 0.1},
+    "body": {"length": 2, "draft": 0.5},
     "tow": {"speed": 0.8, "ramp": 1},
     "solver": {"tile": 2.5, "max_sweeps": 40},
     "output": {"frame_interval": 8},

@@ -141,7 +141,7 @@ static void a_geographic_domain_lies_about_the_origin(void **state)
     (void)state;
     bt_case c;
     bt_errors err = {0};
-    if (read_text(&c, "run: {dt: 1, duration: 10}\ndomain: {frame: geographic, length: 2 km, width: 1 km}\nice: {size: 30 m}\n", &err)) fail_with(&err, "refused");
+    if (read_text(&c, "run: {dt: 1, duration: 10}\ndomain: {frame: geographic, length: 2 km, width: 1 km}\nice: {concentration: 0.8, size: 30 m, thickness: 1}\nbody: {length: 2, draft: 0.5}\n", &err)) fail_with(&err, "refused");
     assert_true(c.domain.x0 == -1000 && c.domain.y0 == -500 && c.body.x == 0);
     bt_case_free(&c);
 }
@@ -608,7 +608,7 @@ static void resolved_text_of_the_resolved_text_is_identical(void **state)
         "run: {dt: 0.1, duration: 100}\nice: {field: some.h5}\n",
         "run: {dt: 0.3, duration: 100}\nbody: {shape: none}\n",
         "run: {dt: 0.1, duration: 100}\ntow: {mode: none}\nbody: {shape: ship, length: 4.1, width: 1.3, yaw: 33, vx: 0.1}\n",
-        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 nmi, width: 0.7 km, sides: open}\nice: {size: 33.3}\n",
+        "run: {dt: 1, duration: 100}\ndomain: {frame: geographic, length: 1 nmi, width: 0.7 km, sides: open}\nice: {concentration: 0.8, size: 33.3, thickness: 0.04}\nbody: {length: 2, draft: 0.5}\n",
         "run: {dt: 0.1, duration: 100}\nfloes: [{x: 9.1, y: 0.3, length: 0.7}, {x: 20, y: 0, shape: polygon, vertices: [[0,0],[1,0],[0,1]]}]\n",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {

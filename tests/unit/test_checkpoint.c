@@ -75,8 +75,8 @@ static const struct scenario {
     {"vessel, bridle that breaks, way-points, tide, wind from a table",
      "run: {dt: 0.2, duration: 28}\n"
      "domain: {frame: geographic, length: 44, width: 14, ends: open, sides: open}\n"
-     "ice: {concentration: 0.7, size: 1, drag: {water_form: 0.85}}\n"
-     "body: {length: 2, x: -14}\n"
+     "ice: {concentration: 0.7, size: 1, thickness: 0.04, drag: {water_form: 0.85}}\n"
+     "body: {length: 2, draft: 0.5, x: -14}\n"
      "tow: {mode: thrust, programme: [[0, 0], [2, 0.9], [20, 0.9], [28, 0.3]], waypoints: [[-9, 0], [0, 4], [60, 4]], turn_radius: 2, line_length: 3,\n"
      "      line_stiffness: 2000, line: {branches: 2}, branch2: {breaking_load: 90},\n"
      "      vessel: {mass: 800, bollard_pull: 600, free_speed: 3, lookahead: 3}}\n"
@@ -87,8 +87,8 @@ static const struct scenario {
     {"moving window on a line",
      "run: {dt: 0.125, duration: 40}\n"
      "domain: {frame: geographic, length: 26, width: 14, ends: moving, sides: wall, ahead: 14}\n"
-     "ice: {concentration: 0.35, size: 1, size_law: lognormal, thickness_law: lognormal}\n"
-     "body: {length: 2}\n"
+     "ice: {concentration: 0.35, size: 1, size_law: lognormal, thickness: 0.04, thickness_law: lognormal}\n"
+     "body: {length: 2, draft: 0.5}\n"
      "tow: {mode: line, speed: 1.5, ramp: 1, line_length: 3, direction: 180}\n"
      "water: {latitude: 75, current_x: 0.1}\n"
      "air: {wind_x: 5, wind_y: 3}\n"

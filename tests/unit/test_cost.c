@@ -26,14 +26,37 @@ static void memory_by_hand(void **state)
     assert_float_equal(bt_cost_memory(&c, 1e6, 4, 2), 2 * (20e6 + 712e6) + 1000e6 + 64e6, 1);
 }
 
-// 501 frames of 1000 floes at 100 B; 100,000 entries of 8 B a series.
-static void result_by_hand(void **state)
+// By hand, from several ranks (nothing is compressed): 501 frames of 1000 floes of 6 corners at 40 B, 48 B of corners and 8 B of ParaView's speed and force, with 3460 B for the group, its
+// datasets and the other bodies; outlines 24 + 96 + 32 B; 100,096 entries (whole chunks of 256) of 8 B a series; one chunk of collisions; 255 kB of HDF5.
+static void disk_by_hand(void **state)
 {
     (void)state;
     bt_case c = a_case();
-    assert_float_equal(bt_cost_result(&c, 1000), 501 * 1000 * 100.0 + 8e5 * bt_n_series_fields, 1);
+    const double series = 8.0 * 100096, rest = 255e3 + 8.0 * 256 * 13;
+    assert_float_equal(bt_cost_frames(&c), 501, 0);
+    bt_cost_disk d = bt_cost_disk_of(&c, 1000, 6000, 2);
+    assert_float_equal(d.result, 501 * (1000 * 96.0 + 3460) + 152e3 + series * bt_n_series_fields + rest, 1);
+    assert_float_equal(d.checkpoints, 95e3 + 180e3 + 13 * 6000 + 64e6, 1);
+    assert_float_equal(d.texts, 30e3 + 501 * 1730, 1);
+    const double kept = bt_cost_left(&d);
+    assert_true(bt_cost_disk_of(&c, 1000, 6000, 1).result < d.result - 501 * 1000 * 20.0); // one rank compresses
+    c.output.checkpoint_steps = 1000; // two of them from now on, and the old beside the new while they are replaced
+    d = bt_cost_disk_of(&c, 1000, 6000, 2);
+    assert_float_equal(d.checkpoints, 2 * (kept - d.result - d.texts), 1);
+    assert_float_equal(d.most, 3 * d.result + d.texts + 1.5 * d.checkpoints, 1);
     c.output.panels = true;
-    assert_float_equal(bt_cost_result(&c, 0), 8e5 * (bt_n_series_fields + 108), 1);
+    assert_float_equal(bt_cost_disk_of(&c, 0, 0, 2).result, 501 * 3460 + series * (bt_n_series_fields + 108) + rest, 1);
+}
+
+static void a_step_has_one_frame_at_most(void **state)
+{
+    (void)state;
+    bt_case c = {.run = {.dt = 1, .duration = 10}, .output = {.frame_interval = 0.1}};
+    assert_float_equal(bt_cost_frames(&c), 11, 0);
+    c.output.frame_interval = 4; // at 0, 4, 8, and the end
+    assert_float_equal(bt_cost_frames(&c), 4, 0);
+    c.output.frame_interval = 5;
+    assert_float_equal(bt_cost_frames(&c), 3, 0);
 }
 
 static void what_does_not_fit_is_refused_with_both_numbers(void **state)
@@ -48,7 +71,7 @@ static void what_does_not_fit_is_refused_with_both_numbers(void **state)
     assert_non_null(strstr(err.text[0], "need some 3.33 GB of memory"));
     assert_non_null(strstr(err.text[0], "ice.size"));
     bt_errors_free(&err);
-    assert_int_equal(bt_cost_fits(&c, 4.1e8, &bt_comm_alone, 1e15, &err), BT_ERR_CASE);
+    assert_int_equal(bt_cost_fits(&c, 4.5e8, &bt_comm_alone, 1e15, &err), BT_ERR_CASE);
     assert_non_null(strstr(err.text[0], "output.frame_interval"));
     bt_errors_free(&err);
     assert_true(bt_cost_machine() > 1e6 && isfinite(bt_cost_machine()));
@@ -58,7 +81,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(memory_by_hand),
-        cmocka_unit_test(result_by_hand),
+        cmocka_unit_test(disk_by_hand),
+        cmocka_unit_test(a_step_has_one_frame_at_most),
         cmocka_unit_test(what_does_not_fit_is_refused_with_both_numbers),
     };
     return cmocka_run_group_tests_name("cost", tests, NULL, NULL);

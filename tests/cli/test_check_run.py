@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt, `check` calls valid with a warning."""
+import os
+
+import pytest
+
+from harness import CASE, DONE, IO, TOW, call, changed, run, write_case
+
+GB = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
+PIER = {"shape": "square", "length": 1, "x": 6, "y": 0, "fixed": True}
+WATER = changed(TOW, ice__concentration=0)
+
+REFUSED = {
+    "no room for the images": (changed(WATER, domain__width=2.9, domain__sides="periodic", body__length=1.6, floes=[PIER | {"x": 10, "length": 1.3, "fixed": False}]), CASE, "no room for the two largest bodies"),
+    "a pier on the path": (changed(WATER, tow__speed=0.3, floes=[PIER]), CASE, "which cannot give way, on its prescribed path"),
+    "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False}, PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
+    "a floe on the body": (changed(WATER, floes=[PIER | {"x": 3, "y": 1, "fixed": False}]), CASE, "overlap by"),
+    "a field that is not there": (changed(TOW, ice__field="none.h5"), IO, "none.h5"),
+    "no field": (changed(TOW, ice__field="case.yml"), CASE, "case.yml"),
+    "a table that is not there": (changed(TOW, water__current_table="none.csv"), IO, "none.csv"),
+    "too many floes": (changed(TOW, domain__length=1e5, domain__width=1e4), CASE, "at most 20000000 are simulated"),
+}
+
+
+def both(folder, case):
+    path = write_case(folder, case)
+    return call("check", path), call("run", path, "-o", folder / "out", "--quiet")
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_check_refuses_what_run_refuses(tmp_path, name):
+    case, code, words = REFUSED[name]
+    checked, ran = both(tmp_path, case)
+    assert ran.returncode == code and words in ran.stderr, ran.stderr
+    assert (checked.returncode, checked.stderr, checked.stdout) == (ran.returncode, ran.stderr, "")
+
+
+@pytest.mark.skipif(not GB < 55, reason="this machine has room for the largest field")
+def test_memory_beyond_the_machine(tmp_path):
+    case = changed(TOW, domain__length=6000, domain__width=2000, ice__concentration=0.6, run__duration=0.1)  # 18 million floes
+    checked, ran = both(tmp_path, case)
+    assert ran.returncode == CASE and "GB of memory, and this machine has" in ran.stderr
+    assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
+    (tmp_path / "study.yml").write_text('{"base": "case.yml", "parameters": {"tow.speed": [0.1, 0.2]}}')
+    studied = call("check", tmp_path / "study.yml")
+    assert studied.returncode == CASE and "GB of memory, and this machine has" in studied.stderr
+
+
+def test_a_field_of_another_domain(tmp_path):
+    assert call("field", write_case(tmp_path, TOW), "-o", tmp_path / "field.h5").returncode == DONE
+    checked, ran = both(tmp_path, changed(TOW, ice__field="field.h5", domain__length=12))
+    assert ran.returncode == CASE and "is outside the domain; make the field for this domain" in ran.stderr
+    assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
+
+
+def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
+    """The run takes it, so it is no fault; but nothing calls it valid without a word."""
+    case = changed(TOW, run__dt=0.6, run__duration=3, tow__ramp=1)
+    checked = call("check", write_case(tmp_path, case))
+    lines = checked.stdout.splitlines()
+    assert checked.returncode == DONE and lines[0].endswith("case.yml: valid, with 2 warnings") and lines[-1] == lines[0]
+    assert lines[-3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; take at most 0.1 s"
+    assert lines[-2].startswith("warning              run.dt: in 0.6 s floes move 0.111 of their size")
+    run(tmp_path, case)
+    good = call("check", write_case(tmp_path, TOW)).stdout
+    assert good.splitlines()[0].endswith("case.yml: valid") and "warning" not in good
+
+
+def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
+    line = {"mode": "line", "speed": 0.13, "line_length": 3, "line_stiffness": 1000}
+    lines = call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 1}))).stdout.splitlines()
+    assert lines[0].endswith("valid, with 1 warning") and lines[-1] == lines[0] and lines[-2].startswith("warning              tow.ramp: 1 s is short for a body that swings on its line")
+    assert "warning" not in call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 100}))).stdout
+
+
+def test_warnings_of_a_study(tmp_path):
+    write_case(tmp_path, TOW, "base.yml")
+    (tmp_path / "study.yml").write_text('{"base": "base.yml", "parameters": {"run.dt": [0.1, 0.2]}}')
+    lines = call("check", "study.yml", cwd=tmp_path).stdout.splitlines()
+    assert lines[0] == "study.yml: valid, with warnings in 1 of 2 conditions" and lines[-1].startswith(lines[0] + "; ")
+
+
+# ---- no sizes of a basin at full scale ----
+
+MAP = {"run": {"dt": 5, "duration": 600}, "domain": {"frame": "geographic", "length": 2000, "width": 1000},
+       "ice": {"concentration": 0.2, "size": 40, "thickness": 1}, "body": {"length": 80, "draft": 40}}
+
+
+def missing(folder, case, *options):
+    result = call("check", write_case(folder, case), *options)
+    return result.returncode, [line.split(": ")[2] for line in result.stderr.splitlines()]
+
+
+def test_sizes_have_no_default_in_the_geographic_frame(tmp_path):
+    assert missing(tmp_path, MAP) == (DONE, [])
+    keys = ["ice.concentration", "ice.size", "ice.thickness", "body.length", "body.draft"]
+    for key in keys:
+        case = changed(MAP, **{key.replace(".", "__"): None})
+        assert missing(tmp_path, case) == (CASE, [key])
+        text = call("check", tmp_path / "case.yml").stderr
+        assert "missing, and in domain.frame: geographic it has no default" in text and "add it (" in text
+        assert missing(tmp_path, case, "--set", f"{key}={MAP[key.split('.')[0]][key.split('.')[1]]}") == (DONE, [])
+    assert missing(tmp_path, changed(MAP, ice=None, body=None)) == (CASE, keys)
+    assert missing(tmp_path, changed(MAP, ice=None, body=None, domain__frame="basin")) == (DONE, [])
+
+
+def test_what_needs_no_size_is_not_asked_for_one(tmp_path):
+    assert missing(tmp_path, changed(MAP, ice={"concentration": 0})) == (DONE, [])
+    assert missing(tmp_path, changed(MAP, body={"shape": "none"}, tow={"mode": "none"})) == (DONE, [])
+    assert missing(tmp_path, changed(MAP, body={"shape": "polygon", "vertices": [[-40, -20], [40, -20], [0, 30]], "draft": 20})) == (DONE, [])
+    assert missing(tmp_path, changed(MAP, ice={"concentration": 0.2, "thickness": 1, "size_law": "power", "size_min": 20, "size_max": 60})) == (DONE, [])
+    floe = {"shape": "disc", "length": 40, "x": 300, "y": 0}
+    assert missing(tmp_path, changed(MAP, ice={"concentration": 0}, floes=[floe])) == (CASE, ["ice.thickness"])
+    assert missing(tmp_path, changed(MAP, ice={"concentration": 0}, floes=[floe | {"thickness": 1}])) == (DONE, [])
+    assert call("field", write_case(tmp_path, MAP), "-o", tmp_path / "field.h5").returncode == DONE
+    assert missing(tmp_path, changed(MAP, ice={"field": "field.h5"})) == (DONE, [])

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT
+"""What `check` says a run leaves on the disk, against what it leaves: within 20 %, on one rank and on two, with checkpoints, panels and read fields."""
+import json
+import re
+import subprocess
+
+import pytest
+
+from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, write_case
+
+MPI = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
+WITHIN = 0.2
+SHORT = changed(TOW, run__duration=10)
+UNIT = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
+
+CASES = {
+    "a basin": TOW,
+    "many frames": changed(SHORT, output__frame_interval=0.1),
+    "few frames, many steps": changed(TOW, run__duration=60, output__frame_interval=60),
+    "rectangles": changed(SHORT, ice__shape="rectangles", domain__length=40),
+    "twelve corners": changed(SHORT, ice__shape="polygons", ice__sides=12, domain__length=40),
+    "2,300 floes": changed(TOW, run__duration=3, domain__length=80, domain__width=25),
+    "next to no floes": changed(SHORT, domain__length=8, ice__concentration=0.05),
+    "panels": changed(TOW, run__duration=60, output__panels=True, output__frame_interval=10),
+    "two checkpoints": changed(TOW, output__checkpoint_steps=100, output__frame_interval=5),
+    "sampled": changed(TOW, output__sample_every=20),
+    "moving": changed(TOW, domain__ends="moving", domain__length=20, body__x=8),
+    "dense": changed(SHORT, ice__concentration=0.8),
+}
+
+
+def left(folder):
+    return sum(p.stat().st_size for p in folder.iterdir())
+
+
+def said(text, words):
+    number, unit = re.search(words + r" ([\d.e+]+) (kB|MB|GB)", text).groups()
+    return float(number) * UNIT[unit]
+
+
+def run(folder, path, ranks, *more):
+    command = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    result = subprocess.run([*command, BERGTOW, "run", path, "-o", folder, "--threads", "1", "--quiet", *more], env=environment(OMP_NUM_THREADS=1, **MPI), capture_output=True, text=True, timeout=120)
+    assert result.returncode == DONE, result.stderr
+    return left(folder)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_left(tmp_path, name, ranks):
+    path = write_case(tmp_path, CASES[name])
+    text = call("check", path).stdout
+    estimate = said(text, "disk +about" if ranks == 1 else "while it runs;")
+    bytes_left = run(tmp_path / "out", path, ranks)
+    assert estimate == pytest.approx(bytes_left, rel=WITHIN), f"{estimate / bytes_left:.2f} of what was left"
+    assert said(text, "up to") >= 0.8 * bytes_left
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_of_a_field_that_is_read(tmp_path, ranks):
+    """Corners and floes are counted; in the outlines' case they are 17 a floe."""
+    path = ROOT / "cases/outlines/outlines.yml"
+    sets = ["--set", "run.duration=30 s", "--set", "output.window_start=-1"]
+    text = call("check", path, *sets).stdout
+    assert said(text, "disk +about" if ranks == 1 else "while it runs;") == pytest.approx(run(tmp_path / "out", path, ranks, *sets), rel=WITHIN)
+
+
+def test_under_mpirun_the_estimate_is_of_these_ranks(tmp_path):
+    path = write_case(tmp_path, CASES["dense"])
+    several = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", path], env=environment(OMP_NUM_THREADS=1, **MPI), capture_output=True, text=True, timeout=60)
+    alone = call("check", path).stdout
+    assert several.returncode == DONE and said(several.stdout, "disk +about") == said(alone, "while it runs;") > said(alone, "disk +about")
+    assert several.stdout.count(": valid") == 1
+
+
+def test_of_a_study(tmp_path):
+    write_case(tmp_path, SHORT, "base.yml")
+    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": 2, "parameters": {"ice.concentration": [0.2, 0.5]}}))
+    estimate = said(call("check", "study.yml", cwd=tmp_path).stdout, "disk +about")
+    assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
+    assert estimate == pytest.approx(sum(p.stat().st_size for p in (tmp_path / "all").rglob("*") if p.is_file()), rel=WITHIN)
