@@ -260,11 +260,10 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
 
 double bt_contacts_overlap(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
-    const bt_vel *v = w->bodies.vel;
-    bt_tiles_begin(w);
-    if (bt_tiles_update(w, bt_contacts_margin(w, bt_contacts_bound(w, v, v, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    bt_tiles_begin(w); // from here on and again below, bodies may lie elsewhere
+    if (bt_tiles_update(w, bt_contacts_margin(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
     detect(w, false);
+    const bt_tiles *t = w->tiles;
     double deepest = 0;
     for (bt_idx k = 0; k < t->n; k++)
         if (t->tile[k].own) deepest = bt_max(deepest, t->tile[k].overlap);
