@@ -12,9 +12,13 @@ import json
 import math
 import random
 import re
+import shutil
+import subprocess
 
 import h5py
 import numpy as np
+
+from harness import ROOT, environment, write_case
 
 STEPS = 50
 
@@ -409,6 +413,9 @@ class Scene:
 
     def rest(self):
         d, v, dt = self.d, self.value, self.value["run.dt"]
+        if self.ends == "moving" and self.x == self.x0 + 0.5 * self.length and not {"tow.waypoints", "lead.mode"} & set(v):
+            v["domain.ahead"] = 0.5 * self.length # says where the body stands
+            del v["body.x"]
         low, middle, high = sorted(d.flat(1, 30) for _ in range(3))
         v["estimate.kappa_low"], v["estimate.kappa"], v["estimate.kappa_high"] = low, middle, high
         for key, value in (("solver.reference_speed", self.most * d.log(0.1, 10)), ("impact.duration", dt * d.log(0.01, 10)),
@@ -442,6 +449,15 @@ def draw(seed, table):
 def text(case):
     """JSON is YAML: what is printed can be pasted into a file."""
     return json.dumps(case, indent=1) + "\n"
+
+
+def flat(case, path=""):
+    """(dotted key, value) of all keys but the floes given by hand."""
+    for key, value in case.items():
+        if isinstance(value, dict):
+            yield from flat(value, f"{path}{key}.")
+        elif key != "floes":
+            yield path + key, value
 
 
 def value_of(case, name, otherwise=None):
@@ -578,3 +594,26 @@ def judge(case, folder, checked, ran):
         if (folder / "summary.json").exists():
             wrong.append("exit code 5 and a summary")
     return wrong + judge_result(case, folder, ran.returncode == 0)
+
+
+def call_on(program, *arguments, timeout=120):
+    """One thread unless said otherwise; a leak is a finding, but for those of Open MPI."""
+    env = environment(OMP_NUM_THREADS=1, ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=1",
+                      LSAN_OPTIONS=f"suppressions={ROOT}/tests/lsan.supp:print_suppressions=0")
+    return subprocess.run([str(program), *map(str, arguments)], env=env, capture_output=True, text=True, timeout=timeout)
+
+
+def tried(seed, table, program, folder):
+    """Exit code of the run of a seed's case on one or two threads, and what is wrong with it, each with the case to paste."""
+    case = draw(seed, table)
+    here = folder / f"seed{seed}"
+    path = write_case(here, case)
+    try:
+        checked = call_on(program, "check", path)
+        ran = call_on(program, "run", path, "-o", here / "out", "--quiet", "--steps", STEPS, "--threads", 1 + seed % 2)
+        code, wrong = ran.returncode, judge(case, here / "out", checked, ran)
+    except subprocess.TimeoutExpired as e:
+        code, wrong = None, [f"{e.cmd[1]}: still at work after {e.timeout} s"]
+    if not wrong:
+        shutil.rmtree(here)
+    return code, [f"seed {seed}: {w}\n{text(case)}" for w in wrong]
