@@ -45,7 +45,7 @@ FREE = {
     "solver.rest_speed": (1e-5, 1e-2, "lm"),
     "guard.overlap": (0.5, 100, "m"), "guard.energy": (1e3, 1e12, "m"), "guard.unconverged": (100, 1e9, "m"), "guard.escape": [True],
     "impact.conversion": None, "impact.corner": None, "impact.pressure": (1e4, 1e8, "m"), "impact.corner_angle": (10, 170, "m"), "impact.panels": (1, 100, "l"),
-    "output.sample_every": (1, 60, "l"), "output.progress": (0.01, 100, "l"), "output.checkpoint_steps": (1, 60, "l"), "output.checkpoint_wall": (0.1, 600, "l"),
+    "output.sample_every": (1, 60, "l"), "output.progress": (0.01, 100, "l"), "output.checkpoint_steps": (5, 60, "l"), "output.checkpoint_wall": (0.1, 600, "l"),
     "output.panels": None,
     "estimate.p_star": (1e2, 1e5, "lm"), "estimate.p_s": (1e2, 1e5, "lm"), "estimate.c_si": (0.1, 10, "lm"), "estimate.phi_j": (0.1, 1, "m"),
     "estimate.length_scale": (1, 100, "m"), "reference.mean_force": (1, 1e6, "lm"),
@@ -413,7 +413,7 @@ class Scene:
 
     def rest(self):
         d, v, dt = self.d, self.value, self.value["run.dt"]
-        if self.ends == "moving" and self.x == self.x0 + 0.5 * self.length and not {"tow.waypoints", "lead.mode"} & set(v):
+        if v["domain.frame"] == "basin" and self.ends == "moving" and self.x == self.x0 + 0.5 * self.length and not {"tow.waypoints", "lead.mode"} & set(v):
             v["domain.ahead"] = 0.5 * self.length # says where the body stands
             del v["body.x"]
         low, middle, high = sorted(d.flat(1, 30) for _ in range(3))

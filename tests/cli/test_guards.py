@@ -7,17 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import DONE, NUMERIC, SIGNAL, TOW, Run, call, changed, placed, run, worst_overlap, write_case
+from harness import CLOSING, DONE, NUMERIC, SIGNAL, TOW, Run, call, changed, placed, run, worst_overlap, write_case
 
-# Walls that close faster than the solver, cut short, can push the floes along.
-CLOSING = {
-    "run": {"dt": 0.1, "duration": 4},
-    "domain": {"length": 8, "width": 6, "ends_closing": 0.9, "sides_closing": 0.6},
-    "ice": {"concentration": 0.7, "size": 0.9},
-    "body": {"shape": "none"},
-    "solver": {"max_sweeps": 2, "position_sweeps": 0},
-    "guard": {"overlap": 0},
-}
 # A floe of 10¹⁶ kg at 100 m/s: more energy than sums hold.
 HEAVY = {
     "run": {"dt": 1, "duration": 20},

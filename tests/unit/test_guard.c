@@ -325,6 +325,12 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
         if (scene % 2) c.water.latitude = 80 * BT_PI / 180;
         if (scene % 6 == 3) c.water.tilt = BT_TILT_DYNAMIC;
         if (scene % 6 == 5) c.water.tilt = BT_TILT_GEOSTROPHIC;
+        if (scene % 13 == 12) { // next to no drag, half a day: an inertial circle about the current
+            c.run.dt = 150, c.run.duration = 300 * c.run.dt;
+            c.ice.drag = (bt_drag_coefs){.water_skin = 1e-12};
+            c.water.current_x = 1, c.water.tide.major = c.water.tide.minor = 0;
+            c.water.latitude = 80 * BT_PI / 180, c.water.tilt = BT_TILT_GEOSTROPHIC, c.water.slope_x = 0;
+        }
         bt_floe_def floe = {.shape = BT_BODY_RECTANGLE, .length = size, .width = 0.4 * size, .thickness = c.ice.thickness};
         if (scene % 8 == 7) floe.vx = 3, floe.yaw_rate = 0.5;
         c.floes = &floe, c.n_floes = 1;
