@@ -14,6 +14,7 @@
 #include "state.h"
 
 #define GRAVITY 9.81     // m/s²
+#define WALL_SIZES 5.0   // a wall is at least as thick, in mean floe sizes (setup.c)
 #define UNIT 0x1p30      // J: sums hold numbers up to 2⁶² (sum.h)
 
 // --- limits ----------------------------------------------------------------------------------------------------------
@@ -86,6 +87,8 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
         .unconverged = c->guard.unconverged,
         .escape_x = c->guard.escape && c->domain.ends == BT_BOUND_WALL,
         .escape_y = c->guard.escape && c->domain.sides == BT_BOUND_WALL,
+        .open_x = c->domain.ends == BT_BOUND_OPEN,
+        .open_y = c->domain.sides == BT_BOUND_OPEN,
         .low = {c->domain.x0, c->domain.y0},
         .high = {c->domain.x0 + c->domain.length, c->domain.y0 + c->domain.width},
         .closing = {c->domain.ends_closing, c->domain.sides_closing},
@@ -99,19 +102,27 @@ void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_f
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
-/// Where bodies may be, m.
-typedef struct { double low[2], high[2]; } range;
+/// The domain of now, m.
+typedef struct { double low[2], high[2]; bool wall[2], open[2]; double depth; } range;
 
 static range range_of(const bt_guard *g, const bt_world *w)
 {
     const double time = (double)w->step * w->par.dt;
-    range r = {{-INFINITY, -INFINITY}, {INFINITY, INFINITY}};
+    range r = {.wall = {g->escape_x, g->escape_y}, .open = {g->open_x, g->open_y}, .depth = WALL_SIZES * w->par.size};
     for (int k = 0; k < 2; k++) {
-        if (!(k ? g->escape_y : g->escape_x)) continue;
         r.low[k] = g->low[k] + g->closing[k] * time;
         r.high[k] = g->high[k] - g->closing[k] * time;
     }
     return r;
+}
+
+/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them only where they stand.
+static bool beyond(const range *r, double x, double y)
+{
+    const double out[2] = {bt_max(r->low[0] - x, x - r->high[0]), bt_max(r->low[1] - y, y - r->high[1])};
+    for (int k = 0; k < 2; k++)
+        if (r->wall[k] && out[k] > 0 && (!r->open[1 - k] || (out[1 - k] <= 0 && out[k] <= r->depth))) return true;
+    return false;
 }
 
 /// The highest ids among the bodies [first, end) into broken and gone.
@@ -122,7 +133,7 @@ static void look_at(const bt_world *w, const range *r, bt_idx first, bt_idx end,
         const bt_pose *p = &b->pose[i];
         const bt_vel *v = &b->vel[i];
         if (!isfinite(p->x + p->y + p->yaw + v->x + v->y + v->w)) *broken = bt_max(*broken, (double)b->gid[i]);
-        else if ((p->x < r->low[0] || p->x > r->high[0] || p->y < r->low[1] || p->y > r->high[1]) && b->motion[i] == BT_DYNAMIC) *gone = bt_max(*gone, (double)b->gid[i]);
+        else if (b->motion[i] == BT_DYNAMIC && beyond(r, p->x, p->y)) *gone = bt_max(*gone, (double)b->gid[i]);
     }
 }
 

@@ -37,7 +37,8 @@ typedef struct bt_guard {
     double overlap;         ///< m
     double energy;          ///< J
     int64_t unconverged;
-    bool escape_x, escape_y;
+    bool escape_x, escape_y;///< there are walls, and they are looked at
+    bool open_x, open_y;    ///< open edges
     double low[2], high[2]; ///< of the domain at time zero, m
     double closing[2];      ///< inward speed of the walls, m/s
     bt_gid n_floes;

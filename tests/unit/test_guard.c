@@ -173,6 +173,18 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
     c.domain.sides = BT_BOUND_OPEN;
     bt_guard_begin(&g, &c, w, 2, 0.8);
     expect(&g, w, &s, NULL);
+
+    // Out there it may go round the ends of the walls that there are; within their breadth it has come through.
+    double *x = &w->bodies.pose[bt_world_index(w, 1)].x;
+    *x = -0.5;
+    expect(&g, w, &s, NULL);
+    *y = 2;
+    expect(&g, w, &s, "floe 1 is beyond a wall");
+    *x = -5.5; // behind it
+    expect_of(&g, w, &s, true, NULL);
+    c.domain.sides = BT_BOUND_PERIODIC; // no way round
+    bt_guard_begin(&g, &c, w, 2, 0.8);
+    expect_of(&g, w, &s, true, "floe 1 is beyond a wall");
     bt_world_free(w);
 }
 
