@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Writing of a case: the resolved file, and the table of keys for --list-keys.
+#include "json.h"
 #include "largest.h"
 #include "schema.h"
 #include "value.h"
@@ -91,4 +92,55 @@ void bt_case_list_keys(void *stream)
           "floes: is a list of floes given by hand, each a map with the keys\n\n", out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
     bt_largest_print(out);
+}
+
+/// Least and most value in the unit of a number without one, and whether the value itself is left out.
+static void json_range(bt_json *j, const bt_key *k)
+{
+    bt_key bare = *k;
+    bare.unit = BT_UNIT_NONE;
+    bt_range r;
+    if (!k->range || !bt_value_range(&bare, &r)) return;
+    bt_json_number(j, "least", r.lo);
+    bt_json_bool(j, "above_least", r.lo_open);
+    bt_json_number(j, "most", r.hi);
+    bt_json_bool(j, "below_most", r.hi_open);
+}
+
+static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
+{
+    static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer", [BT_KEY_BOOL] = "bool", [BT_KEY_TEXT] = "text",
+                                        [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points"};
+    bt_json_open(j, name, '[');
+    for (int i = 0; i < n; i++) {
+        const bt_key *k = &keys[i];
+        const bool number = k->type == BT_KEY_REAL || k->type == BT_KEY_INT || k->type == BT_KEY_POINTS, rule = k->preset && k->preset[0] == '=';
+        bt_json_open(j, NULL, '{');
+        bt_json_string(j, "name", k->name);
+        bt_json_string(j, "type", types[k->type]);
+        bt_json_bool(j, "required", !k->preset);
+        bt_json_string(j, "default", rule ? NULL : k->preset);
+        bt_json_string(j, "follows", rule ? k->preset + 2 : NULL);
+        if (number) bt_json_string(j, "unit", k->type == BT_KEY_INT ? "" : bt_units_bare(k->unit));
+        if (number) json_range(j, k);
+        if (k->type == BT_KEY_CHOICE) {
+            bt_json_open(j, "choices", '[');
+            for (int c = 0; k->choices[c]; c++) bt_json_string(j, NULL, k->choices[c]);
+            bt_json_close(j, ']');
+        }
+        bt_json_string(j, "doc", k->doc);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, ']');
+}
+
+void bt_case_list_keys_json(void *stream)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    json_keys(&j, "keys", bt_case_keys, bt_n_case_keys);
+    json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
+    bt_json_close(&j, '}');
+    fputs(j.text, stream);
+    bt_json_free(&j);
 }

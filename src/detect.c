@@ -258,6 +258,19 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
     *n_man = kept;
 }
 
+double bt_contacts_overlap(bt_world *w)
+{
+    bt_tiles_begin(w); // from here on and again below, bodies may lie elsewhere
+    if (bt_tiles_update(w, bt_contacts_margin(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    detect(w, false);
+    const bt_tiles *t = w->tiles;
+    double deepest = 0;
+    for (bt_idx k = 0; k < t->n; k++)
+        if (t->tile[k].own) deepest = bt_max(deepest, t->tile[k].overlap);
+    bt_domain_maxima(w, &deepest, 1);
+    return deepest;
+}
+
 double bt_world_overlap(bt_world *w)
 {
     bt_tiles_begin(w);

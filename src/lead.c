@@ -149,7 +149,7 @@ static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
     cut(&k, (int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
     double area = 0;
     for (bt_idx p = first; p < out->n; p++) area += out->area[p];
-    const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->period_x, s->l->period_y};
+    const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->round_x, s->l->period_y};
     for (bt_idx p = first; p < out->n; p++) {
         out->thickness[p] *= f->area[i] / area;
         for (size_t d = 0; d < 2; d++) { // a piece of a floe on a periodic edge may lie beyond it
@@ -270,6 +270,7 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
         .y0 = c->domain.y0,
         .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
         .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
+        .round_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
     };
     const bt_status status = bt_lead_cut(&l, f, s, err);
     free(path);

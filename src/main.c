@@ -39,7 +39,7 @@ static void print_help(FILE *out)
     fputs("Usage: bergtow COMMAND [OPTION...]\n"
           "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
     for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-12s %s\n", commands[i].name, commands[i].summary);
-    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning\n"
+    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
           "  --version    version, revision and compiler\n"
           "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
@@ -103,7 +103,11 @@ static int bergtow(int argc, char **argv)
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
     if (help) print_help(stdout);
     else if (version) print_version(stdout, NULL);
-    else if (!strcmp(word, "--list-keys")) bt_case_list_keys(stdout);
+    else if (!strcmp(word, "--list-keys")) {
+        const bool json = argc == 3 && !strcmp(argv[2], "--json");
+        if (argc > 2 && !json) return refuse_word("option", argv[2], (const char *const[]){"--json", NULL});
+        (json ? bt_case_list_keys_json : bt_case_list_keys)(stdout);
+    }
     if (help || version || !strcmp(word, "--list-keys")) return fflush(stdout) ? BT_ERR_IO : BT_OK;
 
     if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});

@@ -153,12 +153,18 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
 static void observe_impacts(const bt_world *w, bt_sample *s)
 {
     const bt_impacts *m = w->impacts;
-    s->collision_resistance = s->collisions = s->impact_peak = NAN;
-    if (!m || !w->tow) return;
     s->collision_resistance = 0.0 - (m->collision_x * w->tow->ux + m->collision_y * w->tow->uy) / w->par.dt;
     s->collisions = (double)m->n_closed;
     s->impact_peak = 0;
     for (int64_t i = 0; i < m->n_closed; i++) s->impact_peak = bt_max(s->impact_peak, m->closed[i].peak);
+}
+
+unsigned bt_observe_applies(const bt_world *w)
+{
+    const bool body = w->towed >= 0, line = body && bt_tow_has_line(w->tow);
+    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE | (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
+           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL | (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
+           (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
 }
 
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
@@ -187,34 +193,20 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .current_y = w->par.water_v,
         .wind_x = w->par.air_u,
         .wind_y = w->par.air_v,
-        .line_tension = NAN,
-        .line_length = NAN,
-        .carriage_x = NAN,
-        .carriage_y = NAN,
-        .line_tension_1 = NAN,
-        .line_tension_2 = NAN,
-        .vessel_x = NAN,
-        .vessel_y = NAN,
-        .vessel_speed = NAN,
-        .vessel_thrust = NAN,
-        .vessel_drag = NAN,
-        .vessel_inertia = NAN,
-        .vessel_line = NAN,
-        .window_x = w->window ? bt_window_low(w->window) : NAN,
-        .window_renewed = w->window ? (double)w->window->renewed_now : NAN,
-        .window_waiting = w->window ? (double)w->window->waiting : NAN,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
     const bt_totals seen = observe_tiles(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
-    observe_impacts(w, s);
-    if (w->towed >= 0) {
-        observe_body(w, &seen, s);
-    } else {
-        s->tow_force = s->ice_resistance = s->ice_resistance_budget = s->ice_force_x = s->ice_force_y = s->ice_moment = NAN;
-        s->drag_force = s->coriolis_force = s->tilt_force = s->inertia_force = s->body_x = s->body_y = s->body_yaw = NAN;
-        s->body_vx = s->body_vy = s->body_yaw_rate = NAN;
+    const unsigned has = bt_observe_applies(w);
+    if (has & 1u << BT_APPLIES_BODY) observe_body(w, &seen, s);
+    if (has & 1u << BT_APPLIES_IMPACTS) observe_impacts(w, s);
+    if (w->window) {
+        s->window_x = bt_window_low(w->window);
+        s->window_renewed = (double)w->window->renewed_now;
+        s->window_waiting = (double)w->window->waiting;
     }
+    for (int k = 0; k < bt_n_series_fields; k++)
+        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 
 void bt_observe_contact_force(const bt_world *w, double *force)
@@ -228,14 +220,4 @@ void bt_observe_contact_force(const bt_world *w, double *force)
             force[u->b] = bt_max(force[u->b], f);
         }
     bt_domain_largest(w, force);
-}
-
-bt_idx bt_observe_not_finite(const bt_world *w)
-{
-    const bt_bodies *b = &w->bodies;
-    for (bt_idx i = 0; i < b->n; i++) {
-        double s = b->pose[i].x + b->pose[i].y + b->pose[i].yaw + b->vel[i].x + b->vel[i].y + b->vel[i].w;
-        if (!isfinite(s)) return i;
-    }
-    return -1;
 }

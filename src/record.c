@@ -35,6 +35,7 @@ static void create_series(bt_record *r)
         bt_h5_attr_text(&r->h5, name, "units", f->units);
         bt_h5_attr_text(&r->h5, name, "description", f->description);
         bt_h5_attr_text(&r->h5, name, "merge", merge[f->keep]);
+        bt_h5_attr_text(&r->h5, name, "applies", bt_applies_names[f->applies]);
         free(name);
     }
 }
@@ -177,13 +178,6 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 
 static double *member(bt_sample *s, int k) { return (double *)(void *)((char *)s + bt_series_fields[k].offset); }
 
-static double member_of(const bt_sample *s, int k)
-{
-    double value;
-    memcpy(&value, (const char *)s + bt_series_fields[k].offset, sizeof value);
-    return value;
-}
-
 void bt_record_flush(bt_record *r)
 {
     for (int k = 0; k < bt_n_series_fields; k++)
@@ -217,7 +211,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     bt_impact_store_take(&r->impacts);
     for (int k = 0; k < bt_n_series_fields; k++) {
         double *m = member(&r->merged, k);
-        const double x = member_of(s, k);
+        const double x = bt_sample_value(s, &bt_series_fields[k]);
         switch (r->n_merged ? bt_series_fields[k].keep : BT_KEEP_LAST) {
         case BT_KEEP_LAST: *m = x; break;
         case BT_KEEP_MEAN:
@@ -228,6 +222,11 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
     if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS)) bt_record_flush(r);
     return r->h5.status;
+}
+
+void bt_record_overlap(bt_record *r, double overlap)
+{
+    if (r->comm->rank == 0) r->history.max_overlap = bt_max_seen(r->history.max_overlap, overlap);
 }
 
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err)

@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "bergtow/checkpoint.h"
+#include "bergtow/contacts.h"
 #include "bergtow/estimate.h"
 #include "bergtow/impact.h"
 #include "bergtow/observe.h"
@@ -165,19 +166,19 @@ static bt_status loop(run *r, bt_errors *err)
         bt_sample s;
         bt_observe(w, r->reference_speed, &s);
         bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
-        if (status == BT_OK) status = bt_record_sample(r->record, &s, err);
+        const bt_status sound = bt_guard_check(&r->guard, w, &s, err);
+        const bool writable = !bt_sample_fault(&s, bt_observe_applies(w)); // what is not has been told, and the series hold numbers only
+        if (status == BT_OK && writable) status = bt_record_sample(r->record, &s, err);
         if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
-        const bt_status sound = isfinite(s.kinetic_energy) ? bt_guard_check(&r->guard, w, err) : bt_guard_finite(w, err);
         if (status == BT_OK) status = sound;
         status = agree(r, status);
+        if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, w, err);
         if (status == BT_OK) status = frame_if_due(r, s.time, err);
         const bool last = w->step == r->end_step || bt_halt_stops(r->asked); // then one is written anyway
         if (status == BT_OK && bt_halt_saves(r->asked) && !last) status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
         bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
         r->totals.phases.output += bt_clock() - t0;
     }
-    if (status == BT_OK) status = bt_comm_agree(r->comm, bt_guard_finite(w, err));
-    r->failed = status == BT_ERR_NUMERIC && w->step > r->first_step;
     return status;
 }
 
@@ -195,6 +196,17 @@ static void total_up(run *r)
     note_division(r);
 }
 
+/// Collective. Guards and deepest overlap of the state that the last step has left, which no further step looks at. Its contacts are looked for as the
+/// next step would, so the number is the same after any resume and on any ranks; the state has been saved, and none of it is written from here on.
+static bt_status look_last(run *r, bt_errors *err)
+{
+    const double overlap = bt_contacts_overlap(r->w);
+    bt_record_overlap(r->record, overlap);
+    const bt_status status = bt_comm_agree(r->comm, bt_guard_check_end(&r->guard, r->w, overlap, err));
+    if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, r->w, err);
+    return status;
+}
+
 /// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order. The result takes its place before the checkpoint, which
 /// counts on it.
 static bt_status finish(run *r, bt_errors *err)
@@ -204,6 +216,7 @@ static bt_status finish(run *r, bt_errors *err)
     bt_status status = bt_running_save(r, &s, err); // before what is still open is closed
     r->totals.wall_time += bt_clock() - r->began;
     total_up(r);
+    if (status == BT_OK) status = look_last(r, err);
     if (bt_halt_stops(r->asked) && r->w->step < r->end_step) {
         bt_halt_describe(&r->halt, r->asked, r->w->step, stopped);
         r->totals.stopped = stopped;
@@ -229,7 +242,7 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     r->end_step = r->until >= 0 ? r->until : r->o->max_steps > 0 && asked < whole ? asked : whole;
     r->progress = (bt_progress){.interval = r->c->output.progress, .n_steps = r->end_step, .quiet = r->o->quiet};
     bt_progress_start(&r->progress, r->w->step);
-    bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size, r->reference_speed);
+    bt_guard_begin(&r->guard, r->c, r->w, r->roster.n_floes, r->roster.mean_size);
     bt_halt_begin(&r->halt);
     r->began = bt_clock();
     if (!kept) {
@@ -248,6 +261,7 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
         bt_record_close(r->record, NULL, status == BT_ERR_IO ? &more : err);
         bt_errors_free(&more);
     }
+    r->failed = status == BT_ERR_NUMERIC && r->w->step > r->first_step;
     bt_halt_end(&r->halt);
     return status;
 }

@@ -227,9 +227,9 @@ const bt_key bt_case_keys[] = {
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
     REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]", "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),
-    REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]", "kinetic energy of all bodies / that at the reference speed that ends the run, 0 = any is let through; assumed"),
+    REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]", "kinetic energy of all bodies / that at the start and at the speeds that tow, walls, current, wind and slope can drive them to, that ends the run; 0 = any is let through; assumed"),
     INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]", "steps in a row without convergence that end the run, 0 = any number is let through; assumed"),
-    BOOL("guard.escape", guard.escape, "true", "a floe beyond a wall of the domain ends the run"),
+    BOOL("guard.escape", guard.escape, "true", "a floe or the towed body beyond a wall of the domain ends the run"),
 
     CHOICE("impact.conversion", impact.conversion, conversions, "duration",
            "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a corner at a pressure; none: collisions are not told apart"),

@@ -313,6 +313,48 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     return status;
 }
 
+static bool all_finite(const double *x, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++)
+        if (!isfinite(x[k])) return false;
+    return true;
+}
+
+/// The first row that is no number.
+static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base, char name[64])
+{
+    for (int k = 0; base && k < n_rows; k++) {
+        if (row[k].type != BT_ITEM_F64 || all_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width)) continue;
+        snprintf(name, 64, "%s/%s", group, row[k].name);
+        return name;
+    }
+    return NULL;
+}
+
+/// What a collision under way is made of; its corner is NaN where there is none.
+static bool open_finite(const bt_impact_open *o)
+{
+    const double real[] = {o->so_far.time, o->so_far.x, o->so_far.y, o->so_far.impulse, o->so_far.approach, o->so_far.mass, o->so_far.thickness, o->rest, o->largest};
+    return all_finite(real, N_OF(real));
+}
+
+const char *bt_state_not_finite(const bt_world *w, char name[64])
+{
+    const char *found = rows_not_finite("world", world_rows, N_OF(world_rows), w, name);
+    if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
+    if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
+    if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
+    const bt_impacts *m = w->impacts;
+    if (!found) found = rows_not_finite("impacts", impacts_rows, N_OF(impacts_rows), m, name);
+    if (found || !m) return found;
+    if (!all_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
+    for (int64_t k = 0; k < m->n_open; k++)
+        if (!open_finite(&m->open[k])) return "impacts/open";
+    for (int k = 0; k < m->panels.n; k++)
+        if (!all_finite((const double *)(const void *)&m->panels.panel[k], PANEL_WIDTH)) return "impacts/panels";
+    return NULL;
+}
+
 /// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are constants, too.
 static bool same_constants(const bt_params *now, const bt_params *then, bool steady)
 {

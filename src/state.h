@@ -17,6 +17,10 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
 /// the hash it was saved with).
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 
+/// The first number of world, step, tow, window and collisions that is none, by its name in a checkpoint ("tow/vessel_vx"); NULL = all are numbers.
+/// Those of the bodies are not looked at.
+const char *bt_state_not_finite(const bt_world *w, char name[64]);
+
 /// The ice field at time zero; on rank 0.
 void bt_state_save_field(const bt_field *f, bt_snapshot *s);
 void bt_state_load_field(bt_field *f, bt_snapshot *s);

@@ -33,6 +33,15 @@ PRESS = {
     "solver": {"max_sweeps": 60},
     "output": {"frame_interval": 0.5},
 }
+# Walls that close faster than the solver, cut short, can push the floes along.
+CLOSING = {
+    "run": {"dt": 0.1, "duration": 4},
+    "domain": {"length": 8, "width": 6, "ends_closing": 0.9, "sides_closing": 0.6},
+    "ice": {"concentration": 0.7, "size": 0.9},
+    "body": {"shape": "none"},
+    "solver": {"max_sweeps": 2, "position_sweeps": 0},
+    "guard": {"overlap": 0},
+}
 
 
 def changed(base, **changes):

@@ -196,7 +196,7 @@ typedef struct bt_case {
     } solver;
     struct {                     ///< what ends a run, see src/guard.h; 0 or false = not looked at
         double overlap;          ///< / mean floe size
-        double energy;           ///< / that at the reference speed
+        double energy;           ///< / what the case can drive the bodies to
         int64_t unconverged;     ///< steps in a row
         bool escape;             ///< a floe beyond a wall
     } guard;
@@ -285,5 +285,9 @@ void bt_case_free(bt_case *c);
 
 /// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream.
 void bt_case_list_keys(void *stream);
+
+/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows), unit, range, choices and meaning; numbers of
+/// the range in the unit of a number written without one.
+void bt_case_list_keys_json(void *stream);
 
 #endif

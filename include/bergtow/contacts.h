@@ -49,6 +49,11 @@ double bt_contacts_margin(const bt_world *w, double s);
 /// same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
 void bt_contacts_detect(bt_world *w, bool again);
 
+/// Deepest overlap of the state after a step, m: what the next step would find before it solves anything, in the tiles that have moved, crushed
+/// ice left out. Poses and velocities stay; contacts, labels, storage and marks of crushing that have come apart do not, so the state must have been
+/// saved. Collective.
+double bt_contacts_overlap(bt_world *w);
+
 /// Everything within margin, whether at rest or not (tests, deepest overlap).
 void bt_contacts_detect_all(bt_world *w, double margin);
 

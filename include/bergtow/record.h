@@ -3,6 +3,8 @@
 #ifndef BERGTOW_RECORD_H
 #define BERGTOW_RECORD_H
 
+#include <string.h>
+
 #include "bergtow/base.h"
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
@@ -59,14 +61,34 @@ typedef struct bt_sample {
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
 
+/// What a run must have for a number of its series to mean anything. Where it has not, the number is NaN, and nowhere else.
+typedef enum { BT_APPLIES_ALWAYS, BT_APPLIES_BODY, BT_APPLIES_LINE, BT_APPLIES_BRIDLE, BT_APPLIES_VESSEL, BT_APPLIES_IMPACTS, BT_APPLIES_WINDOW, BT_APPLIES_KINDS } bt_applies;
+extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line"
+
 typedef struct bt_series_field {
     const char *name, *units, *description;
     size_t offset;  ///< of the double in bt_sample
     bt_keep keep;
+    bt_applies applies;
 } bt_series_field;
 
 extern const bt_series_field bt_series_fields[];
 extern const int bt_n_series_fields;
+
+/// A number of a sample by its field.
+static inline double bt_sample_value(const bt_sample *s, const bt_series_field *f)
+{
+    double value;
+    memcpy(&value, (const char *)s + f->offset, sizeof value);
+    return value;
+}
+
+/// Larger than any quantity of a run, and small enough for the squares that the statistics sum up.
+#define BT_SAMPLE_MOST 1e100
+
+/// The first field that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the sample is sound.
+/// has: bit 1 << k for each bt_applies k of the run.
+const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has);
 
 /// Wall time by phase of the step, s.
 typedef struct bt_phases {
@@ -159,6 +181,10 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 /// returns BT_ERR_IO; only the first adds a message. Rank 0 records; on others nothing is done, and the status is not
 /// that of rank 0: agree on it.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
+
+/// An overlap that no sample holds: that of the last state, m. After bt_record_save, whose state a further step goes on from and measures
+/// again. On rank 0.
+void bt_record_overlap(bt_record *r, double overlap);
 
 /// Write the events that came since the last call into /events (time, kind, subject, value; names of the kinds in kind_names). On rank 0, as
 /// for bt_record_sample.

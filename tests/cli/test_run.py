@@ -48,7 +48,7 @@ def test_summary_tells_the_truth(finished):
     assert 0 < sum(s["phases_s"].values()) <= s["wall_time_s"] * 1.001
     assert s["ns_per_floe_step"] == pytest.approx(s["wall_time_s"] * 1e9 / 300 / s["n_floes"], rel=1e-9)
     overlap, sweeps, contacts = finished.series("overlap", "sweeps", "contacts")
-    assert s["max_overlap_m"] == overlap.max() > 0
+    assert s["max_overlap_m"] >= overlap.max() > 0 # and of the last state: test_guards.py
     assert s["mean_sweeps"] == pytest.approx(sweeps.mean()) and s["contacts_mean"] == pytest.approx(contacts.mean())
     assert 0 < s["mean_ice_resistance_se_n"] < s["mean_ice_resistance_n"] < s["mean_tow_force_n"]
 

@@ -224,11 +224,13 @@ static void altered(const bt_snapshot *from, const uint8_t *data, size_t n, bt_s
 
 static void step_on(bt_running *r)
 {
-    for (int k = 0; k < STEPS && r->w->step < bt_case_steps(r->c) && bt_observe_not_finite(r->w) < 0; k++) {
+    bool sound = true;
+    for (int k = 0; k < STEPS && r->w->step < bt_case_steps(r->c) && sound; k++) {
         bt_world_step(r->w);
         bt_sample s;
         bt_observe(r->w, bt_case_reference_speed(r->c), &s);
         bt_stall_step(&r->totals.stall, r->w, r->roster.mean_size);
+        sound = !bt_sample_fault(&s, bt_observe_applies(r->w));
     }
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
 }

@@ -205,7 +205,7 @@ static void a_lead_goes_over_the_seam(void **state)
     (void)state;
     const double path[] = {30, 0, 30 + 60, 0}; // to x = 10 of the next period but one: the whole width of the domain
     for (int managed = 0; managed < 2; managed++) {
-        const bt_lead l = {.mode = managed ? BT_LEAD_MANAGED : BT_LEAD_CHANNEL, .width = 2, .floe_size = 0.7, .n = 2, .path = path, .period_x = 40, .y0 = -10};
+        const bt_lead l = {.mode = managed ? BT_LEAD_MANAGED : BT_LEAD_CHANNEL, .width = 2, .floe_size = 0.7, .n = 2, .path = path, .period_x = 40, .round_x = 40, .y0 = -10};
         bt_field f;
         make_field(&f, BT_BOUND_PERIODIC);
         bt_lead_stats s;

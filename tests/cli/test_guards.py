@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Guards as a user meets them: what ends a run, what no longer does, and what the last state is held against."""
+import json
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from harness import CLOSING, DONE, NUMERIC, SIGNAL, TOW, Run, call, changed, placed, run, worst_overlap, write_case
+
+# A floe of 10¹⁶ kg at 100 m/s: more energy than sums hold.
+HEAVY = {
+    "run": {"dt": 1, "duration": 20},
+    "domain": {"length": 1e6, "width": 1e6, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "density": 1100, "added_mass": 10, "size": 1e5},
+    "body": {"shape": "none"},
+    "floes": [{"shape": "disc", "length": 1e5, "x": 3e5, "y": 0, "thickness": 100, "vx": 100}],
+}
+
+
+def beyond(folder, frame=-1):
+    """Floes whose centroid is beyond a wall of CLOSING in a frame."""
+    with h5py.File(folder / "result.h5") as f:
+        pose, time = f["frames/pose"][frame], f["frames/time"][frame]
+    x, y = 0.9 * time, 0.6 * time
+    return np.sum((pose[:, 0] < x) | (pose[:, 0] > 8 - x) | (np.abs(pose[:, 1]) > 3 - y))
+
+
+def test_floes_beyond_walls_end_the_run_at_the_step_they_pass(tmp_path):
+    """A run of fewer than 50 steps, and one that ends between two multiples of 50; walls are where they have closed to."""
+    free = run(tmp_path, changed(CLOSING, guard__escape=False), "--quiet", name="free")
+    assert beyond(free.dir) > 10
+    r = run(tmp_path, CLOSING, "--quiet", code=NUMERIC)
+    said = re.search(r"step (\d+): floe \d+ is beyond a wall \(guard.escape\)", r.result.stderr)
+    assert said and not (r.dir / "summary.json").exists(), r.result.stderr
+    step = int(said[1])
+    before = run(tmp_path, changed(CLOSING, guard__escape=False), "--quiet", "--steps", step - 1, name="before")
+    at = run(tmp_path, changed(CLOSING, guard__escape=False), "--quiet", "--steps", step, name="at")
+    assert (beyond(before.dir), beyond(at.dir) > 0) == (0, True)
+    assert said[0] in call("resume", r.dir / "failure.h5", "--quiet").stderr
+
+
+def test_energy_that_overflows_ends_the_run(tmp_path):
+    r = run(tmp_path, HEAVY, "--quiet", code=NUMERIC)
+    assert re.search(r"step 1: kinetic_energy \(kinetic energy of all dynamic bodies.*\) is not a number, or came from some too large to be summed up", r.result.stderr), r.result.stderr
+    assert (r.dir / "failure.h5").exists() and not (r.dir / "summary.json").exists()
+    assert np.isfinite(r.series("kinetic_energy")).all() and not len(r.series("time"))
+
+
+@pytest.mark.parametrize("more", [{"air__wind_x": 15}, {"air__wind_x": 15, "ice__thickness": 0.002}, {"water__current_y": 1, "domain__sides": "periodic"},
+                                  {"water__tide__major": 1, "water__tide__period": 40, "domain__sides": "periodic"},
+                                  {"water__tilt": "slope", "water__slope_x": 0.01}])
+def test_what_drives_the_ice_is_no_failure_on_a_slow_tow(tmp_path, more):
+    """Wind, current, tide or slope that move the ice a hundred times faster than the tow, over as many steps as they take to."""
+    r = run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40, **more), "--quiet")
+    assert r.series("kinetic_energy").max() > 0
+
+
+def test_a_table_of_wind_drives_the_ice(tmp_path):
+    (tmp_path / "wind.csv").write_text("t,u,v\n0,0,0\n10,15,0\n40,15,0\n")
+    run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40, air={"wind_table": "wind.csv"}), "--quiet")
+
+
+def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
+    r = run(tmp_path, changed(TOW, air__wind_x=15, guard__energy=1e-3), "--quiet", code=NUMERIC)
+    assert re.search(r"step \d+: the bodies have \S+ J of kinetic energy, more than the \S+ J that guard.energy allows", r.result.stderr)
+
+
+# ---- the last state ----
+
+LAST = changed(CLOSING, domain__ends_closing=0.3, domain__sides_closing=0.2, guard={"overlap": 0, "escape": False}, run__duration=3, output__frame_interval=1, output__checkpoint_steps=7)
+
+
+def measured(r):
+    """Deepest overlap in the last frame, by its polygons: of the floes, and of floes with walls."""
+    with h5py.File(r.dir / "result.h5") as f:
+        vertices, offsets, pose = f["floes/vertices"][()], f["floes/offsets"][()], f["frames/pose"][-1]
+        time = f["frames/time"][-1]
+    polygons = [placed(vertices[a:b], p) for a, b, p in zip(offsets, offsets[1:], pose)]
+    all_points = np.vstack(polygons)
+    x, y = 0.3 * time, 0.2 * time
+    return max(worst_overlap(polygons), x - all_points[:, 0].min(), all_points[:, 0].max() - 8 + x, y - 3 - all_points[:, 1].min(), all_points[:, 1].max() - 3 + y)
+
+
+def test_the_largest_overlap_includes_the_last_state(tmp_path):
+    r = run(tmp_path, LAST, "--quiet")
+    deep = measured(r)
+    assert deep > 1.01 * r.series("overlap").max(), "the last state is no deeper than those before: nothing is tested"
+    assert r.summary["max_overlap_m"] == pytest.approx(deep, rel=1e-6)
+    assert any(re.match(rf"bodies overlap by up to {deep:.2g} m", w) for w in r.summary["warnings"])
+
+
+def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):
+    """Stopped at steps where the last look would be deeper or not, and gone on with: summary, series and state of a run never stopped."""
+    whole = run(tmp_path, LAST, "--quiet", name="whole")
+    case = write_case(tmp_path, LAST)
+    assert call("run", case, "-o", tmp_path / "bits", "--quiet", "--steps", 5).returncode == DONE
+    stopped = json.loads((tmp_path / "bits/summary.json").read_text())["max_overlap_m"]
+    with h5py.File(whole.dir / "result.h5") as f: # what the next step has found
+        assert stopped == f["series/overlap"][5]
+    for _ in range(3):
+        assert call("resume", tmp_path / "bits", "--quiet", "--steps", 8).returncode in (DONE, SIGNAL)
+    assert call("resume", tmp_path / "bits", "--quiet").returncode == DONE
+    parts = Run(tmp_path / "bits", None)
+    clocks = {"wall_time_s", "phases_s", "ns_per_floe_step", "memory_per_floe_b"}
+    assert {k: v for k, v in parts.summary.items() if k not in clocks} == {k: v for k, v in whole.summary.items() if k not in clocks}
+    with h5py.File(whole.dir / "result.h5") as a, h5py.File(parts.dir / "result.h5") as b:
+        assert all(np.array_equal(a["series"][n][:], b["series"][n][:], equal_nan=True) for n in a["series"])
+
+
+def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
+    """The limit lies between what the steps have found and what the last one has left."""
+    free = run(tmp_path, LAST, "--quiet", name="free")
+    size = free.summary["mean_size_m"]
+    limit = 0.5 * (free.series("overlap").max() + free.summary["max_overlap_m"]) / size
+    r = run(tmp_path, changed(LAST, guard__overlap=limit), "--quiet", code=NUMERIC)
+    assert re.search(r"step 30: two bodies overlap by \S+ m", r.result.stderr) and not (r.dir / "summary.json").exists(), r.result.stderr
+    again = call("resume", r.dir / "failure.h5", "--quiet")
+    assert again.returncode == NUMERIC and "step 30: two bodies overlap" in again.stderr
+
+
+# ---- what applies ----
+
+@pytest.mark.parametrize("case, has", [
+    (changed(TOW, run__duration=2), {"always", "with a towed body", "where collisions are told apart"}),
+    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=2, impact={"conversion": "none"}), {"always", "with a towed body", "with a tow line"}),
+    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=3, tow__line={"branches": 2}),
+     {"always", "with a towed body", "with a tow line", "with a tow line of two branches", "where collisions are told apart"}),
+    (changed(CLOSING, run__duration=1), {"always"}),
+])
+def test_each_series_says_when_it_applies(tmp_path, case, has):
+    """Numbers where it does and NaN where it does not, as the attribute has it."""
+    r = run(tmp_path, case, "--quiet")
+    said = set()
+    with h5py.File(r.dir / "result.h5") as f:
+        for name, series in f["series"].items():
+            applies = series.attrs["applies"]
+            assert (np.isfinite if applies in has else np.isnan)(series[:]).all(), (name, applies)
+            said.add(applies)
+    assert has <= said and len(said) == 7

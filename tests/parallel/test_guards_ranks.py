@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: MIT
+"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest overlap of the last state.
+
+What turns these tests red: the body named by each rank for itself (two messages); the overlap of the last state without the maximum over the ranks.
+"""
+import json
+
+import pytest
+
+from harness import CLOSING, DONE, NUMERIC, changed, run, write_case
+from test_ranks_output import mpirun, ours
+
+# Longer, so that there are tiles for all.
+WIDE = {"domain__length": 16, "domain__width": 9}
+
+
+def told(text):
+    return sorted(line for line in text.splitlines() if "failure.h5" not in line)
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_a_floe_beyond_a_wall_is_named_once(tmp_path, ranks):
+    case = changed(CLOSING, **WIDE)
+    one = run(tmp_path, case, "--quiet", code=NUMERIC)
+    several = mpirun(ranks, "run", write_case(tmp_path, case), "-o", tmp_path / "several", "--quiet")
+    assert several.returncode == NUMERIC
+    assert told(one.result.stderr) == sorted(line for line in ours(several) if "failure.h5" not in line)
+    assert (tmp_path / "several/failure.h5").exists()
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_the_overlap_of_the_last_state(tmp_path, ranks):
+    case = changed(CLOSING, run__duration=3.5, guard={"overlap": 0, "escape": False}, **WIDE)
+    one = run(tmp_path, case, "--quiet")
+    assert one.summary["max_overlap_m"] > one.series("overlap").max()
+    assert mpirun(ranks, "run", write_case(tmp_path, case), "-o", tmp_path / "several", "--quiet").returncode == DONE
+    several = json.loads((tmp_path / "several/summary.json").read_text())
+    assert [several[k] for k in ("max_overlap_m", "state_hash")] == [one.summary[k] for k in ("max_overlap_m", "state_hash")]
