@@ -18,6 +18,7 @@
 #define BT_ARCH_WIDTHS 30.0       ///< body widths of domain from which on they are not expected, assumed
 
 typedef struct bt_arch {
+    double concentration; ///< as given
     double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
     double floes;         ///< the same in mean floe sizes; NaN without floes
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
@@ -26,5 +27,8 @@ typedef struct bt_arch {
 
 /// concentration, and mean floe size in m (0 without floes): as made, or as the case asks for.
 bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size);
+
+/// Tell of a width of which the answer is a property.
+void bt_arch_warn(const bt_arch *a, bt_errors *warnings);
 
 #endif

@@ -43,6 +43,11 @@ double bt_case_line_period(const bt_case *c);
 
 #define BT_RAMP_PERIODS 2.0 ///< of the body on its line that a start takes which does not jerk it, assumed
 
+/// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a line)?
+bool bt_case_start_is_slow(const bt_case *c);
+/// Tell of a start that is not.
+void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
+
 /// A check under way, for the checks that stand in files of their own (case_tow.c).
 typedef struct bt_check bt_check;
 bt_case *bt_check_case(const bt_check *k);

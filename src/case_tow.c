@@ -149,6 +149,19 @@ double bt_case_line_period(const bt_case *c)
     return isfinite(period) ? period : 0;
 }
 
+bool bt_case_start_is_slow(const bt_case *c)
+{
+    return c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12);
+}
+
+void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
+{
+    if (bt_case_start_is_slow(c)) return;
+    const double period = bt_case_line_period(c);
+    bt_errors_add(warnings, "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the line, and it swings on; leave "
+                  "tow.ramp out, or take at least %.3g s", c->tow.ramp, period, BT_RAMP_PERIODS * period);
+}
+
 void bt_case_tow_ramp(bt_case *c)
 {
     if (!isnan(c->tow.ramp)) return;

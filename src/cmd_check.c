@@ -9,6 +9,7 @@
 #include "bergtow/rope.h"
 #include "bergtow/setup.h"
 #include "bergtow/shape.h"
+#include "arch.h"
 #include "case_check.h"
 #include "cmd.h"
 #include "cmd_check.h"
@@ -140,21 +141,12 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
                       0.1 * s.size / bt_case_reference_speed(c));
 }
 
-/// Is the ramp long for the body on its line, or a programme given instead?
-static bool start_is_slow(const bt_case *c) { return c->tow.n_programme > 0 || c->tow.ramp >= BT_RAMP_PERIODS * bt_case_line_period(c) * (1 - 1e-12); }
-
-static void warn_of_start(const bt_case *c, bt_errors *warnings)
-{
-    const bool line = c->body.shape != BT_BODY_ABSENT && (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST);
-    if (line && !start_is_slow(c))
-        bt_errors_add(warnings, "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks it; take at least %.3g s", c->tow.ramp, bt_case_line_period(c),
-                      BT_RAMP_PERIODS * bt_case_line_period(c));
-}
-
 void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
+    const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
+    bt_arch_warn(&arch, warnings);
     warn_of_step(c, n, warnings);
-    warn_of_start(c, warnings);
+    bt_case_warn_start(c, warnings);
 }
 
 static void print_ice(const bt_case *c, const bt_check_ice *n)
@@ -177,7 +169,7 @@ static void print_line(const bt_case *c)
         printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
                rope.stiffness, rope.breaking, rope.source);
     printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
-           start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
+           bt_case_start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
     printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,
@@ -217,7 +209,6 @@ static void print_body(const bt_case *c)
     double mass = bt_case_body_mass(c), displaced = c->water.density * m.area * c->body.draft;
     printf("body                 %.4g m along the tow, %.4g m across, waterline %.4g m2, draft %.4g m, sail %.4g m\n", along, across, m.area, c->body.draft, c->body.sail);
     printf("body mass            %.4g kg, %.4g kg with added mass; displaced water %.4g kg (ratio %.3f)\n", mass, mass * (1 + c->body.added_mass), displaced, mass / displaced);
-    printf("domain width / body  %.3g\n", c->domain.width / across);
     double speed = c->tow.speed;
     if (c->tow.mode == BT_TOW_NONE) {
         printf("tow                  none, free drift\n");
@@ -314,6 +305,15 @@ static void print_warnings(const char *path, const bt_errors *w)
     if (w->n) printf("%s: valid%s\n", path, warned(w->n, text));
 }
 
+static void print_width(const bt_case *c, const bt_check_ice *n)
+{
+    const bt_arch a = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
+    printf("domain width         ");
+    if (isfinite(a.bodies)) printf("%.3g body widths, ", a.bodies);
+    if (isfinite(a.floes)) printf("%.3g floe sizes, ", a.floes);
+    printf("%s: arches of rigid floes %s\n", a.sides, a.possible ? "POSSIBLE" : "not expected");
+}
+
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
     const bt_comm *comm = bt_comm_world();
@@ -331,6 +331,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     print_crushing(c, &n);
     print_outlines(&f->outlines, c);
     print_body(c);
+    print_width(c, &n);
     print_window(c);
     print_environment(c);
     print_lead(c, &lead);

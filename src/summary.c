@@ -74,14 +74,6 @@ static void reduce_window(bt_summary *s, const bt_history *h)
                       "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
 }
 
-static void warn_of_arches(bt_summary *s, const bt_case *c, const bt_run_totals *t)
-{
-    const bt_arch a = bt_arch_of(c, t->concentration, t->mean_size);
-    if (a.possible)
-        bt_errors_add(&s->warnings, "the domain is %.3g body widths wide, and its %s can carry arches of rigid floes at %.0f %% ice: the resistance is also a property of "
-                      "that width; compare with a wider domain (%g body widths, assumed)", a.bodies, a.sides, 100 * t->concentration, BT_ARCH_WIDTHS);
-}
-
 /// A line that broke changes what the means stand for.
 static void warn_of_events(bt_summary *s, const bt_events *e)
 {
@@ -93,14 +85,13 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
     }
 }
 
-/// The verdict, where it is not "steady", and a ramp that jerks the body on its line.
-static void warn_of_window(bt_summary *s, const bt_case *c)
+/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start and its width.
+static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals *t)
 {
     if (s->window.verdict != BT_STEADY) bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
-    const double period = bt_case_line_period(c);
-    if (c->tow.n_programme == 0 && c->tow.ramp < BT_RAMP_PERIODS * period * (1 - 1e-12))
-        bt_errors_add(&s->warnings, "tow.ramp of %g s is shorter than %g periods of the body on its line (%.3g s each): the start jerks the line, and it swings on; "
-                      "leave tow.ramp out, or take at least %.3g s", c->tow.ramp, BT_RAMP_PERIODS, period, BT_RAMP_PERIODS * period);
+    bt_case_warn_start(c, &s->warnings);
+    const bt_arch arch = bt_arch_of(c, t->concentration, t->mean_size);
+    bt_arch_warn(&arch, &s->warnings);
 }
 
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
@@ -117,8 +108,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (body) {
         bt_steady_find(&s->window, h, c, t);
         reduce_window(s, h);
-        warn_of_window(s, c);
-        warn_of_arches(s, c, t);
+        warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;
         bt_estimate_conditions(c, &s->estimate);
         s->estimate.concentration = t->concentration;
