@@ -16,12 +16,15 @@ import stat_extreme
 import stat_fit
 import stat_mean
 import stat_sensitivity
+import style
 from bergtow_read import RunError
 from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
 
 import numpy as np
 
 ESTIMATES = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
+LEAST_DRIFT = 5  # fields
+MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/steady.h
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
 
 
@@ -81,6 +84,20 @@ def extremes(e, rows, options):
             "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)}
 
 
+def drift(e, rows, mean):
+    """Does the mean of all fields change over the window? From the line through each member's ice resistance, which one run alone may not tell from its noise."""
+    change = e.summary.get("window_series_ice_resistance_change_n", np.full(e.n, np.nan))[rows]
+    change = change[np.isfinite(change)]
+    if len(change) < LEAST_DRIFT:
+        return {"verdict": "not judged", "words": "too few fields, or results of an earlier version"}
+    low, high = stat_mean.t_interval(change)
+    factor, unit = style.scale([abs(change.mean())], "N")
+    moved = (low > 0 or high < 0) and abs(change.mean()) > MATERIAL * abs(mean)
+    words = (f"{'rises' if change.mean() > 0 else 'falls'} by {style.short(abs(change.mean()) / factor)} {unit} "
+             f"(95 %: {style.short(min(abs(low), abs(high)) / factor)} to {style.short(max(abs(low), abs(high)) / factor)})") if moved else "no drift"
+    return {"verdict": "not steady" if moved else "steady", "change": change.mean(), "change_95": (low, high), "words": words}
+
+
 def condition(e, c, members, options):
     """All statistics of one condition."""
     rows = c.finished
@@ -91,7 +108,7 @@ def condition(e, c, members, options):
     return {"index": c.index, "label": c.label, "values": c.values, "units": c.units,
             "members": {"all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
                         "doubts": {kind: sum(kind in e.doubts(m) for m in rows) for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)},
-            "resistance": fields, "estimates": estimates(e, rows, fields.get("mean", np.nan)),
+            "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)), "estimates": estimates(e, rows, fields.get("mean", np.nan)),
             "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)],
             "samples": {"independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
                         "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]},

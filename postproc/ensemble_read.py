@@ -28,7 +28,8 @@ MIN_INDEPENDENT = 20  # samples below which the program itself calls a window sh
 DOUBTS = {
     "unconverged": "steps met the sweep limit before the tolerance",
     "jammed": "the towed body stood still while the tow asked for motion",
-    "short": "no steady window, or fewer than 20 independent samples in it",
+    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not solved",
+    "short": "no window, or fewer than 20 independent samples in it",
     "stopped": "the run stopped early",
     "other": "a warning of another kind",
 }
@@ -164,9 +165,10 @@ class Ensemble:
         for m in np.flatnonzero(self.status == FINISHED):
             texts, found = self._texts(m), set()
             window = texts.get("window") or {}
-            independent = self.number("window_n_independent", m)
+            verdict, independent = window.get("verdict"), self.number("window_n_independent", m)
+            short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(window.get("warning"))
             checks = {"unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
-                      "short": not independent >= MIN_INDEPENDENT or bool(window.get("warning")), "stopped": bool(texts.get("stopped"))}
+                      "unsteady": verdict == "not steady", "short": short, "stopped": bool(texts.get("stopped"))}
             found |= {kind for kind, there in checks.items() if there}
             told = len(texts.get("warnings") or [])
             if told > sum(checks.values()):

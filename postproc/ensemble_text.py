@@ -7,7 +7,7 @@ from ensemble_read import listed
 
 SHORT = {"lichey_hellmer": "Lichey–Hellmer", "marchenko_compaction": "compaction", "marchenko_rafting": "rafting", "marchenko_momentum": "momentum",
          "dilute_limit": "dilute", "open_water_drag": "open water"}
-DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "short": "S", "stopped": "X", "other": "O"}
+DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
 
 
 def table(head, rows, markdown):
@@ -63,7 +63,11 @@ def means(s, markdown):
                      f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
     note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth of the fields at each end (from 8 fields on). "
             "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by its correlation time. "
-            "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, S short window, X stopped early, O other warning.")
+            "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, N window not steady, S short window, X stopped early, O other warning.")
+    drifting = [f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"]
+    if drifting:
+        note += ("\n\nNOT STEADY over all fields: the mean of the fields still changes within the window, by more than one run can see. " + "; ".join(drifting)
+                 + ". Begin the window later, or run longer.")
     return table(head, rows, markdown) + "\n\n" + note
 
 

@@ -29,7 +29,7 @@ def numbers(m):
     steady = x[np.arange(1, len(x) + 1) >= start]
     estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"} for name, f in m["estimates"].items()}
     return {"mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "stalled_windows": 0, "concentration": 0.5,
-            "window": {"start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0, "correlation_time_s": 1.0},
+            "window": {"start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0, "correlation_time_s": 1.0} | m.get("window", {}),
             "impacts": {"from_s": 0.0, "hours": m["hours"]}, "estimates": estimates} | m.get("summary", {})
 
 

@@ -56,6 +56,33 @@ def plain(tmp_path_factory):
     return folder, result, json.loads((folder / "statistics.json").read_text())
 
 
+def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
+    """Each member's own change is within its noise; over eight fields it is not."""
+    def change(c, r):
+        drift = {0: 20.0, 1: 0.0}.get(c, 0.5)  # of means of 100 N times the number of the condition
+        window = {"verdict": "not steady" if (c, r) == (1, 3) else "too short" if (c, r) == (1, 4) else "steady",
+                  "series": {"ice_resistance": {"change_n": drift + 10 * (r - 3.5)}}}
+        return {"window": window, "warnings": [window["verdict"]] if window["verdict"] != "steady" else []}
+    result = script("ensemble.py", grid(tmp_path / "all", change=change), "--resamples", 5)
+    assert result.returncode == 0, result.stderr
+    s = json.loads((tmp_path / "all/statistics.json").read_text())
+    drifts = [c["drift"] for c in s["conditions"]]
+    assert drifts[0]["change"] == pytest.approx(20) and drifts[1]["change"] == pytest.approx(0)
+    assert drifts[0]["change_95"] == pytest.approx(list(stats.t.interval(0.95, 7, 20, stats.sem(10 * (np.arange(8) - 3.5)))))
+    assert [d["verdict"] for d in drifts[:2]] == ["steady", "steady"]  # 20 ± 20: not yet
+    assert s["conditions"][1]["members"]["doubts"] == dict.fromkeys(s["doubts"], 0) | {"unsteady": 1, "short": 1}
+    assert "1 N, 1 S" in result.stdout and "NOT STEADY" not in result.stdout
+
+    def more(c, r):
+        found = change(c, r)
+        found["window"]["series"]["ice_resistance"]["change_n"] += 20 if c == 0 else 0
+        return found
+    result = script("ensemble.py", grid(tmp_path / "more", change=more), "--resamples", 5)
+    s = json.loads((tmp_path / "more/statistics.json").read_text())
+    assert s["conditions"][0]["drift"]["verdict"] == "not steady" and s["conditions"][1]["drift"]["verdict"] == "steady"
+    assert "NOT STEADY over all fields" in result.stdout and "rises by 40.0 N" in result.stdout
+
+
 def test_means_and_intervals_of_known_fields(plain):
     _, _, s = plain
     for c in s["conditions"][2:]:
@@ -77,7 +104,7 @@ def test_means_and_intervals_of_known_fields(plain):
 def test_doubts_failures_and_gaps_are_counted(plain):
     folder, result, s = plain
     first, second, third = (c["members"] for c in s["conditions"][:3])
-    assert first["doubts"] == {"unconverged": 2, "jammed": 1, "short": 0, "stopped": 0, "other": 0} and first["doubtful"] == 3 and first["used"] == 8
+    assert first["doubts"] == {"unconverged": 2, "jammed": 1, "unsteady": 0, "short": 0, "stopped": 0, "other": 0} and first["doubtful"] == 3 and first["used"] == 8
     assert second["failed"] == 1 and second["waiting"] == 1 and second["used"] == 6 and not s["complete"]
     assert third["doubts"]["short"] == 1 and third["doubts"]["other"] == 1 and third["doubtful"] == 1
     assert s["failed"] == {"c002-r001": "base.yml: too short"}
