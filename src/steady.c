@@ -122,8 +122,10 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     }
     for (int64_t i = 0; t->events && i < t->events->n; i++) {
         const bt_event *e = &t->events->event[i];
-        if ((e->kind != BT_EVENT_LINE_BROKEN && e->kind != BT_EVENT_ADRIFT) || e->time <= s->start) continue;
-        decide(s, BT_NOT_STEADY, "the line parted at %g s, within the window, whose means mix before and after", e->time);
+        if (e->kind == BT_EVENT_ADRIFT)
+            decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
+        else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
+            decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after", e->time);
     }
     if (t->stall.time > BT_STEADY_STALLED * s->end)
         decide(s, BT_NOT_STEADY, "the towed body stood still for %.3g s of %.3g s: the mean depends on how often it jammed", t->stall.time, s->end);

@@ -234,7 +234,7 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
     const bt_events events = {.event = event, .n = 1};
     static const char *const told[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s", "a step in the window was left with a residual of 0.2 m/s",
                                        "1.2 % of the steps in the window did not converge", "the speed programme goes from 1 to 0.5 m/s within the window",
-                                       "the line parted at 45 s", "stood still for 6 s of 60 s", "of the places ahead of the moving window stayed empty"};
+                                       "a line parted at 45 s", "stood still for 6 s of 60 s", "of the places ahead of the moving window stayed empty"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++) {
         bt_case d = c;
         bt_run_totals t = totals(600);
