@@ -112,7 +112,7 @@ def test_it_lies_as_on_the_map(tmp_path, frame, crs):
 def test_round_trip_in_degrees(tmp_path, frame):
     """A field that is made goes out as longitude and latitude, lies where geodesics say, and comes back to where it
     was."""
-    made = changed(FRAMES[frame], ice={"concentration": 0.3, "size": 20, "thickness_law": "lognormal"}, **ORIGIN)
+    made = changed(FRAMES[frame], ice={"concentration": 0.3, "size": 20, "thickness": 0.04, "thickness_law": "lognormal"}, **ORIGIN)
     rings, thickness, *_ = field(tmp_path, made)
     field(tmp_path, made, name="out.geojson")
     out, crs = rings_of(tmp_path / "out.geojson")
@@ -145,7 +145,7 @@ def test_round_trip_in_degrees(tmp_path, frame):
 @pytest.mark.parametrize("frame", FRAMES)
 def test_round_trip_in_metres(tmp_path, frame):
     """Without a place on the earth: metres east and north, and a crs that says so, which the reader honours."""
-    made = changed(FRAMES[frame], ice={"concentration": 0.3, "size": 20})
+    made = changed(FRAMES[frame], ice={"concentration": 0.3, "size": 20, "thickness": 0.04})
     rings, *_ = field(tmp_path, made)
     field(tmp_path, made, name="out.geojson")
     out, crs = rings_of(tmp_path / "out.geojson")
