@@ -166,11 +166,17 @@ void bt_guard_name(const bt_guard *g, const bt_world *w, bt_errors *err)
     bt_domain_maxima(w, found, 2);
     if (found[0] >= 0) {
         body_name(g, w, (bt_gid)found[0], name);
-        bt_errors_add(err, "step %" PRId64 ": %s has a pose or velocity that is not a number; take a smaller run.dt, and check masses, stiffness and speeds of the case", w->step, name);
+        bt_errors_add(err,
+                      "step %" PRId64 ": %s has a pose or velocity that is not a number; "
+                      "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                      w->step, name);
     }
     if (found[1] >= 0) {
         body_name(g, w, (bt_gid)found[1], name);
-        bt_errors_add(err, "step %" PRId64 ": %s is beyond a wall (guard.escape); take a smaller run.dt, or more solver.max_sweeps", w->step, name);
+        bt_errors_add(err,
+                      "step %" PRId64 ": %s is beyond a wall (guard.escape); "
+                      "take a smaller run.dt, or more solver.max_sweeps",
+                      w->step, name);
     }
 }
 
@@ -180,7 +186,10 @@ static bool numbers_of_state(const bt_world *w, bt_errors *err)
 {
     char buffer[64];
     const char *name = bt_state_not_finite(w, buffer);
-    if (name) bt_errors_add(err, "step %" PRId64 ": %s of the state is not a number; take a smaller run.dt, and check masses, stiffness and speeds of the case", w->step, name);
+    if (name) bt_errors_add(err,
+                            "step %" PRId64 ": %s of the state is not a number; "
+                            "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                            w->step, name);
     return !name;
 }
 
@@ -189,15 +198,21 @@ static bool numbers_of_sample(const bt_world *w, const bt_sample *s, bt_errors *
     const bt_series_field *f = bt_sample_fault(s, bt_observe_applies(w));
     if (!f) return true;
     const double x = bt_sample_value(s, f);
-    bt_errors_add(err, "step %" PRId64 ": %s (%s) is %s; take a smaller run.dt, and check masses, stiffness and speeds of the case", w->step, f->name, f->description,
-                  isnan(x) ? "not a number, or came from some too large to be summed up" : isfinite(x) && fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure" : "beyond all numbers of a run");
+    bt_errors_add(err,
+                  "step %" PRId64 ": %s (%s) is %s; "
+                  "take a smaller run.dt, and check masses, stiffness and speeds of the case",
+                  w->step, f->name, f->description,
+                  isnan(x) ? "not a number, or came from some too large to be summed up"
+                  : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure" : "beyond all numbers of a run");
     return false;
 }
 
 static bool overlap_within(const bt_guard *g, const bt_world *w, double overlap, bt_errors *err)
 {
     if (!(g->overlap > 0) || overlap <= g->overlap) return true;
-    bt_errors_add(err, "step %" PRId64 ": two bodies overlap by %.4g m, %.3g of the mean floe size (guard.overlap %.3g); take a smaller run.dt, or more solver.max_sweeps and solver.position_sweeps",
+    bt_errors_add(err,
+                  "step %" PRId64 ": two bodies overlap by %.4g m, %.3g of the mean floe size (guard.overlap %.3g); "
+                  "take a smaller run.dt, or more solver.max_sweeps and solver.position_sweeps",
                   w->step, overlap, overlap / g->size, g->overlap / g->size);
     return false;
 }
@@ -211,12 +226,16 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
     g->in_a_row = s->unconverged == 0 ? 0 : g->in_a_row + 1;
     if (g->energy > 0 && s->kinetic_energy > g->energy) {
         sound = false;
-        bt_errors_add(err, "step %" PRId64 ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
+        bt_errors_add(err,
+                      "step %" PRId64 ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
+                      "take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
                       w->step, s->kinetic_energy, g->energy);
     }
     if (g->unconverged > 0 && g->in_a_row >= g->unconverged) {
         sound = false;
-        bt_errors_add(err, "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
+        bt_errors_add(err,
+                      "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
+                      "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
                       w->step, g->in_a_row);
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;

@@ -12,20 +12,24 @@
 // Every guard looks at every step, and at the state after the last one. Bodies are looked at where their tile may have moved: a field at rest
 // costs a look at its tiles. What leaves the domain does so by moving; at the end all bodies are looked at all the same.
 //
-// Energy. The limit is guard.energy × (E_0 + Σ ½ M v²), E_0 the kinetic energy that the case starts with and v the speed that the body can be driven to:
+// Energy. The limit is guard.energy × (E_0 + Σ ½ M v²), E_0 the kinetic energy that the case starts with and v the
+// speed that the body can be driven to:
 //     v = max(v_p, U_w + v_a + v_s)        v_p: tow, closing walls, reference speed of the solver; U_w: fastest current, twice where Coriolis acts about it
-// Contacts take energy out, so no distribution of it among the bodies exceeds the sum, but for the work of what has a prescribed velocity and of the line, both
-// of the order of v_p; guard.energy leaves room for that, as for the speed of a floe squeezed out of a wedge.
-// Wind. Drag of water k_w r² and of air k_a (D − r)², D = U_a + U_w at most, balance at r = D α/(1 + α), α² = k_a/k_w (Nansen's 2 %, for the default
-// coefficients). r grows towards that from below; D bounds it whatever α. α² is at most the larger of the ratios of skin and form drag, whatever the width. A light floe in a
-// long step passes the balance at first: from rest the linearised drag (forces.h) takes r to D x/(1 + x), x = Δt k_a D/M, and beyond the balance only if x > α. So
-// v_a = D m/(1 + m) with m = max(α, x), and D for m > 1, where the air also turns the body about. Rejected: U_a itself, which is a bound, too, but fifty times
-// what ice does in wind: energy of 10⁴ times that is a pack at a hundred times the speed of the wind.
-// Slope. An acceleration a = g |∇η| against drag ends at √(M a / k_w), or after the run at a T: v_s is the smaller one, at least a Δt; k_w for the least width that the
-// outline can have, area over diameter.
+// Contacts take energy out, so no distribution of it among the bodies exceeds the sum, but for the work of what has a
+// prescribed velocity and of the line, both of the order of v_p; guard.energy leaves room for that, as for the speed of
+// a floe squeezed out of a wedge.
+// Wind. Drag of water k_w r² and of air k_a (D − r)², D = U_a + U_w at most, balance at r = D α/(1 + α), α² = k_a/k_w
+// (Nansen's 2 %, for the default coefficients). r grows towards that from below; D bounds it whatever α. α² is at most
+// the larger of the ratios of skin and form drag, whatever the width. A light floe in a long step passes the balance at
+// first: from rest the linearised drag (forces.h) takes r to D x/(1 + x), x = Δt k_a D/M, and beyond the balance only
+// if x > α. So v_a = D m/(1 + m) with m = max(α, x), and D for m > 1, where the air also turns the body about.
+// Rejected: U_a itself, which is a bound, too, but fifty times what ice does in wind: energy of 10⁴ times that is a
+// pack at a hundred times the speed of the wind.
+// Slope. An acceleration a = g |∇η| against drag ends at √(M a / k_w), or after the run at a T: v_s is the smaller one,
+// at least a Δt; k_w for the least width that the outline can have, area over diameter.
 //
-// The state before the step. No step keeps one, which would cost more than a step where ice rests. A run repeats itself to the bit, so the state is
-// made again, from the last checkpoint or from the start, up to the step before (run.c).
+// The state before the step. No step keeps one, which would cost more than a step where ice rests. A run repeats itself
+// to the bit, so the state is made again, from the last checkpoint or from the start, up to the step before (run.c).
 #ifndef BT_GUARD_H
 #define BT_GUARD_H
 

@@ -90,3 +90,12 @@ def test_leads_that_are_refused(tmp_path, kind):
     result = call("run", path, "-o", tmp_path / "out")
     assert result.returncode == CASE and fragment in result.stderr, result.stderr
     assert json.loads(path.read_text()) and "case.yml" in result.stderr
+
+
+def test_pieces_beyond_the_end_of_a_moving_window_come_round(tmp_path):
+    """They were refused as floes outside the domain: the lead goes to the front of the window, and a floe there reaches over it."""
+    case = changed(BASE, run__duration=2, domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"}, body__x=6, body__shape=None, ice={"concentration": 0.8, "size": 0.7},
+                   lead={"mode": "managed", "floe_size": 0.4, "length": 9, "width": 3})
+    r = run(tmp_path, case, "--quiet")
+    x = r.dataset("/frames/pose")[0][:, 0]
+    assert (x >= 0).all() and (x <= 15).all() and r.summary["lead"]["pieces"] > 0
