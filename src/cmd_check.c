@@ -294,7 +294,8 @@ static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice
 
 static const char *warned(size_t n, char out[64])
 {
-    snprintf(out, 64, n ? ", with %zu warning%s" : "", n, n > 1 ? "s" : "");
+    out[0] = '\0';
+    if (n) snprintf(out, 64, ", with %zu warning%s", n, n > 1 ? "s" : "");
     return out;
 }
 

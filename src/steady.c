@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bergtow/window.h"
+#include "summary.h"
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
 
@@ -136,23 +137,32 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
                "longer domain", 100 * (double)t->window->missed / places);
 }
 
-static void judge_series(bt_steady *s)
+/// The first of the reported series with a trend that matters: the others mostly follow from it.
+static void judge_trends(bt_steady *s)
 {
+    char change[32], low[32], high[32];
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
-        if (!r->present || !r->trend.significant || !(fabs(r->trend.change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
-        decide(s, BT_NOT_STEADY, "the %s %s over the window by %.3g N (95 %%: %.3g to %.3g), %.0f %% of its mean: run longer, or begin the window later",
-               r->name, r->trend.change > 0 ? "rises" : "falls", fabs(r->trend.change), bt_min(fabs(r->trend.low), fabs(r->trend.high)),
-               bt_max(fabs(r->trend.low), fabs(r->trend.high)), 100 * fabs(r->trend.change / r->mean.mean));
-        break; // the others follow from it, mostly
+        const bt_trend *t = &r->trend;
+        if (!r->present || !t->significant || !(fabs(t->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
+        decide(s, BT_NOT_STEADY, "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the window later", r->name,
+               t->change > 0 ? "rises" : "falls", bt_force_text(change, fabs(t->change)), bt_force_text(low, bt_min(fabs(t->low), fabs(t->high))),
+               bt_force_text(high, bt_max(fabs(t->low), fabs(t->high))), 100 * fabs(t->change / r->mean.mean));
+        return;
     }
+}
+
+/// The load that is known worst.
+static void judge_length(bt_steady *s)
+{
+    const bt_reported *worst = NULL;
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const bt_reported *r = &s->series[k];
-        if (reported[k].load && r->present && !(r->mean.n_eff >= BT_STEADY_INDEPENDENT))
-            decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run longer",
-                   s->end - s->start, r->mean.n_eff, r->name, s->n > 1 ? r->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN,
-                   BT_STEADY_INDEPENDENT);
+        if (reported[k].load && r->present && !(worst && r->mean.n_eff >= worst->mean.n_eff)) worst = r;
     }
+    if (!worst || worst->mean.n_eff >= BT_STEADY_INDEPENDENT) return;
+    decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run longer", s->end - s->start,
+           worst->mean.n_eff, worst->name, s->n > 1 ? worst->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN, BT_STEADY_INDEPENDENT);
 }
 
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
@@ -177,5 +187,6 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
         decide(s, BT_NOT_STEADY, "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start", s->start, ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
-    judge_series(s);
+    judge_trends(s);
+    judge_length(s);
 }
