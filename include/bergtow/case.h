@@ -186,7 +186,7 @@ typedef struct bt_case {
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
         int64_t inner_sweeps;    ///< sweeps of a tile in its turn
-        int64_t turn_rows;       ///< from so many rows on one sweep of six is accelerated and looked at; 0 = never
+        int64_t turn_rows;       ///< without effect, of cases written for earlier versions
         double tile;             ///< least side of a tile / mean floe size
         bool plain;              ///< no acceleration
         bool warm_start;

@@ -26,16 +26,18 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/tiles.h"
+#include "bergtow/tow.h"
 #include "bergtow/world.h"
 
 typedef struct bt_solver {
-    struct bt_anderson *anderson;
+    bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/rounds.h)
+    bt_idx cap_before;
+    double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
     bt_idx cap_bodies;
     bool shifted;                ///< the projection did something this step
     bool rebounds;               ///< some contact of this step has a restitution
     struct bt_islands *islands;  ///< bodies that touch, while `rebounds`
-    int64_t rows;                ///< of the contact problem, all ranks
     double prepare_s;            ///< wall time of islands and biases in this step, s
 } bt_solver;
 
