@@ -203,6 +203,7 @@ static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
         if (line) most = bt_max(most, bt_tow_update(line, towed, w->bodies.inv[bt_world_towed(w)]));
         if (times == 0) t->most = bt_max(t->most, most);
     }
+    tile->updates += times * tile->n_list;
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)(times * tile->n_list));
     if (!o->moves) return;
     double against = units_against(tile, moved.y);
