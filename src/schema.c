@@ -216,14 +216,14 @@ const bt_key bt_case_keys[] = {
 
     REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
-    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: that of so many sweeps over all contacts, each tile inner_sweeps times; sweeps over few contacts count as what they visit; assumed"),
-    INT("solver.inner_sweeps", solver.inner_sweeps, "3", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
+    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: three updates of every contact for each of so many sweeps, looks at contacts counted as updates; assumed"),
+    INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "without effect: sweeps no longer follow each other through large fields; accepted in cases written for earlier versions, and to be taken out"),
     REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false", "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of sweeps"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
     REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]", "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the projection]"),
-    INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of the work of the position projection: that of so many sweeps over all contacts, assumed"),
+    INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of the work of the position projection: so many updates of every contact, looks counted as updates; assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
 
     REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]", "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),

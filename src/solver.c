@@ -15,6 +15,7 @@
 #include "restitution.h"
 #include "rounds.h"
 
+#define UPDATES 3.0 // of every unit that one of max_sweeps stands for
 #define ENOUGH 0.3 // of the tolerance: a tile that changes less is not swept again in the same turn
 
 bt_solver *bt_solver_create(void)
@@ -216,7 +217,7 @@ static bt_problem contact_problem(const bt_world *w)
 {
     bt_problem p = {
         .look = look_at_tile, .sweep = sweep_tile, .settle = settle, .vel = w->bodies.vel, .tolerance = w->par.tolerance, .cap = 0.9, .length = 50,
-        .limit = (double)w->par.max_sweeps * (double)(w->par.plain_sweeps || w->par.inner_sweeps < 1 ? 1 : w->par.inner_sweeps), .plain = w->par.plain_sweeps,
+        .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES), .plain = w->par.plain_sweeps,
     };
     bt_rounds_scale(&p, w->tiles->heaviest);
     return p;

@@ -109,13 +109,13 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    int64_t max_sweeps;    ///< limit of the work of a step: that of so many sweeps over all contacts, each inner_sweeps times; without momentum, of sweeps
+    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every unit for each; with plain_sweeps, of sweeps
     bool warm_start;
     bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
     int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
     double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
-    int64_t position_sweeps; ///< limit of the position projection, as max_sweeps
+    int64_t position_sweeps; ///< limit of the position projection: updates of every unit; with plain_sweeps, sweeps
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets tiles and skin, m
     double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
