@@ -55,6 +55,8 @@ typedef struct bt_floe_def {
     int line;                  ///< where in the case file it stands, for messages
 } bt_floe_def;
 
+enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
+
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
     char *text;       ///< the file's text
