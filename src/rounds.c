@@ -75,7 +75,10 @@ static void mark_swept(bt_world *w)
     const bt_idx last = t->n - 1;
     const bt_tile *large = &t->tile[last];
     double *listed = bt_alloc((size_t)t->n, sizeof *listed);
-    for (bt_idx k = 0; k < last; k++) t->tile[k].swept = false;
+    for (bt_idx k = 0; k < last; k++) {
+        t->tile[k].still = !t->tile[k].swept;
+        t->tile[k].swept = false;
+    }
     for (bt_idx i = 0; i < t->n_order; i++) {
         const bt_idx k = t->order[i];
         listed[k] = t->tile[k].n_list > 0;
@@ -154,13 +157,15 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
 {
     (void)t;
     const body_move *m = context;
-    const bt_tile *tile = &w->tiles->tile[k];
+    bt_tile *tile = &w->tiles->tile[k];
     if (!tile->swept) return;
+    const double beta = tile->still ? 0 : m->beta;
+    tile->still = false;
     for (bt_idx i = tile->first; i < tile->end; i++) {
         const bt_vel now = m->vel[i];
-        if (m->beta > 0) {
+        if (beta > 0) {
             const bt_vel *before = &m->before[i];
-            m->vel[i] = (bt_vel){now.x + m->beta * (now.x - before->x), now.y + m->beta * (now.y - before->y), now.w + m->beta * (now.w - before->w), 0};
+            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y), now.w + beta * (now.w - before->w), 0};
         }
         m->before[i] = now;
     }

@@ -103,6 +103,7 @@ typedef struct bt_tile {
     int64_t updates;                ///< of units, since the balance of the ranks was last noted
     bool bad;                       ///< some unit is not yet near the tolerance
     bool kept;                      ///< swept in a round over a part of the field
+    bool still;                     ///< they could not in the round before: nothing of theirs moves on
     bool swept;                     ///< listed units, here or on another rank, may move its bodies
 } bt_tile;
 
