@@ -199,8 +199,8 @@ asan: ## tests of units and physics, kept hostile input, and runs on threads and
 	@tests/sanitize.sh asan $(TEST_BIN:build/$(CONFIG)/%=build/asan/%)
 
 tsan: ## tows on threads and ranks, and the tests that use threads, under ThreadSanitizer (clang, libomp with archer)
-	@$(AGAIN) CONFIG=tsan all build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_order
-	@tests/sanitize.sh tsan build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_order
+	@$(AGAIN) CONFIG=tsan all build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_phases
+	@tests/sanitize.sh tsan build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_phases
 
 valgrind: ## short runs under memcheck
 	@$(AGAIN) CONFIG=debug all

@@ -21,11 +21,11 @@ typedef struct bt_link {
     double *out, *in;                               ///< [3 × longest list] values on the way
     uint8_t *flags_out, *flags_in;                  ///< [sum of the lists] touched or not
     bt_idx n_flags_out, n_flags_in;
-    // tiles whose speed the other must know, and the reverse
-    bt_idx *speed_send;                             ///< [n_speed_send] tiles here
-    int32_t (*speed_receive)[2];                    ///< [n_speed_receive] coordinates of tiles there
-    bt_idx n_speed_send, n_speed_receive;
-    double *speed_out, *speed_in;
+    // tiles of which the other must know a value, and the reverse
+    bt_idx *tell_send;                             ///< [n_tell_send] tiles here
+    int32_t (*tell_receive)[2];                    ///< [n_tell_receive] coordinates of tiles there
+    bt_idx n_tell_send, n_tell_receive;
+    double *tell_out, *tell_in;
 } bt_link;
 
 struct bt_domain {

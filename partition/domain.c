@@ -301,16 +301,14 @@ void bt_domain_note(bt_world *w)
     bt_domain *d = w->domain;
     if (!d) return;
     const bt_tiles *t = w->tiles;
-    const bt_step_stats *st = &w->stats;
-    const double inner = w->par.inner_sweeps > 1 ? (double)w->par.inner_sweeps : 1;
     int64_t large = 0; // the large bodies' own work is done where they are
     while (large < (int64_t)d->n_x * d->n_y - 1 && !d->under[large]) large++;
     for (bt_idx k = 0; k < t->n; k++) {
-        const bt_tile *tile = &t->tile[k];
+        bt_tile *tile = &t->tile[k];
         if (!tile->own) continue;
         const bool last = k == t->n - 1;
-        const double sweeps = UNIT_STEP + UNIT_SWEEP * (double)st->sweeps * inner;
-        d->work[last ? large : place(w, tile->x, tile->y)] += tile->n_units * sweeps + tile->n_pairs * PAIR + (tile->end - tile->first) * (last || bt_tiles_moves(t, k) ? BODY : BODY_AT_REST);
+        d->work[last ? large : place(w, tile->x, tile->y)] += tile->n_units * UNIT_STEP + (double)tile->updates * UNIT_SWEEP + tile->n_pairs * PAIR + (tile->end - tile->first) * (last || bt_tiles_moves(t, k) ? BODY : BODY_AT_REST);
+        tile->updates = 0;
     }
     d->drift += w->par.dt * ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
     const double path = large_path(w);

@@ -61,10 +61,14 @@ bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n);
 /// After the tiles have been made: what is exchanged with whom. Collective.
 void bt_domain_connect(bt_world *w);
 
-/// Speeds of the tiles of other ranks into bound and awake of the tiles here that they reach. Collective.
-void bt_domain_share_speeds(bt_world *w);
+/// What is to be done with the value, above 0, of a tile of another rank.
+typedef void bt_take_tile(bt_tiles *t, int32_t x, int32_t y, double value);
+/// Tell a value [n tiles] of the tiles of this rank to the ranks that have tiles within two of them, and take theirs. Collective.
+void bt_domain_tell_tiles(bt_world *w, const double *value, bt_take_tile *take);
 /// After the detection: which bodies the units of this step touch. Collective.
 void bt_domain_select(bt_world *w);
+/// Floes here that have a contact with a large movable body of another rank.
+void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
 /// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
 void bt_domain_send(bt_world *w, int phase, bt_vel *v);
 void bt_domain_receive(bt_world *w, int phase, bt_vel *v);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What ranks exchange: velocities of shared bodies after each phase, speeds of tiles, and what only some of them know.
+// What ranks exchange: velocities of shared bodies after each phase, values of tiles, and what only some of them know.
 //
 // Lists. A body of tile t is touched in phase p by one tile, T_p(t), whose rank sends its velocity to all others that hold t. Both sides
 // go through the tiles they hold in the same order, so they make the same lists without a word. Of these bodies few have a
@@ -9,9 +9,8 @@
 
 #include "division.h"
 #include "domain.h"
-#include "order.h"
 
-enum { TAG_FLAGS = 10, TAG_SPEEDS = 11, TAG_VELOCITIES = 20 };
+enum { TAG_FLAGS = 10, TAG_TILES = 11, TAG_VELOCITIES = 20 };
 
 void bt_halo_free(bt_domain *d)
 {
@@ -23,7 +22,7 @@ void bt_halo_free(bt_domain *d)
             free(l->send_now[p]);
             free(l->receive_now[p]);
         }
-        void *arrays[] = {l->out, l->in, l->flags_out, l->flags_in, l->speed_send, l->speed_receive, l->speed_out, l->speed_in};
+        void *arrays[] = {l->out, l->in, l->flags_out, l->flags_in, l->tell_send, l->tell_receive, l->tell_out, l->tell_in};
         for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     }
     free(d->link);
@@ -84,7 +83,7 @@ static void list_bodies(bt_world *w)
     }
 }
 
-/// Does rank r hold a tile within two of (x, y)? Its bounds depend on the speed there.
+/// Does rank r hold a tile within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far that has converged.
 static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
 {
     const bt_tiles *t = w->tiles;
@@ -98,8 +97,8 @@ static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
         }
 }
 
-/// Lists of tiles whose speeds are told: at the border of the map's parts only.
-static void list_speeds(bt_world *w)
+/// Lists of tiles of which a value is told: at the border of the map's parts only.
+static void list_told(bt_world *w)
 {
     bt_domain *d = w->domain;
     const bt_tiles *t = w->tiles;
@@ -111,15 +110,15 @@ static void list_speeds(bt_world *w)
             near_ranks(w, x, y, near);
             if (owner != me && near[me]) {
                 bt_link *l = link_to(d, owner);
-                l->speed_receive = bt_realloc(l->speed_receive, (size_t)l->n_speed_receive + 1, sizeof *l->speed_receive);
-                l->speed_receive[l->n_speed_receive][0] = x;
-                l->speed_receive[l->n_speed_receive++][1] = y;
+                l->tell_receive = bt_realloc(l->tell_receive, (size_t)l->n_tell_receive + 1, sizeof *l->tell_receive);
+                l->tell_receive[l->n_tell_receive][0] = x;
+                l->tell_receive[l->n_tell_receive++][1] = y;
             } else if (owner == me) {
                 for (int r = 0; r < d->comm->size; r++) {
                     if (r == me || !near[r]) continue;
                     bt_link *l = link_to(d, r);
-                    l->speed_send = bt_realloc(l->speed_send, (size_t)l->n_speed_send + 1, sizeof *l->speed_send);
-                    l->speed_send[l->n_speed_send++] = bt_tiles_at(t, x, y);
+                    l->tell_send = bt_realloc(l->tell_send, (size_t)l->n_tell_send + 1, sizeof *l->tell_send);
+                    l->tell_send[l->n_tell_send++] = bt_tiles_at(t, x, y);
                 }
             }
         }
@@ -145,15 +144,12 @@ static void mark_owned(bt_world *w)
         // Whoever holds a body of the block waits for what the tile does to it.
         const bt_idx block[4] = {k, tile->right, tile->above, tile->diagonal};
         tile->border = k == t->n - 1;
-        bool beside_large = false;
         for (int j = 0; j < 4 && tile->own && k < t->n - 1; j++) {
             if (block[j] < 0) continue;
             const bt_tile *other = &t->tile[block[j]];
             int holder[BT_MAX_HOLDERS];
             if (bt_division_holders(w, other->x, other->y, holder) > 1) tile->border = true;
-            if (is_under(d, other)) beside_large = true;
         }
-        tile->depth = tile->border || beside_large ? 0 : -1;
     }
     bt_sum sums[2] = {{0}, {0}};
     for (int k = 0; k < 2; k++) bt_sum_add(&sums[k], held[k]);
@@ -166,7 +162,7 @@ void bt_halo_connect(bt_world *w)
     bt_domain *d = w->domain;
     bt_halo_free(d);
     list_bodies(w);
-    list_speeds(w);
+    list_told(w);
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         bt_idx most_out = 0, most_in = 0;
@@ -182,8 +178,8 @@ void bt_halo_connect(bt_world *w)
         l->in = bt_alloc(3 * (size_t)most_in, sizeof *l->in);
         l->flags_out = bt_alloc((size_t)l->n_flags_out, 1);
         l->flags_in = bt_alloc((size_t)l->n_flags_in, 1);
-        l->speed_out = bt_alloc((size_t)l->n_speed_send, sizeof *l->speed_out);
-        l->speed_in = bt_alloc((size_t)l->n_speed_receive, sizeof *l->speed_in);
+        l->tell_out = bt_alloc((size_t)l->n_tell_send, sizeof *l->tell_out);
+        l->tell_in = bt_alloc((size_t)l->n_tell_receive, sizeof *l->tell_in);
     }
     d->request = bt_alloc(2 * (size_t)d->n_links, sizeof *d->request);
 }
@@ -192,7 +188,6 @@ void bt_domain_connect(bt_world *w)
 {
     if (!w->domain) return;
     mark_owned(w);
-    bt_order_depths(w->tiles);
     bt_halo_connect(w);
     bt_domain_check(w);
 }
@@ -205,22 +200,21 @@ static void wait_all(bt_domain *d)
     d->n_requests = 0;
 }
 
-void bt_domain_share_speeds(bt_world *w)
+void bt_domain_tell_tiles(bt_world *w, const double *value, bt_take_tile *take)
 {
     bt_domain *d = w->domain;
     if (!d) return;
-    bt_tiles *t = w->tiles;
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
-        for (bt_idx i = 0; i < l->n_speed_send; i++) l->speed_out[i] = t->speed[l->speed_send[i]];
-        if (l->n_speed_receive) MPI_Irecv(l->speed_in, l->n_speed_receive, MPI_DOUBLE, l->rank, TAG_SPEEDS, d->comm->mpi, &d->request[d->n_requests++]);
-        if (l->n_speed_send) MPI_Isend(l->speed_out, l->n_speed_send, MPI_DOUBLE, l->rank, TAG_SPEEDS, d->comm->mpi, &d->request[d->n_requests++]);
+        for (bt_idx i = 0; i < l->n_tell_send; i++) l->tell_out[i] = value[l->tell_send[i]];
+        if (l->n_tell_receive) MPI_Irecv(l->tell_in, l->n_tell_receive, MPI_DOUBLE, l->rank, TAG_TILES, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_tell_send) MPI_Isend(l->tell_out, l->n_tell_send, MPI_DOUBLE, l->rank, TAG_TILES, d->comm->mpi, &d->request[d->n_requests++]);
     }
     wait_all(d);
     for (int k = 0; k < d->n_links; k++) {
         const bt_link *l = &d->link[k];
-        for (bt_idx i = 0; i < l->n_speed_receive; i++)
-            if (l->speed_in[i] > 0) bt_contacts_spread(t, l->speed_receive[i][0], l->speed_receive[i][1], l->speed_in[i]);
+        for (bt_idx i = 0; i < l->n_tell_receive; i++)
+            if (l->tell_in[i] > 0) take(w->tiles, l->tell_receive[i][0], l->tell_receive[i][1], l->tell_in[i]);
     }
 }
 
@@ -262,6 +256,13 @@ void bt_domain_select(bt_world *w)
                 if (l->flags_in[n++]) l->receive_now[p][l->n_receive_now[p]++] = l->receive[p][i];
         }
     }
+}
+
+void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body))
+{
+    const bt_domain *d = w->domain;
+    for (int k = 0; d && k < d->n_links; k++)
+        for (bt_idx i = 0; i < d->link[k].n_receive_now[BT_COLOURS]; i++) mark(w, d->link[k].receive_now[BT_COLOURS][i]);
 }
 
 void bt_domain_send(bt_world *w, int phase, bt_vel *v)

@@ -11,9 +11,9 @@
 #include "bergtow/tow.h"
 #include "domain.h"
 #include "merge.h"
-#include "order.h"
 #include "pack.h"
 #include "pairs.h"
+#include "phases.h"
 
 enum { FEW_TILES = 64 }; // fewer are done by one thread: a team costs microseconds
 
@@ -94,7 +94,7 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
             fastest = bt_max(fastest, t->speed[k]);
             bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
         }
-    bt_domain_share_speeds(w);
+    bt_domain_tell_tiles(w, t->speed, bt_contacts_spread);
     const double large = spread_large(w, v, v2);
     // The last tile meets floes anywhere: it is made for the fastest of them all.
     bool movable = false;
@@ -215,7 +215,7 @@ static void detect(bt_world *w, bool again)
         bt_pack_scratch_free(&s.pack);
     }
     free(due);
-    bt_order_tiles(w);
+    bt_phases_order(w);
     bt_domain_select(w);
 }
 

@@ -45,6 +45,9 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     h->n++;
     h->sum_contacts += s->contacts;
     h->sum_sweeps += s->sweeps;
+    h->sum_updates += s->unit_updates;
+    h->sum_moves += s->momentum_moves;
+    h->unprojected += s->unprojected != 0;
     h->contact_work += s->contact_work;
     h->max_overlap = bt_max_seen(h->max_overlap, s->overlap);
     h->max_residual = bt_max_seen(h->max_residual, s->residual);

@@ -22,11 +22,11 @@ extern const bt_column_def bt_history_columns[BT_N_COLUMNS];
 typedef struct bt_history {
     int64_t n, cap;
     double *column[BT_N_COLUMNS];    ///< [n] each, units as in bt_sample; NaN where a step has no such number
-    double sum_contacts, sum_sweeps, contact_work;
+    double sum_contacts, sum_sweeps, sum_updates, sum_moves, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
     int64_t crushing_steps;
-    int64_t unconverged, positive_work, restitution_cut, repeats, outrun;
+    int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.

@@ -1,5 +1,14 @@
 // SPDX-License-Identifier: MIT
 // One pass over the active tiles in the order of their phases (private to the solver).
+//
+// What the result depends on is only this: of two tiles that share a body, the one of lower phase comes first (tiles.h), and a
+// pass ends before the next begins. So: all tiles of phase 0 at once, then all of phase 1, ..., with a barrier of the threads
+// after each. Each thread has a share of every phase, a stretch of neighbouring tiles with its part of the work, the same in
+// every pass, so that it finds in its caches what it left there; a thread that is done takes tiles from the others' shares.
+// Among ranks the tiles of a phase for which others wait come first, and their velocities travel while the rest is worked on.
+//
+// Rejected: passes that follow each other through the field without barriers, so that what one has read from memory
+// serves the next. After every sweep there is a decision for the whole field (rounds.h), so that there is no next pass to go on with.
 #ifndef BERGTOW_PHASES_H
 #define BERGTOW_PHASES_H
 
@@ -23,23 +32,16 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from);
 /// Work on one tile. Only the bodies of its block, its units and *t may be changed.
 typedef void bt_visit(bt_world *w, bt_idx tile, const void *context, bt_totals *t);
 
-/// A pass: work on every tile, and what it adds up.
-typedef struct bt_pass {
-    bt_visit *visit;
-    const void *context;
-    bt_totals *totals;
-    bool looks;           ///< it changes no velocity: nothing for other ranks
-} bt_pass;
+/// List the tiles of this rank with work in t->order, by phase, and deal them to threads. After the units have been made.
+void bt_phases_order(bt_world *w);
 
-enum { BT_MAX_TURN = 6 }; ///< passes of a turn
+/// Deal the tiles to threads by the units that are listed in them. No result depends on it.
+void bt_phases_deal(bt_world *w);
 
 /// Visit the tiles of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at once by threads and
 /// ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date on all ranks, while tiles that nobody
 /// waits for are still worked on. Collective.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
-
-/// n passes in turn, with the results of n calls of bt_phases_run; they follow each other through the field (order.h). Collective.
-void bt_phases_turn(bt_world *w, const bt_pass *pass, int n, bt_vel *exchanged);
 
 /// Visit the tiles with work in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);

@@ -18,8 +18,8 @@
 
 #define HISTORY(type, member) {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}
 static const bt_state_row history_rows[] = {
-    HISTORY(F64, sum_contacts), HISTORY(F64, sum_sweeps), HISTORY(F64, contact_work), HISTORY(F64, max_overlap), HISTORY(F64, max_momentum_residual), HISTORY(F64, max_residual),
-    HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged),
+    HISTORY(F64, sum_contacts), HISTORY(F64, sum_sweeps), HISTORY(F64, sum_updates), HISTORY(F64, sum_moves), HISTORY(F64, contact_work), HISTORY(F64, max_overlap), HISTORY(F64, max_momentum_residual), HISTORY(F64, max_residual),
+    HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged), HISTORY(I64, unprojected),
     HISTORY(I64, positive_work), HISTORY(I64, restitution_cut), HISTORY(I64, repeats), HISTORY(I64, outrun),
 };
 enum { N_HISTORY = sizeof history_rows / sizeof *history_rows };

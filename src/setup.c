@@ -39,7 +39,6 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .warm_start = c->solver.warm_start,
         .plain_sweeps = c->solver.plain,
         .inner_sweeps = c->solver.inner_sweeps,
-        .turn_rows = c->solver.turn_rows,
         .tile = c->solver.tile,
         .slop = c->solver.slop * size,
         .position_sweeps = c->solver.position_sweeps,

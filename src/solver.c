@@ -3,11 +3,9 @@
 #include "bergtow/solver.h"
 
 #include <math.h>
-#include <omp.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "anderson.h"
 #include "bergtow/tow.h"
 #include "domain.h"
 #include "kernel.h"
@@ -15,13 +13,14 @@
 #include "pack.h"
 #include "phases.h"
 #include "restitution.h"
+#include "rounds.h"
 
+#define UPDATES 3.0 // of every unit that one of max_sweeps stands for
 #define ENOUGH 0.3 // of the tolerance: a tile that changes less is not swept again in the same turn
 
 bt_solver *bt_solver_create(void)
 {
     bt_solver *s = bt_alloc(1, sizeof *s);
-    s->anderson = bt_alloc(1, sizeof *s->anderson);
     s->islands = bt_islands_create();
     return s;
 }
@@ -30,7 +29,7 @@ void bt_solver_free(bt_solver *s)
 {
     if (!s) return;
     bt_islands_free(s->islands);
-    free(s->anderson);
+    free(s->before);
     free(s->shift);
     free(s);
 }
@@ -43,13 +42,16 @@ static bt_tow *line_of(const bt_world *w, bt_idx tile)
 
 // --- velocities from impulses, and what they leave of the contact law ------------------------------------------------
 
-/// What a new geometry, or a bound, no longer allows of the impulses of the last step.
-static void clamp_impulses(bt_tile *tile)
+/// Impulses of the last step, without what a new geometry, or a bound, no longer allows; nothing moves yet.
+static void start_impulses(bt_tile *tile)
 {
+    bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         bt_unit *u = &tile->units[i];
         for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
         u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+        double *x = tile->before[i];
+        x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
     }
 }
 
@@ -59,7 +61,7 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     bt_tile *tile = &w->tiles->tile[k];
     bt_vel *v = w->bodies.vel;
     const bt_inv *inv = w->bodies.inv;
-    if (warm) clamp_impulses(tile);
+    if (warm) start_impulses(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
         const double total = u->ln[0] + u->ln[1];
@@ -80,52 +82,36 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     if (warm) bt_tow_update(line, towed, by);
 }
 
-static void add_residual(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+/// Residual of a tile, and its list: units that bear load, or close. Others would be left as they are.
+static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    const double scale = *(const double *)context;
-    const bt_tile *tile = &w->tiles->tile[k];
+    const bt_problem *p = context;
+    bt_tile *tile = &w->tiles->tile[k];
+    const bt_vel *v = w->bodies.vel;
+    const double near = BT_NEAR * p->tolerance;
     double sum = 0;
-    int64_t rows = 0;
+    int64_t rows = 0, bad = 0;
+    bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
-        t->most = bt_max(t->most, tile->limits ? bt_limited_residual(u, &tile->limits[i], w->bodies.vel, &sum) : bt_unit_residual(u, w->bodies.vel, &sum));
-        rows += tile->units[i].n + 1;
+        const double r = tile->limits ? bt_limited_residual(u, &tile->limits[i], v, &sum) : bt_unit_residual(u, v, &sum);
+        t->most = bt_max(t->most, r);
+        bad += r > near;
+        rows += u->n + 1;
+        const double *x = tile->before[i];
+        bool on = p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt; // or did before the last sweep
+        for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
+        if (on) tile->list[tile->n_list++] = i;
     }
     const bt_tow *line = line_of(w, k);
     if (line) {
-        const double r = bt_tow_residual(line, &w->bodies.vel[bt_world_towed(w)]);
+        const double r = bt_tow_residual(line, &v[bt_world_towed(w)]);
         t->most = bt_max(t->most, r);
         sum += r * r;
         rows++;
+        bad += r > near;
     }
-    bt_sum_add(&t->sum[0], bt_min(sum * scale, 0x1p45));
-    bt_sum_add(&t->sum[1], (double)rows);
-}
-
-/// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
-/// at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound.
-static double scale_of_squares(const bt_world *w)
-{
-    const double tolerance = w->par.tolerance;
-    return tolerance > 0 ? exp2(20 - ceil(2 * log2(tolerance))) : 0x1p60;
-}
-
-/// Collective. The largest residual from the totals of all tiles, m/s; root mean square into *rms.
-static double residual_of(bt_world *w, bt_totals *t, double *rms)
-{
-    bt_domain_reduce(w, t);
-    const double rows = bt_sum_value(&t->sum[1]);
-    w->solver->rows = (int64_t)rows;
-    if (rms) *rms = rows > 0 ? sqrt(bt_sum_value(&t->sum[0]) / scale_of_squares(w) / rows) : 0;
-    return t->most;
-}
-
-double bt_solver_residual(bt_world *w, double *rms)
-{
-    const double scale = scale_of_squares(w);
-    bt_totals t = {.n_sums = 2};
-    bt_phases_any_order(w, add_residual, &scale, &t);
-    return residual_of(w, &t, rms);
+    bt_rounds_found(p, tile, sum, rows, bad, t);
 }
 
 static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_totals *t)
@@ -136,130 +122,114 @@ static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_total
     if (k == w->tiles->n - 1 || w->tiles->awake[k]) memcpy(b->vel + tile->first, b->vel_free + tile->first, (size_t)(tile->end - tile->first) * sizeof *b->vel);
 }
 
-/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up, and their residual. True when some
-/// impulse on this rank is not zero.
-static bool velocities_from_impulses(bt_world *w, bool warm)
+/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up. True when some impulse on this
+/// rank is not zero.
+static bool form_velocities(bt_world *w, bool warm)
 {
     bt_phases_everywhere(w, free_velocities, NULL);
-    const double scale = scale_of_squares(w);
-    bt_totals applied = {0}, left = {.n_sums = 2};
-    const bt_pass pass[2] = {{apply_impulses, &warm, &applied, false}, {add_residual, &scale, &left, true}};
-    bt_phases_turn(w, pass, 2, w->bodies.vel);
-    w->stats.residual = residual_of(w, &left, &w->stats.residual_rms);
-    return applied.most > 0;
+    bt_totals t = {0};
+    bt_phases_run(w, apply_impulses, &warm, w->bodies.vel, &t);
+    return t.most > 0;
 }
+
+static void settle(bt_world *w) { form_velocities(w, false); }
 
 // --- sweeps ----------------------------------------------------------------------------------------------------------
 
-/// What a sweep is to do.
-typedef struct {
-    const bt_anderson *record; ///< keep the history of this sweep; NULL: a plain one
-    bt_anderson_verdict move;  ///< what is still to be done to the impulses after the last sweep
-    int64_t times;             ///< sweeps of a tile in its turn
-    bool far;                  ///< the field is larger than the caches
-} sweep_order;
-
-/// The next cache lines of the units of a tile that comes later. Memory is read in the order of the units only within a tile, too
-/// short a row for the hardware to foresee: 300,000 floes lost a third of a sweep to waiting.
-static inline void fetch_ahead(const bt_tile *ahead, bt_idx i)
+/// Memory is read in the order of the units, but with gaps too wide for the hardware to foresee.
+static inline void fetch_ahead(const bt_tile *tile, bt_idx j)
 {
-    if (!ahead || i >= ahead->n_units) return;
-    const char *line = (const char *)&ahead->units[i];
+    if (j >= tile->n_list) return;
+    const char *line = (const char *)&tile->units[tile->list[j]];
     for (size_t k = 0; k < sizeof(bt_unit); k += 64) __builtin_prefetch(line + k);
+}
+
+/// Every listed unit once; returns the largest update, m/s.
+static double update_list(bt_tile *tile, bt_vel *v, const bt_inv *inv)
+{
+    enum { AHEAD = 3 };
+    double most = 0;
+    for (bt_idx j = 0; !tile->limits && j < tile->n_list; j++) {
+        fetch_ahead(tile, j + AHEAD);
+        most = bt_max(most, bt_update_unit(&tile->units[tile->list[j]], v, inv));
+    }
+    for (bt_idx j = 0; tile->limits && j < tile->n_list; j++) {
+        const bt_idx i = tile->list[j];
+        most = bt_max(most, bt_update_limited(&tile->units[i], &tile->limits[i], v, inv));
+    }
+    return most;
+}
+
+static void move_units(const bt_sweep *o, bt_tile *tile, double (*y)[3])
+{
+    for (bt_idx j = 0; j < tile->n_list; j++) {
+        bt_unit *u = &tile->units[tile->list[j]];
+        double *x = tile->before[tile->list[j]];
+        bt_rounds_move(o, u->ln, x, y[j], 2);
+        bt_rounds_move(o, &u->lt, x + 2, y[j] + 2, 1);
+    }
+}
+
+static double units_against(const bt_tile *tile, double (*y)[3])
+{
+    double sum = 0;
+    for (bt_idx j = 0; j < tile->n_list; j++) {
+        const bt_unit *u = &tile->units[tile->list[j]];
+        const double *x = tile->before[tile->list[j]];
+        sum += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) + bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) +
+               bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
+    }
+    return sum;
 }
 
 static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
-    enum { ON_STACK = 192 };
-    const sweep_order *o = context;
+    const bt_sweep *o = context;
     bt_tile *tile = &w->tiles->tile[k];
-    bt_vel *v = w->bodies.vel;
-    const bt_inv *inv = w->bodies.inv;
-    const bt_tile *ahead = tile->ahead >= 0 ? &w->tiles->tile[tile->ahead] : NULL;
-    double few[6 * ON_STACK], *x = few;
-    if (o->move != BT_ANDERSON_STAY && tile->n_units > 0) bt_anderson_move_units(w->solver->anderson, o->move, tile);
-    if (o->record) {
-        if (o->far) bt_anderson_fetch(tile);
-        if (tile->n_units > ON_STACK) x = bt_alloc(6 * (size_t)tile->n_units, sizeof *x);
-        for (bt_idx i = 0; i < tile->n_units; i++) {
-            x[3 * i] = tile->units[i].ln[0];
-            x[3 * i + 1] = tile->units[i].ln[1];
-            x[3 * i + 2] = tile->units[i].lt;
-        }
-    }
     bt_tow *line = line_of(w, k);
-    double line_before[BT_MAX_BRANCHES] = {0};
-    for (int c = 0; line && c < line->n_branches; c++) line_before[c] = line->branch[c].lambda;
-    for (int64_t n = 0; n < o->times; n++) {
-        double most = 0;
-        for (bt_idx i = 0; !tile->limits && i < tile->n_units; i++) {
-            if (n == 0) fetch_ahead(ahead, i);
-            most = bt_max(most, bt_update_unit(&tile->units[i], v, inv));
-        }
-        for (bt_idx i = 0; tile->limits && i < tile->n_units; i++) most = bt_max(most, bt_update_limited(&tile->units[i], &tile->limits[i], v, inv));
-        if (line) most = bt_max(most, bt_tow_update(line, &v[bt_world_towed(w)], inv[bt_world_towed(w)]));
-        if (n == 0) t->most = bt_max(t->most, most);
-        if (most <= ENOUGH * w->par.tolerance) break; // more would be for nothing until the neighbours have changed
+    if (tile->n_list == 0 && !line) return;
+    bt_vel *v = w->bodies.vel, *towed = line ? &v[bt_world_towed(w)] : NULL;
+    double line_y[BT_MAX_BRANCHES] = {0};
+    bt_moved moved;
+    if (o->moves) {
+        bt_moved_begin(&moved, tile);
+        move_units(o, tile, moved.y);
+        for (int c = 0; line && c < line->n_branches; c++) bt_rounds_move(o, &line->branch[c].lambda, &w->solver->line_before[c], &line_y[c], 1);
     }
-    if (o->record) bt_anderson_collect(o->record, tile, x, x + 3 * (size_t)tile->n_units, t);
-    for (int c = 0; o->record && line && c < line->n_branches; c++)
-        bt_anderson_collect_scalar(o->record, &w->solver->anderson->line[c], line_before[c], line->branch[c].lambda, line->branch[c].w, t);
-    if (x != few) free(x);
+    int64_t times = 0;
+    double most = INFINITY;
+    for (; times < w->par.inner_sweeps || times == 0; times++) {
+        if (most <= ENOUGH * o->problem->tolerance) break; // more would be for nothing until the neighbours have changed
+        most = update_list(tile, v, w->bodies.inv);
+        if (line) most = bt_max(most, bt_tow_update(line, towed, w->bodies.inv[bt_world_towed(w)]));
+        if (times == 0) t->most = bt_max(t->most, most);
+    }
+    tile->updates += times * tile->n_list;
+    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)(times * tile->n_list));
+    if (!o->moves) return;
+    double against = units_against(tile, moved.y);
+    for (int c = 0; line && c < line->n_branches; c++)
+        against += bt_rounds_against(line->branch[c].w, line->branch[c].lambda, w->solver->line_before[c], line_y[c]);
+    bt_moved_end(&moved, tile, o, against, t);
 }
 
-/// n sweeps; returns the largest update of the last, m/s, whose totals are in t[n − 1].
-static double sweep(bt_world *w, const sweep_order *o, int n, bt_totals *t)
+static bt_problem contact_problem(const bt_world *w)
 {
-    bt_pass pass[BT_MAX_TURN];
-    for (int q = 0; q < n; q++) pass[q] = (bt_pass){sweep_tile, &o[q], &t[q], false};
-    bt_phases_turn(w, pass, n, w->bodies.vel);
-    bt_domain_reduce(w, &t[n - 1]);
-    return t[n - 1].most;
+    bt_problem p = {
+        .look = look_at_tile, .sweep = sweep_tile, .settle = settle, .vel = w->bodies.vel, .tolerance = w->par.tolerance, .cap = 0.9, .length = 50,
+        .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES), .plain = w->par.plain_sweeps,
+    };
+    bt_rounds_scale(&p, w->tiles->heaviest);
+    return p;
 }
 
-/// Does this step have so many rows, those of all ranks, that they do not fit into the caches?
-static bool is_far(const bt_world *w) { return w->par.turn_rows > 0 && w->solver->rows >= w->par.turn_rows; }
-
-/// Sweeps until the next look at what they change. In a large field, all that come before the next move: they share the traffic of memory
-/// (order.h), and some sweeps too many at the end are cheaper than looking after each.
-static int turn_length(const bt_world *w, int64_t left)
+double bt_solver_residual(bt_world *w, double *rms)
 {
-    if (!is_far(w)) return 1;
-    const int64_t n = w->par.plain_sweeps ? BT_MAX_TURN : bt_anderson_period(w->solver->anderson), most = left < BT_MAX_TURN ? left : BT_MAX_TURN;
-    return (int)(n < most ? n : most);
-}
-
-static void reserve_history(bt_world *w)
-{
-    bt_tiles *ts = w->tiles;
-    for (bt_idx k = 0; k < ts->n; k++)
-        if (ts->awake[k] || ts->tile[k].n_units > 0 || k == ts->n - 1) bt_anderson_reserve(&ts->tile[k], ts->tile[k].n_units > 0);
-}
-
-typedef struct {
-    const bt_anderson *a;
-    bt_anderson_verdict verdict;
-} bodies_order;
-
-static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
-{
-    (void)t;
-    const bodies_order *o = context;
-    bt_tile *tile = &w->tiles->tile[k];
-    if (k < w->tiles->n - 1 ? w->tiles->awake[k] : tile->own) bt_anderson_move_bodies(o->a, o->verdict, tile, w->bodies.vel);
-}
-
-/// Move the velocities and the line; the impulses of the units are moved at the beginning of the next sweep, which has them at hand.
-static bt_anderson_verdict accelerate(bt_world *w, const bt_totals *t)
-{
-    bt_tiles *ts = w->tiles;
-    bt_anderson *a = w->solver->anderson;
-    const bt_anderson_verdict verdict = bt_anderson_decide(a, t);
-    bt_phases_everywhere(w, move_bodies, &(bodies_order){a, verdict});
-    bt_tow *line = ts->tile[ts->n - 1].own ? line_of(w, ts->n - 1) : NULL;
-    for (int c = 0; line && verdict != BT_ANDERSON_STAY && c < line->n_branches; c++)
-        line->branch[c].lambda = bt_anderson_moved(a, verdict, &a->line[c], line->branch[c].lambda);
-    return verdict;
+    const bt_problem p = contact_problem(w);
+    bt_work work = {0};
+    bt_rounds_look(w, &p, false, &work);
+    if (rms) *rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
+    return work.residual;
 }
 
 /// Start from the impulses of the step before. True when there are any.
@@ -267,7 +237,7 @@ static bool warm_start(bt_world *w)
 {
     bt_tow *line = w->tiles->tile[w->tiles->n - 1].own ? line_of(w, w->tiles->n - 1) : NULL;
     if (line) bt_tow_warm_start(line, w->par.warm_start);
-    double pressed = velocities_from_impulses(w, true);
+    double pressed = form_velocities(w, true);
     bt_domain_maxima(w, &pressed, 1);
     return pressed > 0;
 }
@@ -280,40 +250,23 @@ static void store(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 
 static void sweep_to_tolerance(bt_world *w)
 {
-    bt_anderson *a = w->solver->anderson;
     bt_step_stats *st = &w->stats;
-    const double tolerance = w->par.tolerance;
-    const int64_t limit = st->sweeps + w->par.max_sweeps;
-    const int64_t times = w->par.inner_sweeps > 1 ? w->par.inner_sweeps : 1;
+    const bt_problem p = contact_problem(w);
+    bt_work work = {0};
     const bool pressed = warm_start(w);
+    bt_rounds_look(w, &p, false, &work);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
-    if (pressed && st->residual <= tolerance) {
-        sweep(w, &(sweep_order){.move = BT_ANDERSON_STAY, .times = times}, 1, &(bt_totals){0});
-        st->sweeps++;
-        st->residual = bt_solver_residual(w, &st->residual_rms);
+    if (pressed && work.residual <= p.tolerance) {
+        bt_rounds_sweep(w, &p, &work);
+        bt_rounds_look(w, &p, false, &work);
     }
-    bt_anderson_start(a, w->tiles->heaviest * tolerance * tolerance, is_far(w) ? BT_ANDERSON_EVERY_FAR : BT_ANDERSON_EVERY);
-    if (st->residual > tolerance && !w->par.plain_sweeps) reserve_history(w);
-    bt_anderson_verdict move = BT_ANDERSON_STAY;
-    while (st->residual > tolerance && st->sweeps < limit) {
-        const int n = turn_length(w, limit - st->sweeps);
-        bt_totals t[BT_MAX_TURN] = {{.n_sums = 0}};
-        sweep_order o[BT_MAX_TURN];
-        bool record = false;
-        for (int q = 0; q < n; q++) {
-            record = !w->par.plain_sweeps && bt_anderson_begin(a, &t[q]);
-            o[q] = (sweep_order){record ? a : NULL, q == 0 ? move : BT_ANDERSON_STAY, times << a->effort, n > 1};
-        }
-        const double change = sweep(w, o, n, t);
-        move = BT_ANDERSON_STAY;
-        st->sweeps += n;
-        if (change <= tolerance || st->sweeps == limit) {
-            velocities_from_impulses(w, false);
-            if (st->residual <= tolerance) break;
-        }
-        if (record && st->sweeps < limit) move = accelerate(w, &t[n - 1]);
-    }
-    st->converged = st->residual <= tolerance;
+    if (work.residual > p.tolerance) bt_rounds_run(w, &p, &work);
+    st->sweeps += work.sweeps;
+    st->unit_updates += work.updates;
+    st->unit_moves += work.moves;
+    st->residual = work.residual;
+    st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
+    st->converged = work.residual <= p.tolerance;
     bt_phases_any_order(w, store, NULL, &(bt_totals){0});
     bt_domain_settle(w);
 }
@@ -325,7 +278,7 @@ void bt_solver_solve(bt_world *w)
     st->restitution_cut = false;
     s->shifted = false; // the displacements of the last step are over, and their array is of the bodies that were here then
     s->prepare_s = 0;
-    st->sweeps = 0;
+    st->sweeps = st->unit_updates = st->unit_moves = 0;
     const double t0 = bt_clock();
     s->rebounds = bt_restitution_begin(w);
     s->prepare_s += bt_clock() - t0;

@@ -191,7 +191,7 @@ static void solve_contacts(bt_world *w)
     double t0 = bt_clock();
     double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     if (bt_tiles_update(w, bt_contacts_margin(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
-    int64_t sweeps = 0;
+    int64_t sweeps = 0, updates = 0, moves = 0;
     bool again = false;
     st->repeats = 0;
     for (bool done = false; !done;) {
@@ -200,6 +200,8 @@ static void solve_contacts(bt_world *w)
         bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
         clock_phase(w, &st->solve_s, &t0);
         sweeps += st->sweeps;
+        updates += st->unit_updates;
+        moves += st->unit_moves;
         fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
         st->outrun = bt_contacts_outrun(w);
         done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
@@ -216,6 +218,8 @@ static void solve_contacts(bt_world *w)
         st->solve_s -= w->solver->prepare_s;
     }
     st->sweeps = sweeps;
+    st->unit_updates = updates;
+    st->unit_moves = moves;
 }
 
 void bt_world_step(bt_world *w)

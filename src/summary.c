@@ -118,8 +118,11 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 
     s->contacts = h->n ? h->sum_contacts / (double)h->n : nan;
     s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
+    s->updates = h->n ? h->sum_updates / (double)h->n : nan;
+    s->moves = h->n ? h->sum_moves / (double)h->n : nan;
     s->ns_per_floe_step = n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 
+    if (c->solver.turn_rows != BT_TURN_ROWS) bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
         bt_errors_add(&s->warnings, "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
                       "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",

@@ -239,6 +239,9 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "max_residual_m_s", h->max_residual);
     bt_json_number(&j, "tolerance_m_s", t->tolerance);
     bt_json_number(&j, "mean_sweeps", s->sweeps);
+    bt_json_number(&j, "mean_unit_updates", s->updates);
+    bt_json_number(&j, "mean_momentum_moves", s->moves);
+    bt_json_int(&j, "unprojected_steps", h->unprojected);
     bt_json_number(&j, "contacts_mean", s->contacts);
     bt_json_number(&j, "contact_work_j", h->contact_work);
     bt_json_number(&j, "crushed_work_j", h->crushed_work);

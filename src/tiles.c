@@ -22,8 +22,8 @@ static void free_tile(bt_tile *t)
     free(t->gaps);
     free(t->limits);
     free(t->scars);
-    free(t->unit_history);
-    free(t->body_history);
+    free(t->list);
+    free(t->before);
     *t = (bt_tile){0};
 }
 
@@ -31,9 +31,7 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    const bt_bands *b = &t->bands;
-    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, b->start, b->member, b->first, b->share,
-                      b->busy, b->worked, b->segment, b->edge, b->knot, b->other, t->tile, t};
+    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->share, t->tile, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 

@@ -55,6 +55,8 @@ typedef struct bt_floe_def {
     int line;                  ///< where in the case file it stands, for messages
 } bt_floe_def;
 
+enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
+
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
     char *text;       ///< the file's text
@@ -186,7 +188,7 @@ typedef struct bt_case {
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
         int64_t inner_sweeps;    ///< sweeps of a tile in its turn
-        int64_t turn_rows;       ///< from so many rows on one sweep of six is accelerated and looked at; 0 = never
+        int64_t turn_rows;       ///< without effect, of cases written for earlier versions
         double tile;             ///< least side of a tile / mean floe size
         bool plain;              ///< no acceleration
         bool warm_start;

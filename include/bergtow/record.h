@@ -36,10 +36,12 @@ typedef struct bt_sample {
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
     double sweeps, position_sweeps;
+    double unit_updates, momentum_moves; ///< of contacts, in all sweeps of the step
+    double unprojected;     ///< 1 if the position projection met its limit
     double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
     double residual_rms;    ///< the same, root mean square over the rows, m/s
     double active;          ///< floes in tiles whose contacts were looked at; the others rest
-    double unconverged;     ///< 1 if the sweep limit came before the tolerance
+    double unconverged;     ///< 1 if the limit of work came before the tolerance
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
     double kinetic_energy;  ///< of all dynamic bodies, J

@@ -3,15 +3,21 @@
 //
 //     w = J U2 + b,   M (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
 //
-// A sweep updates every unit once (a unit is a manifold: the normals of its two points are solved together, and their friction as one),
-// tile by tile in the order of tiles.h, with the velocities as they stand. It touches units, vel and inv and nothing else. Each tile is swept
-// par.inner_sweeps times before the next has its turn: its data are then in the first-level cache, and between ranks nothing
-// need be exchanged. In large fields (par.turn_rows) the sweeps up to the next acceleration, then six, follow each other through the field four levels of
-// tiles apart (src/order.h), so that what one has read from memory serves all; convergence is then looked at after the last of them. Contacts with large movable bodies (the berg on a line has hundreds) follow in sequence, and the tow line after them.
+// A sweep updates units one after the other (a unit is a manifold: the normals of its two points are solved together, and their friction as
+// one), tile by tile in the order of tiles.h, with the velocities as they stand. Contacts with large movable bodies (the berg on a line has
+// hundreds) follow in sequence, and the tow line after them.
 //
-// Acceleration: Anderson's, around the sweep taken as a fixed-point map of the impulses (src/anderson.h). Why: a plain
-// sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and ~m_berg/m_floe where a heavy
-// berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration as the reference; both end
+// Data flow of a step. units (bt_tile.units, with the impulses of the last step) and vel_free -> vel -> look -> lists -> sweeps -> vel, units:
+//   look     reads all units and vel; writes bt_tile.list (units that bear load or close), the residual, and what is bad;
+//   sweep    goes over the lists only, inner_sweeps times a tile before the next has its turn: its data are then in the first-level cache, and
+//            between ranks nothing need be exchanged. It touches listed units, vel and inv, and 24 B of bt_tile.before a unit;
+//   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
+//   settle   at the end: vel anew from vel_free and the impulses, then a look: the residual that is reported.
+// Rounds of sweeps, momentum, what ends them and what they may cost: src/rounds.h. The position projection is the same, with displacements in
+// place of velocities.
+//
+// Why momentum: a plain sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and ~m_berg/m_floe where a heavy
+// berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over all units, as the reference; both end
 // on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
 //
 // With ice.crushing.pressure the normal impulses have an upper bound, too, λ_n <= L(w_n) (bergtow/crush.h, src/limit.h): the sweep over a tile
@@ -26,16 +32,18 @@
 
 #include "bergtow/contacts.h"
 #include "bergtow/tiles.h"
+#include "bergtow/tow.h"
 #include "bergtow/world.h"
 
 typedef struct bt_solver {
-    struct bt_anderson *anderson;
+    bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/rounds.h)
+    bt_idx cap_before;
+    double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
     bt_idx cap_bodies;
     bool shifted;                ///< the projection did something this step
     bool rebounds;               ///< some contact of this step has a restitution
     struct bt_islands *islands;  ///< bodies that touch, while `rebounds`
-    int64_t rows;                ///< of the contact problem, all ranks
     double prepare_s;            ///< wall time of islands and biases in this step, s
 } bt_solver;
 

@@ -32,7 +32,7 @@
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
 
-enum { BT_COLOURS = 4, BT_PHASES = 5 }; ///< the fifth phase is the tile of the large movable bodies
+enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES }; ///< the fifth phase is the tile of the large movable bodies
 
 /// A pair near enough to be looked at, and what its contact was in the last step.
 typedef struct bt_pair {
@@ -77,9 +77,6 @@ typedef struct bt_tile {
     bt_idx right, above, diagonal;  ///< tiles +x, +y, +xy: index, −1 = none
     bool own;                       ///< this rank solves its contacts and answers for its bodies
     bool border;                    ///< some body of its block is held by other ranks too
-    bt_idx ahead;                   ///< tile that comes soon after it in the order of the pass, −1 = none
-    bt_idx knot;                    ///< its knot, −1 = all its neighbours are the same thread's
-    bt_idx depth;                   ///< among ranks: tiles from the nearest tile for which others wait (src/order.h)
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
     double margin;                  ///< m, of this step's detection
@@ -99,45 +96,23 @@ typedef struct bt_tile {
     struct bt_limit *limits;        ///< [n_units] bounds of the units
     struct bt_scar *scars;          ///< [n_scars] what pairs of this tile have crushed
     bt_idx cap_limits, n_scars, cap_scars;
-    // acceleration (anderson.h)
-    double *unit_history, *body_history;
-    bt_idx cap_unit_history, cap_body_history;
+    // units that are swept (src/rounds.h)
+    bt_idx *list;                   ///< [n_list] ascending
+    double (*before)[3];            ///< [n_units] unknowns before the last sweep
+    bt_idx n_list, cap_list;
+    int64_t updates;                ///< of units, since the balance of the ranks was last noted
+    bool bad;                       ///< some unit is not yet near the tolerance
+    bool kept;                      ///< swept in a round over a part of the field
+    bool still;                     ///< they could not in the round before: nothing of theirs moves on
+    bool swept;                     ///< listed units, here or on another rank, may move its bodies
 } bt_tile;
 
-/// A tile that may share its block with tiles that another thread does.
-typedef struct bt_knot {
-    _Atomic int64_t done;           ///< passes that it has behind it
-    bt_idx begin, end;              ///< those tiles, among bt_bands.other
-    int8_t phase;
-    char apart[64 - sizeof(int64_t) - 2 * sizeof(bt_idx) - 1]; ///< a cache line each
-} bt_knot;
-
-/// Groups of rows between two places where passes begin: one band goes up from the first, one, if any, down from the last, until they meet.
-typedef struct bt_segment {
-    _Atomic uint64_t free;          ///< groups that neither has taken in this turn: the first, and 2³² times the end
-    bt_idx begin, end;              ///< groups
-    bt_idx free_begin, free_end;    ///< those that either may take
-    char apart[64 - sizeof(uint64_t) - 4 * sizeof(bt_idx)];
-} bt_segment;
-
-/// The order of a pass (src/order.h).
-typedef struct bt_bands {
-    bt_idx n, n_threads;            ///< bands, and threads for them; among ranks one band, shared by all threads
-    bt_idx n_groups;
-    bt_idx *start;                  ///< [n_groups][BT_PHASES] and the end: place in the order
-    bt_segment *segment;            ///< [(n + 1) / 2] bands 2 s (up) and 2 s + 1 (down) are in segment s
-    bt_idx *edge;                   ///< [n + 1] groups that each band is expected to do
-    bt_idx n_border[BT_COLOURS];    ///< among ranks: border tiles of each phase, the first of that phase in group 0
-    bt_idx *member, *first;         ///< all tiles, with work or not, those of band b from first[b] on [n + 1]
-    double *share;                  ///< [n_shares] of the units each band is expected to do
-    double *busy;                   ///< [n_shares] s that it has been worked on in passes of this order, without waiting
-    double *worked;                 ///< [n_shares] units that it has visited in that time
-    bt_idx n_shares;
-    bt_knot *knot;                  ///< [n_knots]
-    bt_idx *other;                  ///< knots
-    bt_idx n_knots;
-    int64_t passes;                 ///< that all knots have behind them
-} bt_bands;
+/// What one thread is to do of one stretch of the order (src/phases.h).
+typedef struct bt_share {
+    _Atomic bt_idx next;            ///< the next tile to be taken, a place in the order
+    bt_idx begin, end;
+    char apart[64 - 3 * sizeof(bt_idx)]; ///< a cache line each
+} bt_share;
 
 enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
 
@@ -164,9 +139,12 @@ typedef struct bt_tiles {
     double moved_any;               ///< the same for any body in a tile
     uint8_t *rest;                  ///< [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
     uint8_t *awake;                 ///< [n] contacts may move the tile's bodies in this step
-    bt_idx *order;                  ///< [n_order] tiles of this rank with work, in the order of a pass (src/order.h)
+    bt_idx *order;                  ///< [n_order] tiles of this rank with work, by phase, in each those at the border of the rank first
     bt_idx n_order;
-    bt_bands bands;                 ///< who does what of it, and when
+    bt_idx start[BT_PHASES + 1];    ///< first tile of each phase in the order
+    bt_idx n_border[BT_PHASES];     ///< tiles at the border among those of each phase
+    bt_share *share;                ///< [BT_STRETCHES][n_shares] at the border and not, of every phase
+    bt_idx n_shares, cap_shares;    ///< threads
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
     bool calm;                      ///< nothing but contacts moves a floe that drifts with the water

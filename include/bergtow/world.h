@@ -109,14 +109,13 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    int64_t max_sweeps;
+    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every unit for each; with plain_sweeps, of sweeps
     bool warm_start;
-    bool plain_sweeps;     ///< no acceleration between the sweeps (reference)
+    bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
     int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
-    int64_t turn_rows;     ///< from so many rows of the contact problem on, six sweeps follow each other unwatched from one acceleration to the next; 0 = never
     double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
-    int64_t position_sweeps;
+    int64_t position_sweeps; ///< limit of the position projection: updates of every unit; with plain_sweeps, sweeps
     double rest_speed;     ///< approach below this has no restitution, m/s
     double size;           ///< mean floe diameter, sets tiles and skin, m
     double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
@@ -141,6 +140,9 @@ typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
     int64_t n_active;        ///< floes in tiles that were looked at (the others rest)
     int64_t sweeps, position_sweeps;
+    bool projected;          ///< the position projection came to its end, or there was nothing to do
+    int64_t unit_updates;    ///< of contacts by the sweeps
+    int64_t unit_moves;      ///< of contacts by momentum between sweeps
     int64_t repeats;         ///< times the step was detected and solved again because its solution outran the margin
     bool outrun;             ///< it still did at the end: a contact may have been missed
     double residual, residual_rms; ///< natural-map residual: max-norm and root mean square over the rows, m/s

@@ -75,7 +75,7 @@ def test_fields_are_made_once_and_keys_reach_the_run(small):
     before = {p: p.stat().st_mtime_ns for p in (out / "fields").iterdir()}
     assert len(before) == 8
     done = start("--sizes", 300, "--scenes", "tow-95", "--steps", 2, "--repeats", 1, "--cores", 1, "--triad-mib", 4, "--out", out,
-                 "--set", "solver.max_sweeps=5", "--set", "solver.tolerance=1e-9")
+                 "--set", "solver.plain=true", "--set", "solver.max_sweeps=5", "--set", "solver.tolerance=1e-9")
     assert done.returncode == 0, done.stderr
     with open(out / "bench.csv", newline="") as f:
         (row,) = csv.DictReader(f)

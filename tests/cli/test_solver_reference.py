@@ -196,6 +196,19 @@ def test_the_problem_does_not_come_from_the_solution(tmp_path):
     np.testing.assert_allclose(one.q, all_.q, atol=1e-12)
 
 
+@pytest.mark.parametrize("ice", [{"friction": 0}, {"friction": 0.2}, {"friction": 0.2, "crushing": {"pressure": "200 Pa"}}], ids=["no friction", "friction", "crushing"])
+def test_momentum_and_the_plain_sweep_agree(tmp_path, ice):
+    """The first step of a squeeze, solved with lists and momentum and by plain sweeps over all contacts: the same problem, the same velocities."""
+    case = changed(BASE, ice={**BASE["ice"], **ice, "concentration": 0.93}, domain={**BASE["domain"], "length": 6, "width": 5}, domain__ends_closing=0.3, water={"current_x": 1.5},
+                   solver={"tolerance": 1e-7, "max_sweeps": 1000000})
+    fast, r = dump(tmp_path, case, 1, "fast")
+    plain, s = dump(tmp_path, changed(case, solver__plain=True), 1, "plain")
+    assert np.array_equal(fast.W, plain.W) and r.series("unconverged")[0] == s.series("unconverged")[0] == 0
+    assert np.sum(fast.r[::2] > 0) > 10 and r.series("momentum_moves")[0] > 0 and s.series("momentum_moves")[0] == 0
+    assert np.abs(fast.u - plain.u).max() <= 1e-5 * SPEED
+    assert r.series("unit_updates")[0] < 0.5 * s.series("unit_updates")[0]
+
+
 def test_two_floes_from_first_principles(tmp_path):
     """W, q and the impulse of one oblique eccentric hit with friction, from masses, arms and velocities worked out here."""
     case = {

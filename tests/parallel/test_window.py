@@ -21,7 +21,7 @@ SPEED = {
     "output": {"frame_interval": 8},
 }
 # On a line, the other way, in the geographic frame, under every force: the field drifts.
-LINE = changed(SPEED, domain__frame="geographic", domain__sides="wall", domain__ahead=14, domain__width=14, ice__concentration=0.35, ice__restitution=0,
+LINE = changed(SPEED, domain__frame="geographic", domain__sides="wall", domain__ahead=14, domain__width=14, ice__concentration=0.35, ice__restitution=0, ice__seed=3,
                tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "direction": 180}, water={"latitude": 75, "current_x": 0.1},
                air={"wind_x": 5, "wind_y": 3})
 CASES = {"speed": SPEED, "line": LINE}
