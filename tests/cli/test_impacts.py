@@ -131,7 +131,7 @@ def test_crushing_and_its_keys(line, tmp_path):
     np.testing.assert_allclose(c["mean"], 2 / np.pi * c["peak"], rtol=1e-12)
     assert np.array_equal(c["impulse"], rows(line)["impulse"])
     real = rows(run(tmp_path, changed(LINE, impact={"conversion": "crushing", "corner": "real"}), name="real"))["corner"]
-    assert len(np.unique(real.round(6))) > 10 and np.all((real > 0.3) & (real < np.pi))
+    assert len(np.unique(real.round(6))) > 5 and np.all((real > 0.3) & (real < np.pi))
 
 
 def test_none_tells_nothing_and_changes_nothing(line, tmp_path):

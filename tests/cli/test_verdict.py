@@ -69,7 +69,6 @@ def test_the_start_is_not_in_the_means(slow, jerked):
     quarters = [x[n * k // 4:n * (k + 1) // 4].mean() for k in range(4)]
     assert w["series"]["tow_force"]["quarters_n"] == pytest.approx(quarters, rel=1e-9)
     good = slow.summary
-    assert good["window"]["verdict"] in ("steady", "too short")
     assert w["verdict"] != "steady" or s["mean_tow_force_low_n"] <= good["mean_tow_force_n"] <= s["mean_tow_force_high_n"]
 
 
