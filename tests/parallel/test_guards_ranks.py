@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest overlap of the last state.
-
-What turns these tests red: the body named by each rank for itself (two messages); the overlap of the last state without the maximum over the ranks.
-"""
+"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest overlap of the last state."""
 import json
 
 import pytest
