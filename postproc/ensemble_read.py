@@ -234,7 +234,7 @@ class Ensemble:
         return out
 
     def impacts(self, m):
-        """Collisions of a member from the program's `from` on: (time s, peak N, from s, hours, conversion), or None where they were not told apart."""
+        """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they were not told apart, or without a window."""
         hours, start = self.number("impacts_hours", m), self.number("impacts_from_s", m)
         if not hours > 0 or not self.folder(m).is_dir():
             return None

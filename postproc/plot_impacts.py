@@ -91,15 +91,15 @@ def exceedance(peaks, hours):
 
 
 def draw_exceedance(axes, run):
-    """Rate against peak, both logarithmic, of the collisions from the end of the ramp on."""
+    """Rate against peak, both logarithmic, of the collisions in the window."""
     hits = run.impacts
-    late = hits["time"] >= run.number("impacts.from_s", 0.0)
+    late = hits["time"] >= run.number("impacts.from_s")  # none without a window
     peaks, rate = exceedance(hits["peak"][late], run.number("impacts.hours"))
     axes.set_xlabel(f"peak of a collision (N)\n{hits['conversion']}")
     axes.set_ylabel("exceeded (per hour)")
     axes.set_title("How often a peak is exceeded", loc="left", fontsize=10.5)
     if not len(peaks) or peaks[0] <= 0:
-        axes.annotate("no collisions", (0.5, 0.5), xycoords="axes fraction", ha="center", color=style.FAINT)
+        axes.annotate("no collisions in the window", (0.5, 0.5), xycoords="axes fraction", ha="center", color=style.FAINT)
         return
     axes.loglog(peaks, rate, color=PEAK, drawstyle="steps-post", linewidth=1.2)
     axes.plot(peaks[:20], rate[:20], ".", color=PEAK, markersize=5)
@@ -113,6 +113,12 @@ def draw_exceedance(axes, run):
     axes.annotate(f"{len(peaks)} collisions in {style.short(60 * run.number('impacts.hours'))} min", (0.02, 0.03), xycoords="axes fraction", fontsize=9, color=style.FAINT)
 
 
+def _start(panels, name):
+    """The largest before the window, in words, where the file tells it and there is one."""
+    before = np.max(panels.get(f"start_{name}", 0.0))
+    return f"\nin the start before the window {style.quantity(before, 'N')}" if before > 0 else ""
+
+
 def draw(run):
     """The figure: mean load, largest load and largest peak by panel, and exceedance."""
     if run.towed is None:
@@ -123,9 +129,10 @@ def draw(run):
             raise RunError(run.result, f"has no /panels/{name}: the run has not ended", "wait for it, or run the case again")
     figure = plt.figure(figsize=(11, 8.6))
     grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.88, bottom=0.09, hspace=0.24, wspace=0.16)
-    draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"mean load by panel, from {panels['from']:g} s on")
-    draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST, "largest load in a step (impulse / time step)")
-    draw_hull(figure.add_subplot(grid[1, 0]), run, panels["max_peak"], PEAK, f"largest peak of a collision, {run.impacts['conversion']}")
+    window = f"over the window from {style.short(panels['from'], 4)} s on" if np.isfinite(panels["from"]) else "no window"
+    draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"mean load by panel, {window}")
+    draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST, "largest load in a step (impulse / time step)" + _start(panels, "max_load"))
+    draw_hull(figure.add_subplot(grid[1, 0]), run, panels["max_peak"], PEAK, f"largest peak of a collision, {run.impacts['conversion']}" + _start(panels, "max_peak"))
     draw_exceedance(figure.add_subplot(grid[1, 1]), run)
     style.headline(figure, run, "ice loads on the hull")
     return figure

@@ -86,9 +86,9 @@ def pictures(run):
     return out
 
 
-def start_peak(run):
-    """What the tension was before the window, in words."""
-    before = run.number("start_peak_line_tension_n")
+def start_peak(run, key="start_peak_line_tension_n"):
+    """What was the largest before the window, in words."""
+    before = run.number(key)
     return f"; in the start before it {force(before)}" if np.isfinite(before) else ""
 
 
@@ -106,7 +106,7 @@ def figures(run):
     if np.isfinite(n("peak_line_tension_n")):
         out.append(("largest line tension", force(n("peak_line_tension_n")), "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("impacts.largest.peak_n")):
-        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")), f"{run.summary['impacts']['conversion']}, from {style.short(n('impacts.from_s'))} s on"))
+        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")), f"{run.summary['impacts']['conversion']}, within the window" + start_peak(run, "impacts.start_largest_peak_n")))
     if np.isfinite(n("reference.mean_force_n")):
         out.append(("simulated / measured", style.short(n("reference.ratio")), f"measured {force(n('reference.mean_force_n'))}: {run.summary['reference'].get('source') or 'source not stated'}"))
     return out
@@ -160,13 +160,13 @@ def impacts(run):
     i = run.summary.get("impacts")
     if not isinstance(i, dict):
         return None
-    rows = [("collisions", f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} min; {i['collisions_whole_run']:.0f} in the whole run"),
+    rows = [("collisions in the window", f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} min; {i['collisions_whole_run']:.0f} in the whole run"),
             ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))), ("mean ice resistance by push", force(run.number("impacts.mean_push_resistance_n"))),
-            ("largest push of a floe", force(run.number("impacts.largest_push_n")))]
+            ("largest push of a floe", force(run.number("impacts.largest_push_n")) + start_peak(run, "impacts.start_largest_push_n"))]
     big = i.get("largest")
     if isinstance(big, dict):
         rows.append(("largest peak", f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse {style.short(big['impulse_ns'])} N s, "
-                     f"approach {style.short(big['approach_m_s'])} m/s), floe {big['floe']} at {style.short(big['time_s'])} s"))
+                     f"approach {style.short(big['approach_m_s'])} m/s), floe {big['floe']} at {style.short(big['time_s'])} s" + start_peak(run, "impacts.start_largest_peak_n")))
     return {"conversion": i["conversion"], "rows": rows, "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"])) for e in i.get("exceedance") or []]}
 
 

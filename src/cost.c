@@ -9,10 +9,13 @@
 
 #include "bergtow/record.h"
 #include "bergtow/shape.h"
+#include "bergtow/stats.h"
 #include "case_check.h"
+#include "history.h"
 #include "largest.h"
+#include "panel_blocks.h"
 
-static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 64, BASE_BYTES = 20e6;
+static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_N_COLUMNS, BASE_BYTES = 20e6;
 static const double CHECKPOINT_BYTES_PER_FLOE = 1000; // on rank 0 while it writes one: rows on the way, columns, the field, contacts
 
 // --- disk ------------------------------------------------------------------------------------------------------------
@@ -23,7 +26,7 @@ static const double RESULT_BASE = 255e3, FRAME_BASE = 2700, INDEX = 2600, LEAST_
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
 static const double OTHERS_FRAME = 760; // towed body and walls: 80 corners, poses, speeds
 static const double IMPACT_ROWS = 256, IMPACT_COLUMNS = 13, SERIES_CHUNK = 256;
-static const double CHECKPOINT_BASE = 95e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13, HISTORY_STEP = 64;
+static const double CHECKPOINT_BASE = 95e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
 static const double TEXTS = 30e3, XDMF_FRAME = 1730;
 static const double VORONOI_CORNERS = 5.6;
 
@@ -39,9 +42,17 @@ double bt_cost_seconds(const bt_case *c)
     return floes * (double)bt_case_steps(c) * bt_cost_floe_step(c->ice.concentration);
 }
 
+/// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel (panel_blocks.h).
+static double steps_kept(const bt_case *c)
+{
+    const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;
+    const double steps = (double)bt_case_steps(c), blocks = steps / (double)bt_stats_start_step(bt_case_steps(c));
+    return BYTES_PER_STEP * steps + (panels ? (double)sizeof(bt_panel_loads) * blocks * (double)c->impact.panels : 0);
+}
+
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
 {
-    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here + CHECKPOINT_BYTES_PER_FLOE * n_floes + BYTES_PER_STEP * (double)bt_case_steps(c);
+    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here + CHECKPOINT_BYTES_PER_FLOE * n_floes + steps_kept(c);
 }
 
 double bt_cost_corners(const bt_case *c, const bt_field *f, double n)
@@ -71,7 +82,7 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) + 2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
     const double outlines = 24 * n + 16 * corners + 4 * (corners + 2 * n);
     const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = bt_n_series_fields + (c->output.panels ? 3 * (double)c->impact.panels : 0);
-    const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + HISTORY_STEP * (double)bt_case_steps(c);
+    const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(c);
     const bool on_the_way = (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
                             (c->output.checkpoint_wall > 0 && (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);
     bt_cost_disk d = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns + 8 * IMPACT_ROWS * IMPACT_COLUMNS,

@@ -313,6 +313,16 @@ void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, con
     write_block(h, dataset, mem, rank, (hsize_t[3]){at}, size, data);
 }
 
+void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t n, void *data)
+{
+    if (idle(h) || n == 0) return;
+    const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(1, &n, NULL);
+    const bool done = H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, NULL, &n, NULL) >= 0 && H5Dread(dataset, mem, here, space, H5P_DEFAULT, data) >= 0;
+    if (!done || *h->errnum) fail(h, "read the file back");
+    H5Sclose(here);
+    H5Sclose(space);
+}
+
 void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n, const void *rows)
 {
     if (idle(h) || n == 0) return;

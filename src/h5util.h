@@ -56,6 +56,9 @@ void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length);
 /// Append n entries along the first dimension, which has `at` entries now.
 void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, const void *data);
 
+/// Entries first up to first + n of a dataset [entries] that was appended to.
+void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t n, void *data);
+
 /// Rows first up to first + n of a dataset [rows]... or, if it has frames, [frame][rows]...
 void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n, const void *rows);
 /// Where in the file a row lies, in bytes; of a dataset that is not packed, in a shared file.

@@ -23,7 +23,17 @@ const bt_column_def bt_history_columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_THRUST, "thrust", vessel_thrust),
     COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged),
     COLUMN(BT_COL_RESIDUAL, "residual", residual),
+    COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
+    COLUMN(BT_COL_PUSH, "push", largest_push),
 };
+
+double bt_history_largest(const double *x, int64_t from, int64_t to)
+{
+    double most = NAN;
+    for (int64_t i = from; i < to; i++)
+        if (!(x[i] <= most)) most = x[i];
+    return most;
+}
 
 void bt_history_init(bt_history *h) { *h = (bt_history){0}; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Collisions of the towed body: events over steps, their forces, counts; definitions in bergtow/impact.h.
+// Collisions of the towed body: events over steps, their forces, loads by panel; definitions in bergtow/impact.h.
 #include "bergtow/impact.h"
 
 #include <math.h>
@@ -7,7 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bergtow/tow.h"
 #include "domain.h"
 #include "touch.h"
 
@@ -26,12 +25,10 @@ bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w)
         .tolerance = w->par.tolerance,
         .sheet = c->ice.density * (1 + c->ice.added_mass),
         .body_height = c->body.draft + c->body.sail,
-        .from = c->output.window_start >= 0 ? c->output.window_start : c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp,
     };
     const bt_bodies *b = &w->bodies;
     const int64_t first = b->offset[towed];
     bt_panels_init(&m->panels, (int)c->impact.panels, (int)(b->offset[towed + 1] - first), b->vertices + 2 * first);
-    m->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *m->peaks);
     return m;
 }
 
@@ -42,7 +39,6 @@ void bt_impacts_free(bt_impacts *m)
     free(m->touch);
     free(m->closed);
     free(m->open);
-    free(m->peaks);
     free(m);
 }
 
@@ -70,47 +66,6 @@ void bt_impact_describe(const bt_impact_rule *r, char out[160])
     else snprintf(out, 160, "half-sine of %g s", r->duration);
 }
 
-// --- the largest peaks -----------------------------------------------------------------------------------------------
-
-static void sift_down(double *heap, int64_t n, int64_t i)
-{
-    for (;;) {
-        int64_t least = i;
-        for (int64_t k = 2 * i + 1; k <= 2 * i + 2 && k < n; k++)
-            if (heap[k] < heap[least]) least = k;
-        if (least == i) return;
-        const double x = heap[i];
-        heap[i] = heap[least], heap[least] = x;
-        i = least;
-    }
-}
-
-static void keep_peak(bt_impacts *m, double peak)
-{
-    if (m->n_peaks == BT_IMPACT_PEAKS) {
-        if (peak <= m->peaks[0]) return;
-        m->peaks[0] = peak;
-        sift_down(m->peaks, m->n_peaks, 0);
-        return;
-    }
-    int64_t i = m->n_peaks++;
-    for (; i > 0 && m->peaks[(i - 1) / 2] > peak; i = (i - 1) / 2) m->peaks[i] = m->peaks[(i - 1) / 2];
-    m->peaks[i] = peak;
-}
-
-static int descending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x < y) - (x > y);
-}
-
-void bt_impacts_sorted_peaks(const bt_impacts *m, double *peaks)
-{
-    if (m->n_peaks == 0) return;
-    memcpy(peaks, m->peaks, (size_t)m->n_peaks * sizeof *peaks);
-    qsort(peaks, (size_t)m->n_peaks, sizeof *peaks, descending);
-}
-
 // --- events over steps -----------------------------------------------------------------------------------------------
 
 static void close_event(bt_impacts *m, const bt_impact_open *o)
@@ -120,14 +75,6 @@ static void close_event(bt_impacts *m, const bt_impact_open *o)
     *e = o->so_far;
     e->panel = bt_panels_at(&m->panels, e->x, e->y);
     bt_impact_convert(&m->rule, e);
-    m->n_all++;
-    if (!(e->time >= m->from)) return;
-    m->n++;
-    keep_peak(m, e->peak);
-    if (m->n == 1 || e->peak > m->largest.peak) m->largest = *e;
-    bt_panel *p = &m->panels.panel[(int)e->panel];
-    p->collisions++;
-    p->max_peak = bt_max(p->max_peak, e->peak);
 }
 
 /// Touches t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that may go on.
@@ -191,31 +138,24 @@ static void follow_events(bt_impacts *m, double time)
 
 // --- one step --------------------------------------------------------------------------------------------------------
 
-/// Impulses of the step into panels and sums. (ux, uy): tow direction; c, s: yaw of the body at X1.
-static void add_loads(bt_impacts *m, bool counted, double ux, double uy, double c, double s)
+/// Impulses of the step into panels and sums. c, s: yaw of the body at X1.
+static void add_loads(bt_impacts *m, double c, double s)
 {
-    double ice[2] = {0, 0}, hit[2] = {0, 0};
+    double hit[2] = {0, 0};
+    m->largest_push = 0;
     for (int64_t i = 0; i < m->n_touch; i++) {
         const bt_touch *t = &m->touch[i];
         const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx, part = t->collision / t->normal;
-        ice[0] += fx, ice[1] += fy;
         hit[0] += part * fx, hit[1] += part * fy;
-        if (counted) m->largest_push = bt_max(m->largest_push, (t->normal - t->collision) / m->dt);
+        m->largest_push = bt_max(m->largest_push, (t->normal - t->collision) / m->dt);
         for (int k = 0; k < 2; k++) {
             if (!(t->point[k] > 0)) continue;
             const double share = t->point[k] / t->normal / m->dt;
             bt_panels_load(&m->panels, t->px[k], t->py[k], t->point[k] / m->dt, share * fx, share * fy);
         }
     }
-    m->ice_x = c * ice[0] - s * ice[1];
-    m->ice_y = s * ice[0] + c * ice[1];
     m->collision_x = c * hit[0] - s * hit[1];
     m->collision_y = s * hit[0] + c * hit[1];
-    if (!counted) return;
-    bt_panels_count(&m->panels);
-    m->steps++;
-    m->sum_ice -= m->ice_x * ux + m->ice_y * uy;
-    m->sum_collision -= m->collision_x * ux + m->collision_y * uy;
 }
 
 void bt_impacts_take(bt_world *w)
@@ -226,10 +166,9 @@ void bt_impacts_take(bt_world *w)
     free(m->touch);
     m->touch = bt_touch_collect(w, m, &m->n_touch);
     m->n_closed = 0;
-    const double time = (double)(w->step + 1) * w->par.dt;
-    follow_events(m, time);
+    follow_events(m, (double)(w->step + 1) * w->par.dt);
     bt_panels_clear(&m->panels);
-    add_loads(m, time >= m->from, w->tow ? w->tow->ux : 0, w->tow ? w->tow->uy : 0, p->c, p->s);
+    add_loads(m, p->c, p->s);
 }
 
 void bt_impacts_end(bt_impacts *m)

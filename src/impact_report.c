@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-static double hours(const bt_impacts *m) { return (double)m->steps * m->dt / 3600; }
+#include "summary.h"
 
 /// The k-th of 1, 2, 5, 10, 20, ...
 static int64_t rank_of(int k)
@@ -20,34 +20,33 @@ static int64_t rank_of(int k)
     return r;
 }
 
-static double *sorted(const bt_impacts *m)
+static double *sorted(const bt_impact_count *c)
 {
-    double *p = bt_alloc((size_t)m->n_peaks + 1, sizeof *p);
-    bt_impacts_sorted_peaks(m, p);
+    double *p = bt_alloc((size_t)c->n_peaks + 1, sizeof *p);
+    bt_impact_count_peaks(c, p);
     return p;
 }
 
-void bt_impacts_json(bt_json *j, const bt_impacts *m)
+void bt_impacts_json(bt_json *j, const bt_impact_count *c)
 {
-    if (!m) {
+    if (!c) {
         bt_json_string(j, "impacts", NULL);
         return;
     }
-    char text[160];
-    bt_impact_describe(&m->rule, text);
-    const double time = hours(m);
     bt_json_open(j, "impacts", '{');
-    bt_json_string(j, "conversion", text);
-    bt_json_number(j, "from_s", m->from);
-    bt_json_number(j, "hours", time);
-    bt_json_int(j, "collisions_whole_run", m->n_all);
-    bt_json_int(j, "collisions", m->n);
-    bt_json_number(j, "collisions_per_hour", time > 0 ? (double)m->n / time : NAN);
-    bt_json_number(j, "mean_collision_resistance_n", m->steps > 0 ? m->sum_collision / ((double)m->steps * m->dt) : NAN);
-    bt_json_number(j, "mean_push_resistance_n", m->steps > 0 ? (m->sum_ice - m->sum_collision) / ((double)m->steps * m->dt) : NAN);
-    bt_json_number(j, "largest_push_n", m->steps > 0 ? m->largest_push : NAN);
-    if (m->n > 0) {
-        const bt_impact *e = &m->largest;
+    bt_json_string(j, "conversion", c->conversion);
+    bt_json_number(j, "from_s", c->start);
+    bt_json_number(j, "hours", c->hours);
+    bt_json_int(j, "collisions_whole_run", c->n_all);
+    bt_json_int(j, "collisions", c->n);
+    bt_json_number(j, "collisions_per_hour", c->hours > 0 ? (double)c->n / c->hours : NAN);
+    bt_json_number(j, "mean_collision_resistance_n", c->collision_resistance);
+    bt_json_number(j, "mean_push_resistance_n", c->push_resistance);
+    bt_json_number(j, "largest_push_n", c->largest_push);
+    bt_json_number(j, "start_largest_push_n", c->start_push);
+    bt_json_number(j, "start_largest_peak_n", c->start_peak);
+    if (c->n > 0) {
+        const bt_impact *e = &c->largest;
         bt_json_open(j, "largest", '{');
         bt_json_number(j, "peak_n", e->peak);
         bt_json_number(j, "mean_n", e->mean);
@@ -64,12 +63,12 @@ void bt_impacts_json(bt_json *j, const bt_impacts *m)
     } else {
         bt_json_string(j, "largest", NULL);
     }
-    double *peaks = sorted(m);
+    double *peaks = sorted(c);
     bt_json_open(j, "exceedance", '[');
-    for (int k = 0; rank_of(k) <= m->n_peaks; k++) {
+    for (int k = 0; rank_of(k) <= c->n_peaks; k++) {
         bt_json_open(j, NULL, '{');
         bt_json_int(j, "rank", rank_of(k));
-        bt_json_number(j, "per_hour", (double)rank_of(k) / time);
+        bt_json_number(j, "per_hour", (double)rank_of(k) / c->hours);
         bt_json_number(j, "peak_n", peaks[rank_of(k) - 1]);
         bt_json_close(j, '}');
     }
@@ -78,29 +77,22 @@ void bt_impacts_json(bt_json *j, const bt_impacts *m)
     free(peaks);
 }
 
-static const char *force(char out[32], double newton)
+void bt_impacts_print(const bt_impact_count *c)
 {
-    const double size = fabs(newton);
-    if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
-    else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
-    else snprintf(out, 32, "%#.4g N", newton);
-    return out;
-}
-
-void bt_impacts_print(const bt_impacts *m)
-{
-    if (!m || m->steps == 0) return;
-    char a[32], b[32], text[160];
-    bt_impact_describe(&m->rule, text);
-    const double time = (double)m->steps * m->dt;
-    printf("  collisions          %lld from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n", (long long)m->n, m->from,
-           (double)m->n / hours(m), force(a, m->sum_collision / time), force(b, (m->sum_ice - m->sum_collision) / time));
-    if (m->n == 0) return;
-    printf("    peaks (%s)", text);
-    double *peaks = sorted(m);
-    // A few of the ranks: the largest, then tenfold.
-    for (int k = 0; rank_of(k) <= m->n_peaks; k += 3)
-        printf("%s %s at %.3g/h", k ? "," : ":", force(a, peaks[rank_of(k) - 1]), (double)rank_of(k) / hours(m));
-    printf("; largest push %s\n", force(a, m->largest_push));
-    free(peaks);
+    if (!c || !(c->hours > 0)) return;
+    char a[32], b[32];
+    printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n", (long long)c->n, c->start,
+           (double)c->n / c->hours, bt_force_text(a, c->collision_resistance), bt_force_text(b, c->push_resistance));
+    if (c->n > 0) {
+        printf("    peaks (%s)", c->conversion);
+        double *peaks = sorted(c);
+        // A few of the ranks: the largest, then tenfold.
+        for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
+            printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]), (double)rank_of(k) / c->hours);
+        printf("; largest push %s\n", bt_force_text(a, c->largest_push));
+        free(peaks);
+    }
+    if (c->n_all > c->n)
+        printf("    start             %lld before the window, the largest peak %s, the largest push %s\n", (long long)(c->n_all - c->n),
+               bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
 }

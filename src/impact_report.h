@@ -3,12 +3,12 @@
 #ifndef BT_IMPACT_REPORT_H
 #define BT_IMPACT_REPORT_H
 
-#include "bergtow/impact.h"
+#include "impact_count.h"
 #include "json.h"
 
-/// "impacts": {...}; null when m is NULL.
-void bt_impacts_json(bt_json *j, const bt_impacts *m);
-/// Two lines of the printed table; nothing when m is NULL.
-void bt_impacts_print(const bt_impacts *m);
+/// "impacts": {...}; null when c is NULL.
+void bt_impacts_json(bt_json *j, const bt_impact_count *c);
+/// Two lines of the printed table; nothing when c is NULL.
+void bt_impacts_print(const bt_impact_count *c);
 
 #endif

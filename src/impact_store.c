@@ -2,11 +2,13 @@
 // Datasets of collisions and panels; one table names the columns of a collision.
 #include "impact_store.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
+#define PIECE 8192 // rows that are read back at once
 
 static const struct {
     const char *name, *units, *description;
@@ -31,6 +33,12 @@ static const struct {
 };
 _Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS && sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
                "every number of a collision has its column");
+
+/// Numbers x[n] of column k into rows[n].
+static void put_column(bt_impact *rows, int64_t n, int k, const double *x)
+{
+    for (int64_t i = 0; i < n; i++) memcpy((char *)&rows[i] + columns[k].offset, &x[i], sizeof *x);
+}
 
 static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
 {
@@ -64,9 +72,10 @@ static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
     describe(h, "/panels/load", "N", "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
 }
 
-void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, bool series)
+void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c)
 {
-    *s = (bt_impact_store){.h = h, .from = m, .force = -1, .normal = -1, .n_panels = m->panels.n};
+    *s = (bt_impact_store){.h = h, .from = m, .earliest = bt_case_earliest_window(c), .force = -1, .normal = -1, .n_panels = m->panels.n};
+    bt_panel_blocks_init(&s->blocks, s->n_panels);
     bt_h5_group(h, "/impacts");
     char text[160], path[64];
     bt_impact_describe(&m->rule, text);
@@ -78,7 +87,7 @@ void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, b
         describe(h, path, columns[k].units, columns[k].description);
     }
     s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
-    create_panels(s, &m->panels, series);
+    create_panels(s, &m->panels, c->output.panels);
 }
 
 static void write_rows(bt_impact_store *s)
@@ -107,10 +116,11 @@ void bt_impact_store_take_closed(bt_impact_store *s)
     if (s->n_rows >= CHUNK) write_rows(s);
 }
 
-void bt_impact_store_take(bt_impact_store *s)
+void bt_impact_store_take(bt_impact_store *s, double time)
 {
     if (!s->h) return;
     bt_impact_store_take_closed(s);
+    bt_panel_blocks_add(&s->blocks, s->from->panels.panel, time < s->earliest);
     for (int k = 0; k < s->n_panels; k++) {
         const bt_panel *p = &s->from->panels.panel[k];
         s->sum[3 * k] += p->fx;
@@ -154,52 +164,75 @@ void bt_impact_store_write(bt_impact_store *s)
     s->n_samples = 0;
 }
 
-void bt_impact_store_totals(bt_impact_store *s)
+void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c)
 {
-    if (!s->h) return;
-    const bt_impacts *m = s->from;
-    const bt_panels *p = &m->panels;
-    const double steps = (double)p->steps;
-    const size_t n = (size_t)p->n;
-    double *x = bt_alloc(5 * n, sizeof *x);
+    bt_impact *rows = bt_alloc(PIECE, sizeof *rows);
+    double *x = bt_alloc(PIECE, sizeof *x);
+    for (int64_t first = 0; first < s->written && s->h->status == BT_OK; first += PIECE) {
+        const int64_t n = s->written - first < PIECE ? s->written - first : PIECE;
+        for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+            bt_h5_read_back(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)n, x);
+            put_column(rows, n, k, x);
+        }
+        for (int64_t i = 0; i < n && s->h->status == BT_OK; i++) bt_impact_count_add(c, &rows[i]);
+    }
+    free(rows);
+    free(x);
+}
+
+void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w)
+{
+    const size_t n = (size_t)s->n_panels;
+    const double steps = (double)w->n;
+    bt_panel_loads *before = bt_alloc(2 * n, sizeof *before), *within = before + n;
+    bt_panel_blocks_reduce(&s->blocks, w->put_off, before, within);
+    double *x = bt_alloc(7 * n, sizeof *x);
     int64_t *count = bt_alloc(n, sizeof *count);
     for (size_t k = 0; k < n; k++) {
-        const bt_panel *l = &p->panel[k];
-        x[2 * k] = l->sum_fx / steps, x[2 * k + 1] = l->sum_fy / steps; // NaN when no step counts
-        x[2 * n + k] = l->sum_normal / steps;
-        x[3 * n + k] = l->max_normal;
-        x[4 * n + k] = l->max_peak;
-        count[k] = l->collisions;
+        x[2 * k] = within[k].fx / steps, x[2 * k + 1] = within[k].fy / steps; // NaN when no step counts
+        x[2 * n + k] = within[k].normal / steps;
+        x[3 * n + k] = within[k].most;
+        x[4 * n + k] = c->panel[k].peak;
+        x[5 * n + k] = before[k].most;
+        x[6 * n + k] = c->panel[k].start_peak;
+        count[k] = c->panel[k].n;
     }
     bt_h5 *h = s->h;
-    bt_h5_attr_double(h, "/panels", "from", m->from);
-    bt_h5_attr_int(h, "/panels", "steps", p->steps);
+    bt_h5_attr_double(h, "/panels", "from", w->start);
+    bt_h5_attr_int(h, "/panels", "steps", w->n);
     bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
-    bt_h5_write(h, "/panels/mean_load", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 2 * n);
-    bt_h5_write(h, "/panels/max_load", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 3 * n);
-    bt_h5_write(h, "/panels/max_peak", H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + 4 * n);
+    describe(h, "/panels/mean_force", "N", "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
+    const struct { const char *path, *text; } of_normals[] = {
+        {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
+        {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt"},
+        {"/panels/max_peak", "largest peak of a collision in the window by the conversion of /impacts"},
+        {"/panels/start_max_load", "largest sum of the normal forces in a step before the window, impulse / dt"},
+        {"/panels/start_max_peak", "largest peak of a collision before the window by the conversion of /impacts"},
+    };
+    for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++) {
+        bt_h5_write(h, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
+        describe(h, of_normals[k].path, "N", of_normals[k].text);
+    }
     bt_h5_write(h, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
-    describe(h, "/panels/mean_force", "N", "mean contact force from the time `from` on, x and y in the frame of the towed body");
-    describe(h, "/panels/mean_load", "N", "mean sum of the normal forces from the time `from` on");
-    describe(h, "/panels/max_load", "N", "largest sum of the normal forces in a step, impulse / dt, from the time `from` on");
-    describe(h, "/panels/max_peak", "N", "largest peak of a collision by the conversion of /impacts, from the time `from` on");
-    describe(h, "/panels/collisions", "1", "collisions from the time `from` on");
+    describe(h, "/panels/collisions", "1", "collisions in the window");
     free(x);
     free(count);
+    free(before);
 }
 
 static const bt_state_row state_rows[] = {
 #define STATE(member) {#member, BT_ITEM_I64, 1, offsetof(bt_impact_store, member)}
-    STATE(written), STATE(n_merged), STATE(samples_written),
+    STATE(written), STATE(n_merged), STATE(samples_written), {"panel_steps", BT_ITEM_I64, 1, offsetof(bt_impact_store, blocks.steps)},
 #undef STATE
 };
-enum { N_STATE = sizeof state_rows / sizeof *state_rows };
+enum { N_STATE = sizeof state_rows / sizeof *state_rows, LOADS_WIDTH = sizeof(bt_panel_loads) / sizeof(double) };
 
 void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
 {
     if (!s->h) return;
     bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, s);
     bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps), LOADS_WIDTH, s->blocks.load);
 }
 
 static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
@@ -211,10 +244,31 @@ static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
         char path[64];
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
         bt_h5_read(old, path, H5T_NATIVE_DOUBLE, 0, n, 1, x);
-        for (int64_t i = 0; i < n; i++) memcpy((char *)&s->rows[i] + columns[k].offset, &x[i], sizeof *x);
+        put_column(s->rows, n, k, x);
     }
     free(x);
     s->n_rows = n;
+}
+
+/// Steps up to `step` that do not end before the earliest start.
+static int64_t late_steps(const bt_impact_store *s, int64_t step)
+{
+    int64_t n = 0;
+    for (int64_t k = 1; k <= step; k++) n += !((double)k * s->from->dt < s->earliest);
+    return n;
+}
+
+static void load_blocks(bt_impact_store *s, bt_snapshot *from, int64_t steps)
+{
+    int64_t rows = 0;
+    double *load = bt_snapshot_copy(from, "collisions/panel_blocks", BT_ITEM_F64, LOADS_WIDTH, &rows);
+    bool finite = true;
+    for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
+    bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
+    bt_snapshot_want(from, steps == late_steps(s, bt_snapshot_int(from, "world/step")), "collisions/panel_steps", -1, "does not fit the number of steps");
+    if (!from->faulty) bt_snapshot_want(from, rows == bt_panel_blocks_rows(&s->blocks, steps), "collisions/panel_blocks", -1, "does not fit the number of steps");
+    if (from->faulty) free(load);
+    else bt_panel_blocks_restore(&s->blocks, steps, (bt_panel_loads *)(void *)load);
 }
 
 void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old)
@@ -227,6 +281,7 @@ void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *o
     bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1, "is not the number of steps in the entry under way");
     bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1, "is not a number of collisions that result.h5 has");
     bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1, "is not the number of entries");
+    load_blocks(s, from, then.blocks.steps);
     if (from->faulty || old->status != BT_OK) return;
     s->n_merged = then.n_merged;
     load_rows(s, old, then.written);
@@ -252,5 +307,6 @@ void bt_impact_store_close(bt_impact_store *s)
     free(s->forces);
     free(s->normals);
     free(s->sum);
+    bt_panel_blocks_free(&s->blocks);
     *s = (bt_impact_store){0};
 }

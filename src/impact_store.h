@@ -6,6 +6,8 @@
 #include "bergtow/impact.h"
 #include "h5read.h"
 #include "h5util.h"
+#include "impact_count.h"
+#include "panel_blocks.h"
 #include "snapshot.h"
 
 enum { BT_IMPACT_COLUMNS = 13 };
@@ -13,9 +15,11 @@ enum { BT_IMPACT_COLUMNS = 13 };
 typedef struct bt_impact_store {
     bt_h5 *h;                         ///< NULL: nothing is stored
     const bt_impacts *from;           ///< what is stored
+    double earliest;                  ///< the window of the statistics begins there or later, s
     hid_t column[BT_IMPACT_COLUMNS];  ///< [collisions] each
     bt_impact *rows;                  ///< [n_rows] not yet written
     int64_t n_rows, cap_rows, written;
+    bt_panel_blocks blocks;
     // series of panel loads, if asked for
     hid_t force, normal;              ///< [samples][panels][2] N, [samples][panels] N; −1 = none
     int n_panels;
@@ -24,18 +28,20 @@ typedef struct bt_impact_store {
     int64_t n_merged, n_samples, cap_samples, samples_written;
 } bt_impact_store;
 
-/// Make the groups. series: with the panel loads of every sample.
-void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, bool series);
-/// Collisions that ended in the last step, and its panel loads.
-void bt_impact_store_take(bt_impact_store *s);
+/// Make the groups of case c. With output.panels the panel loads of every sample are in them.
+void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c);
+/// Collisions that ended in the last step, and its panel loads; time: its end, s.
+void bt_impact_store_take(bt_impact_store *s, double time);
 /// Collisions alone: those that the end of the run has closed.
 void bt_impact_store_take_closed(bt_impact_store *s);
 /// The present sample is complete.
 void bt_impact_store_end_sample(bt_impact_store *s);
 /// What is kept into the file.
 void bt_impact_store_write(bt_impact_store *s);
-/// Means and maxima by panel.
-void bt_impact_store_totals(bt_impact_store *s);
+/// Everything is written: the collisions of the file, one after the other, into c.
+void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c);
+/// Means and maxima by panel, over the window w and before it.
+void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w);
 /// Where it stands, after bt_impact_store_write.
 void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to);
 /// Go on from there: what had been written by then comes from `old`, the result file of that run.

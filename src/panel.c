@@ -96,15 +96,3 @@ void bt_panels_load(bt_panels *p, double x, double y, double normal, double fx, 
     k->fx += fx;
     k->fy += fy;
 }
-
-void bt_panels_count(bt_panels *p)
-{
-    for (int k = 0; k < p->n; k++) {
-        bt_panel *l = &p->panel[k];
-        l->sum_fx += l->fx;
-        l->sum_fy += l->fy;
-        l->sum_normal += l->normal;
-        l->max_normal = bt_max(l->max_normal, l->normal);
-    }
-    p->steps++;
-}

@@ -69,6 +69,8 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err)
 
 static void record_free(bt_record *r)
 {
+    bt_summary_free(&r->summary);
+    bt_impact_count_free(&r->count);
     bt_history_free(&r->history);
     free(r->dir);
     free(r->series);
@@ -172,7 +174,7 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 {
     if (r->comm->rank != 0) return BT_OK;
     r->h5.err = err;
-    bt_impact_store_create(&r->impacts, &r->h5, m, r->c->output.panels);
+    bt_impact_store_create(&r->impacts, &r->h5, m, r->c);
     return r->h5.status;
 }
 
@@ -208,7 +210,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
     r->h5.err = err;
     bt_history_add(&r->history, s);
-    bt_impact_store_take(&r->impacts);
+    bt_impact_store_take(&r->impacts, s->time);
     for (int k = 0; k < bt_n_series_fields; k++) {
         double *m = member(&r->merged, k);
         const double x = bt_sample_value(s, &bt_series_fields[k]);
@@ -256,14 +258,27 @@ char *bt_record_xdmf(const bt_record *r)
                                    .body_vertices = f->other_vertices, .time = f->times, .n_frames = f->n});
 }
 
+/// What is still on its way goes to the file, and the numbers of the whole run are made: once, on rank 0.
+static void conclude(bt_record *r, const bt_run_totals *t)
+{
+    if (r->concluded) return;
+    r->concluded = true;
+    if (r->n_merged > 0) end_entry(r);
+    bt_impact_store_take_closed(&r->impacts);
+    bt_record_flush(r);
+    bt_summary_make(&r->summary, &r->history, r->c, t, r->n_floes, r->towed >= 0);
+    if (!r->impacts.h) return;
+    bt_impact_count_init(&r->count, r->impacts.from, &r->history, &r->summary.window);
+    bt_impact_store_count(&r->impacts, &r->count);
+    bt_impact_store_totals(&r->impacts, &r->count, &r->summary.window);
+    r->summary.impacts = &r->count;
+}
+
 static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_errors *err)
 {
-    bt_summary s;
-    bt_summary_make(&s, &r->history, r->c, t, r->n_floes, r->towed >= 0);
-    char *text = bt_summary_json(&s, &r->history, r->c, t, r->n_floes);
+    char *text = bt_summary_json(&r->summary, &r->history, r->c, t, r->n_floes);
     const bt_status status = bt_record_write_text(r, "summary.json", text, err);
     free(text);
-    bt_summary_free(&s);
     return status;
 }
 
@@ -283,12 +298,12 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
     const bool first = r->comm->rank == 0;
     char *xdmf = first ? bt_record_xdmf(r) : NULL;
     r->h5.err = err;
-    if (first) {
+    if (first && t) {
+        conclude(r, t);
+        write_totals(r, t);
+    } else if (first) {
         if (r->n_merged > 0) end_entry(r);
-        if (t) bt_impact_store_take_closed(&r->impacts);
         bt_record_flush(r);
-        if (t) bt_impact_store_totals(&r->impacts);
-        if (t) write_totals(r, t);
     }
     bt_h5_sync_raw(&r->h5);
     bt_status status = bt_comm_agree(r->comm, close_file(r));
@@ -312,10 +327,9 @@ void bt_record_abandon(bt_record *r)
     record_free(r);
 }
 
-void bt_record_print_summary(const bt_record *r, const bt_run_totals *t)
+void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err)
 {
-    bt_summary s;
-    bt_summary_make(&s, &r->history, r->c, t, r->n_floes, r->towed >= 0);
-    bt_summary_print(&s, &r->history, r->c, t, r->n_floes);
-    bt_summary_free(&s);
+    r->h5.err = err;
+    conclude(r, t);
+    bt_summary_print(&r->summary, &r->history, r->c, t, r->n_floes);
 }

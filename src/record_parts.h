@@ -31,6 +31,10 @@ struct bt_record {
     int64_t n_events;      ///< written
     bt_frames frames;
     bt_impact_store impacts;
+    // of the end of the run
+    bool concluded;
+    bt_summary summary;
+    bt_impact_count count; ///< collisions over the window
 };
 
 /// What is buffered into the file, and the file to the system.

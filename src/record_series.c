@@ -73,6 +73,7 @@ const bt_series_field bt_series_fields[] = {
     ROW(collision_resistance, IMPACTS, MEAN, "N", "part of ice_resistance that belongs to collisions, impulse / dt; the rest is push; NaN if not told apart"),
     ROW(collisions, IMPACTS, SUM, "1", "collisions with the towed body that ended in the step; NaN if not told apart"),
     ROW(impact_peak, IMPACTS, MAX, "N", "largest peak force of these collisions by impact.conversion, 0 without a collision; NaN if not told apart"),
+    ROW(largest_push, IMPACTS, MAX, "N", "largest force of a floe on the towed body that is no collision, impulse / dt; NaN if not told apart"),
     ROW(moving, ALWAYS, LAST, "1", "floes faster than 1 % of the reference speed"),
     ROW(crushing, ALWAYS, MEAN, "1", "contact points that crush: their normal force is at the limit pressure x thickness x length"),
     ROW(crushed_work, ALWAYS, SUM, "J", "work taken by contact points that crush"),

@@ -188,7 +188,6 @@ static void total_up(run *r)
     r->totals.n_steps = r->w->step;
     r->totals.events = &r->w->events;
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
-    r->totals.impacts = r->w->impacts;
     r->totals.floes_outside = count_outside(r);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
@@ -221,7 +220,7 @@ static bt_status finish(run *r, bt_errors *err)
         bt_halt_describe(&r->halt, r->asked, r->w->step, stopped);
         r->totals.stopped = stopped;
     }
-    if (status == BT_OK && !r->o->quiet) bt_record_print_summary(r->record, &r->totals);
+    if (status == BT_OK && !r->o->quiet) bt_record_print_summary(r->record, &r->totals, err);
     const bt_status closed = bt_record_close(r->record, status == BT_OK ? &r->totals : NULL, err);
     if (status == BT_OK) status = closed;
     if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, BT_CHECKPOINT_FILE, err);

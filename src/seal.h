@@ -4,7 +4,7 @@
 // HDF5 checks next to nothing of what it reads, and 1.10 crashes on damaged files. So a file of ours begins with a user block of 512
 // bytes, which readers of HDF5 skip (h5py, ParaView, h5dump), and is compared with it before HDF5 sees a byte:
 //
-//     bergtow sealed file\nkind: checkpoint 1\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//     bergtow sealed file\nkind: checkpoint 2\nbytes: 123456\nxxh128: 0123...\n, then zeros
 //
 // The block must be, to the last byte, what the file's length and digest (XXH3, 128 bits) make it: any flipped bit, any cut, any swapped part is
 // refused. It protects against damage, not against intent. Rejected: HDF5's Fletcher-32, which leaves metadata and the pairing of
@@ -20,7 +20,7 @@ enum {
 };
 
 // Kinds carry the version of the format: another one is refused with both names.
-#define BT_SEAL_CHECKPOINT "checkpoint 1"
+#define BT_SEAL_CHECKPOINT "checkpoint 2"
 #define BT_SEAL_RESULT "result 1"
 #define BT_SEAL_FIELD "field 1"
 #define BT_SEAL_ENSEMBLE "ensemble 1"

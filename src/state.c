@@ -54,12 +54,7 @@ static const bt_state_row window_rows[] = {
     WINDOW(I64, 1, missed), WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
 };
 
-#define IMPACTS(type, width, member) MEMBER(bt_impacts, #member, type, width, member)
-enum { IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double), OPEN_WIDTH = sizeof(bt_impact_open) / sizeof(double), PANEL_WIDTH = offsetof(bt_panel, collisions) / sizeof(double) };
-static const bt_state_row impacts_rows[] = {
-    IMPACTS(I64, 1, steps), IMPACTS(I64, 1, n_all), IMPACTS(I64, 1, n), IMPACTS(F64, 1, largest_push), IMPACTS(F64, 1, sum_collision), IMPACTS(F64, 1, sum_ice),
-    IMPACTS(F64, IMPACT_WIDTH, largest), MEMBER(bt_impacts, "panel_steps", I64, 1, panels.steps),
-};
+enum { IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double), OPEN_WIDTH = sizeof(bt_impact_open) / sizeof(double), PANEL_WIDTH = sizeof(bt_panel) / sizeof(double) };
 
 #define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
 static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time), STALL(F64, asked), STALL(F64, spent), STALL(F64, from_x), STALL(F64, from_y), STALL(U8, begun)};
@@ -258,39 +253,6 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 
 // --- collisions, events ----------------------------------------------------------------------------------------------
 
-static void save_impacts(const bt_impacts *m, bt_snapshot *s)
-{
-    bt_snapshot_add_rows(s, "impacts", impacts_rows, N_OF(impacts_rows), m);
-    bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, m->n_open, OPEN_WIDTH, m->open);
-    bt_snapshot_add(s, "impacts/peaks", BT_ITEM_F64, m->n_peaks, 1, m->peaks);
-    double *load = bt_snapshot_add(s, "impacts/panels", BT_ITEM_F64, m->panels.n, PANEL_WIDTH, NULL);
-    int64_t *count = bt_snapshot_add(s, "impacts/panel_collisions", BT_ITEM_I64, m->panels.n, 1, NULL);
-    for (int k = 0; k < m->panels.n; k++) {
-        memcpy(load + k * PANEL_WIDTH, &m->panels.panel[k], PANEL_WIDTH * sizeof *load);
-        count[k] = m->panels.panel[k].collisions;
-    }
-}
-
-static void load_impacts(bt_impacts *m, bt_snapshot *s)
-{
-    bt_snapshot_take_rows(s, "impacts", impacts_rows, N_OF(impacts_rows), m);
-    free(m->open);
-    m->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &m->n_open);
-    m->n_peaks = bt_snapshot_rows(s, "impacts/peaks");
-    if (m->n_peaks > BT_IMPACT_PEAKS) m->n_peaks = 0; // the next line complains
-    bt_snapshot_take(s, "impacts/peaks", BT_ITEM_F64, m->n_peaks, 1, m->peaks);
-    int64_t n = 0;
-    double *load = bt_snapshot_copy(s, "impacts/panels", BT_ITEM_F64, PANEL_WIDTH, &n);
-    int64_t *count = bt_alloc((size_t)m->panels.n, sizeof *count);
-    bt_snapshot_take(s, "impacts/panel_collisions", BT_ITEM_I64, m->panels.n, 1, count);
-    for (int k = 0; k < m->panels.n && n == m->panels.n; k++) {
-        memcpy(&m->panels.panel[k], load + k * PANEL_WIDTH, PANEL_WIDTH * sizeof *load);
-        m->panels.panel[k].collisions = count[k];
-    }
-    free(load);
-    free(count);
-}
-
 static const bt_state_row event_columns[] = {MEMBER(bt_event, "time", F64, 1, time), MEMBER(bt_event, "kind", I64, 1, kind), MEMBER(bt_event, "subject", I64, 1, subject),
                                              MEMBER(bt_event, "value", F64, 1, value)};
 
@@ -308,7 +270,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
-    if (w->impacts) save_impacts(w->impacts, s);
+    if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
     save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event, w->events.n);
     return status;
 }
@@ -345,14 +307,11 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
     if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
     const bt_impacts *m = w->impacts;
-    if (!found) found = rows_not_finite("impacts", impacts_rows, N_OF(impacts_rows), m, name);
     if (found || !m) return found;
     if (!all_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
     for (int64_t k = 0; k < m->n_open; k++)
         if (!open_finite(&m->open[k])) return "impacts/open";
-    for (int k = 0; k < m->panels.n; k++)
-        if (!all_finite((const double *)(const void *)&m->panels.panel[k], PANEL_WIDTH)) return "impacts/panels";
-    return NULL;
+    return all_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL : "impacts/panels";
 }
 
 /// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are constants, too.
@@ -375,7 +334,10 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     bt_snapshot_take_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
-    if (w->impacts && c->rank == 0) load_impacts(w->impacts, s);
+    if (w->impacts && c->rank == 0) {
+        free(w->impacts->open);
+        w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);
+    }
     bt_events_free(&w->events);
     w->events.n = -1;
     w->events.event = load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);

@@ -12,13 +12,14 @@
 
 const char *const bt_verdict_names[] = {"steady", "not steady", "too short"};
 
-static const struct { const char *name, *key; bt_column column; bool load; } reported[BT_N_REPORTED] = {
-    {"ice resistance", "ice_resistance", BT_COL_ICE, true},
-    {"tow force", "tow_force", BT_COL_TOW, true},
-    {"drag", "drag_force", BT_COL_DRAG, false},
-    {"tension of the line", "line_tension_1", BT_COL_TENSION_1, true},
-    {"tension of the second branch", "line_tension_2", BT_COL_TENSION_2, true},
-    {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true},
+/// load: its independent samples count for the length of the window. always: there in every run with a towed body.
+static const struct { const char *name, *key; bt_column column; bool load, always; } reported[BT_N_REPORTED] = {
+    [BT_REPORTED_ICE] = {"ice resistance", "ice_resistance", BT_COL_ICE, true, true},
+    [BT_REPORTED_TOW] = {"tow force", "tow_force", BT_COL_TOW, true, true},
+    [BT_REPORTED_DRAG] = {"drag", "drag_force", BT_COL_DRAG, false, false},
+    [BT_REPORTED_TENSION_1] = {"tension of the line", "line_tension_1", BT_COL_TENSION_1, true, false},
+    [BT_REPORTED_TENSION_2] = {"tension of the second branch", "line_tension_2", BT_COL_TENSION_2, true, false},
+    [BT_REPORTED_THRUST] = {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true, false},
 };
 
 /// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window too short.
@@ -50,19 +51,11 @@ static bool is_there(const double *x, int64_t first, int64_t n)
     return n > first;
 }
 
-static double largest(const double *x, int64_t from, int64_t to)
-{
-    double most = NAN;
-    for (int64_t i = from; i < to; i++)
-        if (!(x[i] <= most)) most = x[i];
-    return most;
-}
-
 /// Index of the window's first step; h->n without a window.
-static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c, double ramp)
+static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
 {
     s->given = c->output.window_start >= 0;
-    s->earliest = s->given ? c->output.window_start : ramp;
+    s->earliest = bt_case_earliest_window(c);
     const int64_t earliest = first_at_or_after(h, s->earliest);
     int64_t first = earliest;
     const char *settles = NULL;
@@ -87,13 +80,13 @@ static void reduce(bt_steady *s, const bt_history *h)
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
         bt_reported *r = &s->series[k];
-        *r = (bt_reported){.name = reported[k].name, .key = reported[k].key, .present = k < 2 || is_there(x, s->first, h->n)};
+        *r = (bt_reported){.name = reported[k].name, .key = reported[k].key, .present = reported[k].always || is_there(x, s->first, h->n)};
         if (!r->present) continue;
         r->mean = bt_stats_mean(x + s->first, s->n);
         r->trend = bt_stats_trend(x + s->first, s->n);
         bt_stats_quarters(x + s->first, s->n, r->quarter);
-        r->peak = largest(x, s->first, h->n);
-        r->start_peak = largest(x, 0, s->first);
+        r->peak = bt_history_largest(x, s->first, h->n);
+        r->start_peak = bt_history_largest(x, 0, s->first);
     }
     for (int64_t i = s->first; i < h->n; i++) {
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
@@ -169,7 +162,8 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
 {
     const double *time = h->column[BT_COL_TIME], ramp = c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp;
     *s = (bt_steady){.start = NAN, .end = NAN, .correlation_time = NAN};
-    s->first = find_start(s, h, c, ramp);
+    s->first = find_start(s, h, c);
+    s->put_off = s->first - first_at_or_after(h, s->earliest);
     s->n = h->n - s->first;
     if (s->n == 0) {
         decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s", s->earliest,
@@ -180,8 +174,8 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     }
     reduce(s, h);
     if (s->n == 0) return;
-    s->correlation_time = s->n > 1 ? s->series[0].mean.tau * t->dt : NAN;
-    if (!isfinite(s->series[0].mean.mean) || !isfinite(s->series[1].mean.mean))
+    s->correlation_time = s->n > 1 ? s->series[BT_REPORTED_ICE].mean.tau * t->dt : NAN;
+    if (!isfinite(s->series[BT_REPORTED_ICE].mean.mean) || !isfinite(s->series[BT_REPORTED_TOW].mean.mean))
         decide(s, BT_NOT_STEADY, "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
     if (s->start < ramp * (1 - 1e-12))
         decide(s, BT_NOT_STEADY, "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start", s->start, ramp);

@@ -29,7 +29,10 @@ typedef enum bt_verdict { BT_STEADY, BT_NOT_STEADY, BT_TOO_SHORT } bt_verdict;
 /// "steady", "not steady", "too short".
 extern const char *const bt_verdict_names[];
 
-enum { BT_N_REPORTED = 6 };
+/// Series whose means are reported.
+typedef enum bt_reported_series {
+    BT_REPORTED_ICE, BT_REPORTED_TOW, BT_REPORTED_DRAG, BT_REPORTED_TENSION_1, BT_REPORTED_TENSION_2, BT_REPORTED_THRUST, BT_N_REPORTED
+} bt_reported_series;
 
 /// A series whose mean is reported, over the window.
 typedef struct bt_reported {
@@ -51,7 +54,8 @@ typedef struct bt_steady {
     double residual;              ///< largest of them, m/s
     bool given;                   ///< by output.window_start, not found
     int64_t first, n;             ///< steps
-    bt_reported series[BT_N_REPORTED]; ///< the first is the ice resistance, the second the tow force
+    int64_t put_off;              ///< steps from the earliest possible start to the first
+    bt_reported series[BT_N_REPORTED];
 } bt_steady;
 
 /// The window of a run with a towed body.

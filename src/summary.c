@@ -41,8 +41,8 @@ static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k) 
 static void reduce_window(bt_summary *s, const bt_history *h)
 {
     const int64_t n = s->window.n;
-    s->ice = s->window.series[0].mean;
-    s->tow = s->window.series[1].mean;
+    s->ice = s->window.series[BT_REPORTED_ICE].mean;
+    s->tow = s->window.series[BT_REPORTED_TOW].mean;
     s->drag = mean_over(s, h, BT_COL_DRAG);
     s->coriolis = mean_over(s, h, BT_COL_CORIOLIS);
     s->tilt = mean_over(s, h, BT_COL_TILT);

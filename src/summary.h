@@ -21,6 +21,7 @@ typedef struct bt_summary {
     double ns_per_floe_step;
     bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
     double reference_ratio;           ///< mean ice / measured mean, NaN without a reference
+    const struct bt_impact_count *impacts; ///< collisions over the window, NULL = none told apart
     bt_errors warnings;
 } bt_summary;
 

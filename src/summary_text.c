@@ -66,6 +66,14 @@ static void json_outlines(bt_json *j, const bt_outline_counts *o)
     bt_json_close(j, '}');
 }
 
+/// Reported series that not every run has: which, in keys of summary.json, in the printed table.
+static const struct { bt_reported_series series; const char *key, *label; } of_the_line[] = {
+    {BT_REPORTED_TENSION_1, "line_tension", "  line tension"},
+    {BT_REPORTED_TENSION_2, "line_tension_2", "  second branch"},
+    {BT_REPORTED_THRUST, "vessel_thrust", "  vessel thrust"},
+};
+enum { N_OF_THE_LINE = sizeof of_the_line / sizeof *of_the_line };
+
 /// Mean with standard error and 95 % interval: mean_KEY_n, mean_KEY_se_n, mean_KEY_low_n, mean_KEY_high_n.
 static void json_mean(bt_json *j, const char *key, const bt_mean *m)
 {
@@ -126,12 +134,12 @@ static void json_window(bt_json *j, const bt_summary *s)
 /// Largest of the two branches within the window, or before it.
 static double peak_tension(const bt_steady *w, bool before)
 {
+    const bt_reported *branch[] = {&w->series[BT_REPORTED_TENSION_1], &w->series[BT_REPORTED_TENSION_2]};
     double most = NAN;
-    for (int k = 0; k < BT_N_REPORTED; k++)
-        if (!strncmp(w->series[k].key ? w->series[k].key : "", "line_tension", 12) && w->series[k].present) {
-            const double x = before ? w->series[k].start_peak : w->series[k].peak;
-            if (!(x <= most)) most = x;
-        }
+    for (int k = 0; k < 2; k++) {
+        const double x = !branch[k]->present ? NAN : before ? branch[k]->start_peak : branch[k]->peak;
+        if (!(x <= most)) most = isnan(x) ? most : x;
+    }
     return most;
 }
 
@@ -146,11 +154,11 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_case *c)
     bt_json_number(j, "peak_ice_resistance_n", s->peak);
     bt_json_string(j, "peak_conversion", "mean over a step, impulse / dt");
     json_mean(j, "tow_force", &s->tow);
-    bt_json_number(j, "peak_tow_force_n", s->body && w->n ? w->series[1].peak : NAN);
-    bt_json_number(j, "start_peak_tow_force_n", s->body ? w->series[1].start_peak : NAN);
-    for (int k = 3; k < BT_N_REPORTED; k++) {
-        static const char *const keys[] = {"line_tension", "line_tension_2", "vessel_thrust"};
-        json_mean(j, keys[k - 3], s->body && w->series[k].present ? &w->series[k].mean : &none);
+    bt_json_number(j, "peak_tow_force_n", s->body && w->n ? w->series[BT_REPORTED_TOW].peak : NAN);
+    bt_json_number(j, "start_peak_tow_force_n", s->body ? w->series[BT_REPORTED_TOW].start_peak : NAN);
+    for (int k = 0; k < N_OF_THE_LINE; k++) {
+        const bt_reported *r = &w->series[of_the_line[k].series];
+        json_mean(j, of_the_line[k].key, s->body && r->present ? &r->mean : &none);
     }
     bt_json_number(j, "peak_line_tension_n", s->body ? peak_tension(w, false) : NAN);
     bt_json_number(j, "start_peak_line_tension_n", s->body ? peak_tension(w, true) : NAN);
@@ -230,7 +238,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     json_lead(&j, &t->lead);
     json_outlines(&j, &t->outlines);
     json_forces(&j, s, c);
-    bt_impacts_json(&j, t->impacts);
+    bt_impacts_json(&j, s->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
     else bt_json_string(&j, "estimates", NULL);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
@@ -307,19 +315,18 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     printf("  %s\n", w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     print_mean("  ice resistance", &s->ice);
     printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to use\n");
-    printf("    quarters          %s,", force(a, w->series[0].quarter[0]));
-    printf(" %s, %s, %s\n", force(a, w->series[0].quarter[1]), force(b, w->series[0].quarter[2]), force(d, w->series[0].quarter[3]));
+    const double *quarter = w->series[BT_REPORTED_ICE].quarter;
+    printf("    quarters          %s,", force(a, quarter[0]));
+    printf(" %s, %s, %s\n", force(a, quarter[1]), force(b, quarter[2]), force(d, quarter[3]));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95), force(b, s->p99), force(d, s->peak));
     printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
            force(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
     printf("    drag              %s\n", force(a, s->drag.mean));
-    for (int k = 3; k < BT_N_REPORTED; k++) {
-        const bt_reported *r = &w->series[k];
+    for (int k = 0; k < N_OF_THE_LINE; k++) {
+        const bt_reported *r = &w->series[of_the_line[k].series];
         if (!r->present) continue;
-        char label[24];
-        snprintf(label, sizeof label, "  %s", k == 3 ? "line tension" : k == 4 ? "second branch" : "vessel thrust");
-        print_mean(label, &r->mean);
+        print_mean(of_the_line[k].label, &r->mean);
         printf("      peak            %s in the window", force(a, r->peak));
         if (isfinite(r->start_peak)) printf(", %s in the start before it", force(b, r->start_peak));
         printf("\n");
@@ -343,7 +350,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
     if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
     if (s->body) print_forces(s, c);
-    bt_impacts_print(t->impacts);
+    bt_impacts_print(s->impacts);
     if (s->body && !isnan(s->estimate.along)) {
         printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);

@@ -131,7 +131,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
         if (frames && i % (steps / frames) == 0) record_frame(r, i / (steps / frames), err);
     }
     const bt_run_totals t = totals(steps);
-    if (print_summary) bt_record_print_summary(r, &t);
+    if (print_summary) bt_record_print_summary(r, &t, err);
     return bt_record_close(r, &t, err);
 }
 

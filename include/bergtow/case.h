@@ -280,6 +280,9 @@ static inline double bt_case_tow_sign(const bt_case *c) { return cos(c->tow.dire
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *c);
 
+/// The window of the statistics begins there or later: output.window_start, or the end of the ramp, s.
+double bt_case_earliest_window(const bt_case *c);
+
 /// Reference speed of the solver tolerance, m/s (> 0).
 double bt_case_reference_speed(const bt_case *c);
 

@@ -29,9 +29,9 @@
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way      D, - the rest
 //   bt_window         S start, rear, drift, vel, counters, dropped, brought                       D the rest
 //   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats
-//   bt_impacts        S open, steps, n_all, n, largest_push, sums, largest, peaks, panels' sums   D rule   - touch, closed, collision, ice
+//   bt_impacts        S open                       D rule, panels' places                         - touch, closed, collision, largest_push, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way               the entries and frames themselves: result.h5
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way                       the rows: result.h5
+//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/panel_blocks.h)      the rows: result.h5
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field   D the rest
 //   bt_domain         not state: which rank owns what steers no bit
 //   random numbers    are keyed by seed, purpose and id (src/rng.h) and used by the field alone: there is no counter

@@ -27,6 +27,8 @@
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then; the rebound, if any, has no part in it
 // In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
 //
+// What is counted of them, and from when: src/impact_count.h, src/panel_blocks.h.
+//
 // On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all that follows.
 #ifndef BERGTOW_IMPACT_H
 #define BERGTOW_IMPACT_H
@@ -82,15 +84,12 @@ typedef struct bt_impact_rule {
     double least_speed;   ///< slower approaches are pushes, m/s
 } bt_impact_rule;
 
-enum { BT_IMPACT_PEAKS = 10000 }; ///< the largest peaks kept for the exceedance table
-
 /// State of this part: on rank 0 everything; on other ranks only rule, panels' geometry and scratch.
 typedef struct bt_impacts {
     bt_impact_rule rule;
     double dt, tolerance; ///< s, m/s
     double sheet;         ///< mass of a floe, added mass included, over its area and thickness, kg/m³
     double body_height;   ///< thickness of the towed body, for contacts with walls, m
-    double from;          ///< statistics count steps that end at or after this time, s
     bt_panels panels;
     // the last step
     bt_touch *touch;      ///< [n_touch] by gid
@@ -98,18 +97,10 @@ typedef struct bt_impacts {
     bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
     int64_t n_closed, cap_closed;
     double collision_x, collision_y; ///< share of collisions in the contact impulse on the body, world frame, N s
-    double ice_x, ice_y;  ///< all of it, N s
+    double largest_push;  ///< (λ − λ_c) / Δt of one manifold, N
     // carried on
     bt_impact_open *open; ///< [n_open] by gid
     int64_t n_open, cap_open;
-    // statistics
-    int64_t steps;        ///< counted
-    int64_t n_all, n;     ///< collisions of the whole run; of the steps counted
-    double largest_push;  ///< (λ − λ_c) / Δt of one floe in a step, N
-    double sum_collision, sum_ice; ///< impulse against the tow direction: of collisions, of all, N s
-    bt_impact largest;    ///< by peak, of the steps counted
-    double *peaks;        ///< [n_peaks] a heap with the smallest first, N
-    int64_t n_peaks;
 } bt_impacts;
 
 /// For the towed body of world w; NULL when the case asks for none, or there is no body.
@@ -124,9 +115,6 @@ void bt_impacts_end(bt_impacts *m);
 
 /// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
 void bt_impact_convert(const bt_impact_rule *r, bt_impact *e);
-
-/// The k-th largest peak kept, k = 1 .. n_peaks, into peaks[0 .. n_peaks), largest first.
-void bt_impacts_sorted_peaks(const bt_impacts *m, double *peaks);
 
 /// What the conversion is, in words: "half-sine of 0.1 s".
 void bt_impact_describe(const bt_impact_rule *r, char out[160]);

@@ -9,15 +9,10 @@
 
 #include "bergtow/base.h"
 
-/// Load on one panel.
+/// Load of a step on one panel.
 typedef struct bt_panel {
-    double fx, fy;        ///< force of the last step, N, body frame, friction included
-    double normal;        ///< sum of the normal forces of the last step, N
-    // since bt_panels_count was first told to
-    double sum_fx, sum_fy, sum_normal; ///< of the steps, N
-    double max_normal;    ///< N
-    double max_peak;      ///< largest peak of a collision, N
-    int64_t collisions;
+    double fx, fy;        ///< N, body frame, friction included
+    double normal;        ///< sum of the normal forces, N
 } bt_panel;
 
 typedef struct bt_panels {
@@ -25,8 +20,7 @@ typedef struct bt_panels {
     double *outline;      ///< [n_vertices][2] m, body frame
     double *arc;          ///< [n_vertices + 1] length of the waterline from vertex 0 to each vertex, m
     double bow;           ///< the same for the point on the x axis, m
-    bt_panel *panel;      ///< [n]
-    int64_t steps;        ///< counted
+    bt_panel *panel;      ///< [n] of the last step
 } bt_panels;
 
 /// n panels on a waterline with the centroid at the origin; the outline is copied. Release with bt_panels_free.
@@ -44,8 +38,5 @@ void bt_panels_clear(bt_panels *p);
 
 /// A normal force (N) and the force vector (N, body frame) at a point.
 void bt_panels_load(bt_panels *p, double x, double y, double normal, double fx, double fy);
-
-/// The step's loads into sums and maxima.
-void bt_panels_count(bt_panels *p);
 
 #endif

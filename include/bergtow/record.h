@@ -52,6 +52,7 @@ typedef struct bt_sample {
     double collision_resistance; ///< N, the part of ice_resistance that collisions have (impact.h); the rest is push
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
+    double largest_push;    ///< largest force of a floe on the body that no collision explains, N; NaN as for the collisions
     double moving;          ///< floes faster than 1 % of the reference speed
     double crushing;        ///< contact points that crush (crush.h)
     double crushed_work;    ///< taken by them in the step, J
@@ -144,7 +145,6 @@ typedef struct bt_run_totals {
     double memory;               ///< peak resident memory of all ranks, B
     double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
     const bt_events *events;     ///< what happened, or NULL
-    const struct bt_impacts *impacts; ///< collisions of the towed body, NULL = none told apart
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
 
@@ -205,7 +205,8 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
 /// Collective. Close and free a record that is of no use, and remove result.part.h5.
 void bt_record_abandon(bt_record *r);
 
-/// Print the end-of-run table (summary and phases) on stdout. On rank 0. Call it before the record is closed.
-void bt_record_print_summary(const bt_record *r, const bt_run_totals *t);
+/// Print the end-of-run table (summary and phases) on stdout. On rank 0, after the last sample and before the record is closed with the same t.
+/// What cannot be written or read back is told in err, and is the status of bt_record_close.
+void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
 #endif

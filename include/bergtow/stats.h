@@ -33,8 +33,13 @@ bt_trend bt_stats_trend(const double *x, int64_t n);
 /// Means of the four quarters of x[n]; NaN where a quarter has no sample.
 void bt_stats_quarters(const double *x, int64_t n, double quarter[4]);
 
-/// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the
-/// variance of the mean of batches of 5, searched over the first half. Returns an index in [first, n/2 or first].
+/// Steps between the starts of a window that are looked at in n samples: 5, twice that as often as it takes to have at most BT_STATS_STARTS of
+/// them. What needs a sum between any two starts so takes bounded memory, and a start of a long series is put off by n / BT_STATS_STARTS at most.
+enum { BT_STATS_STARTS = 4096 };
+int64_t bt_stats_start_step(int64_t n);
+
+/// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the variance of the mean of
+/// batches of 5, searched over the first half in steps of bt_stats_start_step(n - first). Returns an index in [first, n/2 or first].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first);
 
 #endif

@@ -5,7 +5,9 @@ import subprocess
 import h5py
 import pytest
 
+from counted import assert_counted_over_the_window
 from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, run
+from resuming import assert_same_result, done
 
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
@@ -31,3 +33,19 @@ def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     with h5py.File(many.dir / "result.h5") as f:
         assert len(f["impacts/time"]) > 5 and f["panels/force"].shape[0] == 100
     assert many.summary["impacts"] == alone.summary["impacts"]
+
+
+def test_counted_over_the_window_that_is_found(tmp_path):
+    """On two ranks, and after stops before the window begins and within it, on other ranks each time."""
+    case = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4}, body={"shape": "square", "length": 1.6, "y": 0.5, "x": 3},
+                   run__duration=60, output={"panels": True}, impact__panels=24)
+    alone = run(tmp_path, case, "--threads", 1)
+    start = assert_counted_over_the_window(alone)
+    assert 5 < start < 31
+    done(2, "run", "case.yml", "-o", "two", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_same_result(alone.dir, tmp_path / "two")
+    done(2, "run", "case.yml", "-o", "cut", "--quiet", "--threads", 1, "--steps", int(10 * start) - 20, cwd=tmp_path)
+    done(1, "resume", "cut", "--quiet", "--threads", 1, "--steps", 120, cwd=tmp_path)
+    done(2, "resume", "cut", "--quiet", "--threads", 1, cwd=tmp_path)
+    assert_counted_over_the_window(Run(tmp_path / "cut", None))
+    assert_same_result(alone.dir, tmp_path / "cut")

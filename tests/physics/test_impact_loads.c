@@ -23,7 +23,6 @@ static void add_body(bt_world *w, bt_impact_rule rule, bool free_body, double ya
     bt_impacts *m = w->impacts = bt_alloc(1, sizeof *m);
     *m = (bt_impacts){.rule = rule, .dt = w->par.dt, .tolerance = w->par.tolerance, .sheet = 910, .body_height = 3};
     bt_panels_init(&m->panels, 40, 4, w->bodies.vertices + 2 * w->bodies.offset[bt_world_towed(w)]);
-    m->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *m->peaks);
 }
 
 static bt_gid add_square(bt_world *w, double x, double y, double yaw, double e, double mu)
@@ -41,14 +40,18 @@ static void set_contact(bt_world *w, double e, double mu)
     w->bodies.friction[bt_world_towed(w)] = mu;
 }
 
+static double largest_push; ///< of the steps of the last call of run, N
+
 /// Collisions of `steps` steps, [0..10); returns how many there were.
 static int run(bt_world *w, int steps, bt_impact *out)
 {
     int n = 0;
+    largest_push = 0;
     for (int s = 0; s < steps; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);
         for (int64_t i = 0; i < w->impacts->n_closed && n < 10; i++) out[n++] = w->impacts->closed[i];
+        largest_push = fmax(largest_push, w->impacts->largest_push);
     }
     return n;
 }
@@ -80,7 +83,7 @@ static void central_impact(void **state)
             CHECK_CLOSE(e[0].x, 5, 0.03); // half-way across the gap
             CHECK_CLOSE(e[0].y, 2, 1e-9);
             CHECK_CLOSE(e[0].thickness, 0.5, 1e-12);
-            CHECK_CLOSE(w->impacts->largest_push, 0, 1e-6 * impulse);
+            CHECK_CLOSE(largest_push, 0, 1e-6 * impulse);
             bt_world_free(w);
         }
 }
@@ -113,7 +116,7 @@ static void eccentric_impact(void **state)
         if (mu == 0) CHECK_CLOSE(hit[0].impulse, (1 + e) * speed / inverse, 1e-3 * speed / inverse);
         // Momentum of the floe along x is λ of the whole run.
         CHECK_CLOSE(hit[0].impulse, m * w->bodies.vel[bt_world_index(w, 0)].x, 1e-3 * speed * m);
-        CHECK_CLOSE(w->impacts->largest_push * p.dt, 0, 1e-3 * speed * m);
+        CHECK_CLOSE(largest_push * p.dt, 0, 1e-3 * speed * m);
         // Crushing: k = 2 p h tan(φ/2).
         const double k = 2 * 2e6 * 0.5 * tan(0.5), m_e = hit[0].mass, v = fmin(speed, hit[0].impulse / m_e);
         CHECK_CLOSE(hit[0].peak, v * sqrt(k * m_e), 1e-9 * hit[0].peak);
@@ -140,7 +143,7 @@ static void drag_is_push(void **state)
     assert_int_equal(run(w, 1, hit), 1);
     CHECK_CLOSE(hit[0].impulse, sheet * (1 + speed), 1e-6 * sheet);
     CHECK_CLOSE(hit[0].mass, sheet, 1e-6);
-    CHECK_CLOSE(w->impacts->largest_push, 200 * 1 * speed, 1e-4); // K V, K = k |U1|
+    CHECK_CLOSE(largest_push, 200 * 1 * speed, 1e-4); // K V, K = k |U1|
     assert_int_equal(run(w, 30, hit), 0);
     bt_sample s;
     bt_observe(w, speed, &s);
@@ -214,7 +217,7 @@ static void static_push(void **state)
     bt_impact hit[10];
     assert_int_equal(run(w, 50, hit), 0);
     assert_int_equal(w->impacts->n_open, 0);
-    CHECK_CLOSE(w->impacts->largest_push, 0.3 * 400, 1e-6);
+    CHECK_CLOSE(largest_push, 0.3 * 400, 1e-6);
     bt_sample s;
     bt_observe(w, speed, &s);
     CHECK_CLOSE(s.ice_resistance, 120, 1e-6);
@@ -236,7 +239,7 @@ static void pushed_ahead(void **state)
     w->bodies.vel[bt_world_towed(w)].x = w->bodies.vel_start[bt_world_towed(w)].x = 0;
     bt_impact hit[10];
     assert_int_equal(run(w, 40, hit), 0);
-    CHECK_CLOSE(w->impacts->largest_push, sheet * speed / 5, 1e-6);
+    CHECK_CLOSE(largest_push, sheet * speed / 5, 1e-6);
     bt_world_free(w);
 }
 
@@ -258,11 +261,6 @@ static void events_in_their_order(void **state)
         CHECK_CLOSE(hit[k].time, times[k], 0.1001);
         CHECK_CLOSE(hit[k].impulse, sheet * speed, 1e-6 * sheet);
     }
-    assert_int_equal(w->impacts->n_all, 3);
-    double peaks[10];
-    bt_impacts_sorted_peaks(w->impacts, peaks);
-    assert_int_equal(w->impacts->n_peaks, 3);
-    assert_true(peaks[0] >= peaks[1] && peaks[1] >= peaks[2]);
     bt_world_free(w);
 }
 
@@ -313,7 +311,8 @@ static void panels_carry_the_ice_force(void **state)
     add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.1}, true, 0.1);
     w->bodies.pose[bt_world_towed(w)].x = -5.6;
     set_contact(w, 0, 0.3);
-    double turned = 0, collided = 0, in_steps = 0, in_events = 0;
+    double turned = 0, collided = 0, in_steps = 0, in_events = 0, behind = 0;
+    int64_t events = 0;
     for (int s = 0; s < 100; s++) {
         bt_sample o;
         const double yaw = w->bodies.pose[bt_world_towed(w)].yaw; // of the start of the step
@@ -323,6 +322,7 @@ static void panels_carry_the_ice_force(void **state)
         for (int k = 0; k < w->impacts->panels.n; k++) {
             const bt_panel *l = &w->impacts->panels.panel[k];
             fx += l->fx, fy += l->fy, normal += l->normal;
+            if (k >= 16 && k < 24) behind += l->normal;
         }
         const double force = hypot(o.ice_force_x, o.ice_force_y);
         CHECK_CLOSE(cos(yaw) * fx - sin(yaw) * fy, o.ice_force_x, 1e-12 * (normal + 1));
@@ -331,6 +331,7 @@ static void panels_carry_the_ice_force(void **state)
         assert_true(fabs(o.collision_resistance) <= fabs(o.ice_resistance) * (1 + 1e-9) + 0.4 * normal);
         for (int64_t i = 0; i < w->impacts->n_touch; i++) in_steps += w->impacts->touch[i].collision;
         for (int64_t i = 0; i < w->impacts->n_closed; i++) in_events += w->impacts->closed[i].impulse;
+        events += w->impacts->n_closed;
         turned = fmax(turned, fabs(yaw - 0.1));
         collided += o.collision_resistance;
     }
@@ -338,12 +339,10 @@ static void panels_carry_the_ice_force(void **state)
     bt_impacts_end(w->impacts);
     for (int64_t i = 0; i < w->impacts->n_closed; i++) in_events += w->impacts->closed[i].impulse;
     CHECK_CLOSE(in_events, in_steps, 1e-9 * in_steps);
-    assert_true(turned > 1e-4 && collided > 0 && w->impacts->n_all > 10);
+    events += w->impacts->n_closed;
+    assert_true(turned > 1e-4 && collided > 0 && events > 10);
     // Loads only where ice was: panels 35..39 and 0..4 are the front side, 15..24 the rear.
-    for (int k = 16; k < 24; k++) CHECK_CLOSE(w->impacts->panels.panel[k].sum_normal, 0, 0);
-    int64_t hits = 0;
-    for (int k = 0; k < 40; k++) hits += w->impacts->panels.panel[k].collisions;
-    assert_int_equal(hits, w->impacts->n_all);
+    CHECK_CLOSE(behind, 0, 0);
     bt_world_free(w);
 }
 
@@ -371,32 +370,6 @@ static void panels_of_a_square(void **state)
     bt_panels_free(&p);
 }
 
-/// More peaks than are kept: the largest are.
-static void the_largest_peaks_are_kept(void **state)
-{
-    (void)state;
-    bt_params p = scene_params(0.1, 1);
-    bt_world *w = bt_world_create(&p);
-    add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_DURATION, .duration = 0.5 * BT_PI}, false, 0); // peak = impulse
-    bt_impacts *m = w->impacts;
-    const int64_t n = 3 * BT_IMPACT_PEAKS;
-    for (int64_t i = 0; i < n; i += 10) { // 1 .. n in another order
-        m->open = bt_realloc(m->open, 10, sizeof *m->open);
-        for (int k = 0; k < 10; k++)
-            m->open[k] = (bt_impact_open){.so_far = {.impulse = (double)((i + k) * 7919 % n + 1), .approach = 1, .mass = 1, .x = 5}};
-        m->n_open = 10;
-        bt_impacts_end(m);
-    }
-    assert_int_equal(m->n, n);
-    assert_int_equal(m->n_peaks, BT_IMPACT_PEAKS);
-    double *peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *peaks);
-    bt_impacts_sorted_peaks(m, peaks);
-    for (int64_t i = 0; i < BT_IMPACT_PEAKS; i++) CHECK_CLOSE(peaks[i], (double)(n - i), 1e-6);
-    CHECK_CLOSE(m->largest.peak, (double)n, 1e-6);
-    free(peaks);
-    bt_world_free(w);
-}
-
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -405,7 +378,7 @@ int main(void)
         cmocka_unit_test(hit_beside_the_middle), cmocka_unit_test(body_against_a_wall),
         cmocka_unit_test(pushed_ahead),          cmocka_unit_test(events_in_their_order),
         cmocka_unit_test(corner_in_contact),     cmocka_unit_test(panels_carry_the_ice_force),
-        cmocka_unit_test(panels_of_a_square),    cmocka_unit_test(the_largest_peaks_are_kept),
+        cmocka_unit_test(panels_of_a_square),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -205,7 +205,7 @@ static int seen_in(const bt_world *w)
     for (int64_t k = 0; k < w->events.n; k++) seen |= w->events.event[k].kind == BT_EVENT_LINE_BROKEN ? BREAKS : WAYPOINT;
     if (w->window && w->window->renewed > 0) seen |= RENEWS;
     if (w->stats.n_crushing > 0) seen |= CRUSHES;
-    if (w->impacts && w->impacts->n_all > 0) seen |= COLLIDES;
+    if (w->impacts && w->impacts->n_closed + w->impacts->n_open > 0) seen |= COLLIDES;
     if (w->tiles->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (bt_part_first(&w->bodies, i) > 0) seen |= PARTS;
@@ -403,7 +403,10 @@ static void damage_is_refused(void **state)
     must(bt_snapshot_write(&later, path, &err), &err);
     size_t m;
     char *other = slurp(path, &m);
-    memcpy(other, bytes, n < m ? n / 2 : m / 2);
+    assert_int_equal(m, n);
+    size_t last = n - 1;
+    while (other[last] == bytes[last]) last--;
+    memcpy(other, bytes, last); // the last byte in which they differ stays
     spill(path, other, m);
     refused(path, m);
     free(other);

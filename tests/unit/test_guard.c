@@ -246,7 +246,7 @@ static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **
     const struct { double *number; const char *name; } all[] = {
         {&w->tow->carriage_x, "tow/carriage_x"}, {&w->tow->way, "tow/way"}, {&w->tow->branch[1].lambda, "tow/impulse_2"}, {&w->tow->vessel.vy, "tow/vessel_vy"},
         {&w->window->rear, "window/rear"}, {&w->window->vel.y, "window/vel"}, {&w->window->brought[2], "window/brought"}, {&w->drift_y, "world/drift_y"},
-        {&w->par.air_u, "step/air_u"}, {&w->impacts->sum_ice, "impacts/sum_ice"}, {&w->impacts->largest.peak, "impacts/largest"}, {&w->impacts->panels.panel[3].sum_fx, "impacts/panels"},
+        {&w->par.air_u, "step/air_u"}, {&w->impacts->panels.panel[3].fx, "impacts/panels"},
     };
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         const double before = *all[k].number;

@@ -117,8 +117,6 @@ static const struct change {
     {0, "tow/mark", 0, 100, NULL},
     {0, "tow/ux", 0, NAN, "tow/carriage_x"},
     {0, "tow/taut_1", 0, 3, NULL},
-    {0, "impacts/n", 0, -3, NULL},
-    {0, "impacts/panel_collisions", 1, -1, NULL},
     {1, "tiles/wrap_x", 0, 1e9, "tiles/side_x"},
     {1, "tiles/wrap_y", 0, 5, NULL},
     {1, "tiles/low_y", 0, 1, NULL},

@@ -238,9 +238,29 @@ static void the_transient_is_cut(void **s)
     assert_int_equal(bt_stats_steady_start(x, N, 1800), 1800);
 }
 
+/// A long series: the starts that are looked at lie apart so far that they are few, and the one that is found is the best of them.
+static void starts_of_a_long_series_are_few(void **s)
+{
+    (void)s;
+    enum { MANY = 5 * BT_STATS_STARTS };
+    const int64_t n[] = {1, MANY, MANY + 1, 2 * MANY, 2 * MANY + 1, 1000 * (int64_t)MANY}, step[] = {5, 5, 10, 10, 20, 5120};
+    for (int k = 0; k < 6; k++) assert_int_equal(bt_stats_start_step(n[k]), step[k]);
+    enum { N = 4 * MANY, FROM = 3 };
+    double *x = malloc(N * sizeof *x);
+    assert_non_null(x);
+    uint64_t state = 7;
+    ar1(x, N, 0.5, &state);
+    for (int i = 0; i < N / 7; i++) x[i] += 10;
+    const int64_t start = bt_stats_steady_start(x, N, FROM);
+    assert_in_range(start, N / 7, N / 7 + 40);
+    assert_int_equal((start - FROM) % 20, 0);
+    free(x);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(starts_of_a_long_series_are_few),
         cmocka_unit_test(the_interval_of_correlated_series_covers),
         cmocka_unit_test(what_is_taken_back_later_is_seen),
         cmocka_unit_test(a_drift_is_told_from_noise),

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+// What is counted of collisions and panel loads over a window that is known only at the end, against sums of the test's own.
+#include "made_up_run.h"
+
+#include "impact_count.h"
+#include "panel_blocks.h"
+
+enum { PANELS = 3 };
+
+static double random_number(uint64_t *state)
+{
+    *state = *state * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+    return (double)(*state >> 11) / 0x1p53;
+}
+
+/// Load of panel k in a step, N: any number, with a few large ones.
+static bt_panel load_at(int64_t step, int k)
+{
+    uint64_t state = (uint64_t)(step * PANELS + k + 1) * 77777;
+    random_number(&state);
+    const double x = random_number(&state), y = random_number(&state);
+    return (bt_panel){.fx = x - 0.5, .fy = y, .normal = x < 0.001 ? 1e3 * y : y};
+}
+
+static void add_steps(bt_panel_blocks *b, int64_t first, int64_t end, int64_t early)
+{
+    for (int64_t s = first; s < end; s++) {
+        bt_panel p[PANELS];
+        for (int k = 0; k < PANELS; k++) p[k] = load_at(s, k);
+        bt_panel_blocks_add(b, p, s < early);
+    }
+}
+
+static bt_panel_loads sum_of(int64_t first, int64_t end, int k)
+{
+    bt_panel_loads l = {0};
+    for (int64_t s = first; s < end; s++) {
+        const bt_panel p = load_at(s, k);
+        l.fx += p.fx, l.fy += p.fy, l.normal += p.normal, l.most = fmax(l.most, p.normal);
+    }
+    return l;
+}
+
+static bool alike(const bt_panel_loads *a, const bt_panel_loads *b)
+{
+    return fabs(a->fx - b->fx) < 1e-7 && fabs(a->fy - b->fy) < 1e-7 && fabs(a->normal - b->normal) < 1e-7 && a->most == b->most;
+}
+
+/// Runs before and after the first and the second time that two blocks become one, and such that end within a block: from any start that the
+/// window may have, and from a state that was kept on the way.
+static void panel_loads_from_any_start(void **state)
+{
+    (void)state;
+    const int64_t full = 5 * BT_STATS_STARTS, early = 17, late[] = {0, 1, 4, 5, 23, full, full + 1, full + 13, 2 * full, 2 * full + 1, 3 * full + 7};
+    const int64_t lengths[] = {5, 5, 5, 5, 5, 5, 10, 10, 10, 20, 20};
+    for (size_t i = 0; i < sizeof late / sizeof *late; i++) {
+        bt_panel_blocks b;
+        bt_panel_blocks_init(&b, PANELS);
+        const int64_t end = early + late[i], kept = end / 2;
+        add_steps(&b, 0, kept, early);
+        const int64_t rows = bt_panel_blocks_rows(&b, b.steps);
+        bt_panel_loads *copy = bt_alloc((size_t)rows, sizeof *copy);
+        memcpy(copy, b.load, (size_t)rows * sizeof *copy);
+        bt_panel_blocks_restore(&b, b.steps, copy);
+        add_steps(&b, kept, end, early);
+        assert_int_equal(b.steps, late[i]);
+        assert_int_equal(bt_stats_start_step(b.steps), lengths[i]);
+        assert_true(bt_panel_blocks_rows(&b, b.steps) <= PANELS * (1 + BT_STATS_STARTS));
+        const int64_t starts = late[i] / lengths[i], stride = starts > 40 ? starts / 40 : 1;
+        for (int64_t n = 0; n <= starts + 1; n += stride) {
+            const int64_t first = n * lengths[i] < late[i] ? n * lengths[i] : late[i];
+            bt_panel_loads before[PANELS], within[PANELS];
+            bt_panel_blocks_reduce(&b, first, before, within);
+            for (int k = 0; k < PANELS; k++) {
+                const bt_panel_loads old = sum_of(0, early + first, k), late_ones = sum_of(early + first, end, k);
+                assert_true(alike(&before[k], &old));
+                assert_true(alike(&within[k], &late_ones));
+            }
+        }
+        bt_panel_blocks_free(&b);
+    }
+}
+
+/// A collision at the very start of the window is in it, one a step before is not; the history gives what is of steps.
+static void collisions_by_their_time(void **state)
+{
+    (void)state;
+    enum { N = 10 };
+    double column[N], push[N] = {9, 1, 30, 2, 3, 7, 4, 5, 6, 1}, share[N] = {50, 50, 50, 50, 1, 2, 3, 4, 5, 6};
+    for (int i = 0; i < N; i++) column[i] = i + 1;
+    bt_history h = {.n = N};
+    for (int k = 0; k < BT_N_COLUMNS; k++) h.column[k] = column;
+    h.column[BT_COL_PUSH] = push;
+    h.column[BT_COL_COLLISION] = share;
+    bt_steady w = {.start = 0.1 * 4, .first = 4, .n = 6};
+    w.series[BT_REPORTED_ICE].mean.mean = 13.5;
+    const bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .panels = {.n = PANELS}};
+    const struct { double time, peak, panel; } hits[] = {{0.1 * 1, 900, 0}, {0.1 * 3, 20, 1}, {0.1 * 4, 5, 1}, {0.1 * 6, 80, 2}, {0.1 * 2, 70, 2}, {0.1 * 8, 60, 2}, {0.1 * 9, 5, 1}};
+    bt_impact_count c;
+    bt_impact_count_init(&c, &m, &h, &w);
+    for (size_t k = 0; k < sizeof hits / sizeof *hits; k++) bt_impact_count_add(&c, &(bt_impact){.time = hits[k].time, .peak = hits[k].peak, .panel = hits[k].panel, .gid = (double)k});
+    assert_int_equal(c.n_all, 7);
+    assert_int_equal(c.n, 4);
+    assert_true(c.hours == 6 * 0.1 / 3600 && c.start == 0.1 * 4);
+    assert_true(c.largest.peak == 80 && c.largest.gid == 3 && c.start_peak == 900);
+    assert_true(c.largest_push == 7 && c.start_push == 30);
+    assert_float_equal(c.collision_resistance, 3.5, 1e-12);
+    assert_float_equal(c.push_resistance, 10, 1e-12);
+    double peaks[4];
+    assert_int_equal(c.n_peaks, 4);
+    bt_impact_count_peaks(&c, peaks);
+    assert_true(peaks[0] == 80 && peaks[1] == 60 && peaks[2] == 5 && peaks[3] == 5);
+    const bt_panel_hits wanted[PANELS] = {{0, 0, 900}, {2, 5, 20}, {2, 80, 70}};
+    for (int k = 0; k < PANELS; k++) assert_true(c.panel[k].n == wanted[k].n && c.panel[k].peak == wanted[k].peak && c.panel[k].start_peak == wanted[k].start_peak);
+    bt_impact_count_free(&c);
+    // Without a window all of it is the start's.
+    w = (bt_steady){.start = NAN, .first = N};
+    w.series[BT_REPORTED_ICE].mean.mean = NAN;
+    bt_impact_count_init(&c, &m, &h, &w);
+    bt_impact_count_add(&c, &(bt_impact){.time = 5, .peak = 3});
+    assert_true(c.n_all == 1 && c.n == 0 && c.start_peak == 3 && c.hours == 0 && isnan(c.start) && isnan(c.largest_push) && c.start_push == 30);
+    assert_true(isnan(c.collision_resistance) && isnan(c.push_resistance));
+    bt_impact_count_free(&c);
+}
+
+/// More peaks than are kept: the largest are.
+static void the_largest_peaks_are_kept(void **state)
+{
+    (void)state;
+    const bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 1}, .dt = 1, .panels = {.n = 1}};
+    double one = 1;
+    bt_history h = {.n = 1};
+    for (int k = 0; k < BT_N_COLUMNS; k++) h.column[k] = &one;
+    const bt_steady w = {.start = 1, .n = 1};
+    bt_impact_count c;
+    bt_impact_count_init(&c, &m, &h, &w);
+    const int64_t n = 3 * BT_IMPACT_PEAKS;
+    for (int64_t i = 0; i < n; i++) bt_impact_count_add(&c, &(bt_impact){.time = 1, .peak = (double)(i * 7919 % n + 1)}); // 1 .. n in another order
+    assert_int_equal(c.n, n);
+    assert_int_equal(c.n_peaks, BT_IMPACT_PEAKS);
+    double *peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *peaks);
+    bt_impact_count_peaks(&c, peaks);
+    for (int64_t i = 0; i < BT_IMPACT_PEAKS; i++) assert_true(peaks[i] == (double)(n - i));
+    assert_true(c.largest.peak == (double)n);
+    free(peaks);
+    bt_impact_count_free(&c);
+}
+
+/// More collisions than are read back at once, and some that the record still holds when it ends: all of result.h5 is counted, once.
+static void every_row_of_the_file_is_counted(void **state)
+{
+    (void)state;
+    enum { STEPS = 200, EACH = 101 };
+    double square[8] = {1, -1, 1, 1, -1, 1, -1, -1};
+    bt_impact closed[EACH];
+    bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .tolerance = 1e-6, .closed = closed, .n_closed = EACH};
+    bt_panels_init(&m.panels, PANELS, 4, square);
+    bt_errors err = {0};
+    bt_case c = made_up_case();
+    c.output.window_start = 5;
+    const bt_record_bodies b = bodies();
+    bt_record *r;
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &c, &b, "", &err), BT_OK);
+    assert_int_equal(bt_record_watch_impacts(r, &m, &err), BT_OK);
+    for (int i = 0; i < STEPS; i++) {
+        const bt_sample s = sample(i);
+        for (int k = 0; k < EACH; k++) closed[k] = (bt_impact){.time = s.time, .peak = i * EACH + k + 1, .panel = k % PANELS};
+        bt_record_sample(r, &s, &err);
+    }
+    closed[0] = (bt_impact){.time = 5, .peak = 1e6, .panel = 1}; // open until the run ends
+    m.n_closed = 1;
+    const bt_run_totals t = totals(STEPS);
+    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
+    char *json = slurp(in_folder("rows/summary.json"));
+    char wanted[200];
+    const int before = 49, all = STEPS * EACH + 1; // 49 steps end before 5 s
+    snprintf(wanted, sizeof wanted, "\"collisions_whole_run\": %d,\n    \"collisions\": %d,", all, all - before * EACH);
+    if (!strstr(json, "\"from_s\": 5,") || !strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
+    snprintf(wanted, sizeof wanted, "\"start_largest_peak_n\": %d,\n    \"largest\": {\n      \"peak_n\": 1000000,", before * EACH);
+    if (!strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
+    free(json);
+    bt_panels_free(&m.panels);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(panel_loads_from_any_start),
+        cmocka_unit_test(collisions_by_their_time),
+        cmocka_unit_test(the_largest_peaks_are_kept),
+        cmocka_unit_test(every_row_of_the_file_is_counted),
+    };
+    int failed;
+    RUN_IN_FOLDER(tests, failed);
+    return failed;
+}
