@@ -271,14 +271,46 @@ double bt_contacts_overlap(bt_world *w)
     return deepest;
 }
 
-double bt_world_overlap(bt_world *w)
+/// The deeper of two; of equals the one with the lower ids, so that no order of threads is seen.
+static void deeper(bt_overlaps *to, const bt_overlaps *o)
+{
+    to->pairs += o->pairs;
+    const bool same = o->deepest == to->deepest, first = o->a < to->a || (o->a == to->a && o->b < to->b);
+    if (!(o->deepest > to->deepest || (same && o->pairs > 0 && first))) return;
+    to->deepest = o->deepest;
+    to->a = o->a, to->b = o->b;
+}
+
+/// Overlaps in the pairs of one tile. A body of several parts is one body.
+static bt_overlaps overlaps_of(const bt_world *w, const bt_tile *t, double allowed)
+{
+    bt_overlaps all = {0}, pair = {0};
+    for (bt_idx i = 0; i < t->n_pairs; i++) {
+        const bt_pair *q = &t->pairs[i];
+        const bt_gid a = w->bodies.gid[q->a], b = w->bodies.gid[q->b];
+        if (pair.a != a || pair.b != b) {
+            deeper(&all, &pair);
+            pair = (bt_overlaps){.a = a, .b = b};
+        }
+        bt_manifold m;
+        double gap;
+        int32_t axis = -1;
+        if (!bt_contacts_parts(w, q->a, q->b, q->part, 0, -1, &m, &gap, &axis)) continue;
+        for (int j = 0; j < m.n_points; j++) pair.deepest = bt_max(pair.deepest, 0 - m.p[j].gap);
+        pair.pairs = pair.deepest > allowed;
+    }
+    deeper(&all, &pair);
+    return all;
+}
+
+bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
 {
     bt_tiles_begin(w);
     bt_tiles_update(w, w->par.slop);
     const bt_tiles *t = w->tiles;
-    double deepest = 0;
+    bt_overlaps all = {0};
     // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel reduction(max : deepest) if (BT_MANY(t->n, FEW_TILES))
+#pragma omp parallel if (BT_MANY(t->n, FEW_TILES))
     {
         bt_pair_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)
@@ -289,17 +321,19 @@ double bt_world_overlap(bt_world *w)
             own.n_pairs = own.cap_pairs = 0;
             own.listed = false;
             bt_pairs_update(w, k, &own, 0, &s);
-            for (bt_idx i = 0; i < own.n_pairs; i++) {
-                bt_manifold m;
-                double gap;
-                int32_t axis = -1;
-                if (!bt_contacts_parts(w, own.pairs[i].a, own.pairs[i].b, own.pairs[i].part, 0, -1, &m, &gap, &axis)) continue;
-                for (int j = 0; j < m.n_points; j++) deepest = bt_max(deepest, 0 - m.p[j].gap);
-            }
+            const bt_overlaps here = overlaps_of(w, &own, allowed);
+#pragma omp critical(bt_overlaps)
+            deeper(&all, &here);
             free(own.pairs);
         }
         bt_pair_scratch_free(&s);
     }
+    return all;
+}
+
+double bt_world_overlap(bt_world *w)
+{
+    double deepest = bt_world_overlaps(w, 0).deepest;
     bt_domain_maxima(w, &deepest, 1);
     return deepest;
 }

@@ -94,7 +94,7 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
     bt_refusals r = {.path = c->ice.field, .err = err, .status = BT_OK};
     char why[BT_ICE_WHY];
     if (bt_ice_domain_fault(c, f, why)) bt_refuse(&r, "%s", why);
-    else bt_field_check_inside(c, f, "floe", &r);
+    else bt_field_check_apart(c, f, "floe", &r);
     if (r.status == BT_OK) return BT_OK;
     bt_field_free(f);
     bt_field_init(f);
@@ -131,6 +131,8 @@ typedef struct place {
     double allowed;        ///< overlap that is left to the position projection, m
     const char *noun;
     bt_refusals *r;
+    int64_t overlapping;   ///< pairs that overlap by more
+    double deepest;        ///< of them, m
 } place;
 
 /// One convex piece of a floe.
@@ -166,16 +168,18 @@ static double depth_in(const place *p, bt_idx i, int nb, const double *b, double
 
 static void visit(void *context, bt_idx i, bt_idx j, double dx, double dy)
 {
-    const place *p = context;
+    place *p = context;
     double deepest = 0;
     for (int k = 0; k < n_pieces(p, j); k++) {
         piece b;
         take_piece(p, j, k, &b);
         deepest = bt_max(deepest, depth_in(p, i, b.n, b.v, dx, dy));
     }
-    if (deepest > p->allowed)
-        bt_refuse(p->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s", p->noun, (int)(i < j ? i : j), p->noun,
-                  (int)(i < j ? j : i), deepest, p->allowed, p->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
+    if (!(deepest > p->allowed)) return;
+    p->overlapping++;
+    p->deepest = bt_max(p->deepest, deepest);
+    bt_refuse(p->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s", p->noun, (int)(i < j ? i : j), p->noun,
+              (int)(i < j ? j : i), deepest, p->allowed, p->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
 }
 
 static void check_bounds(const bt_case *c, const place *p, bt_idx i)
@@ -198,54 +202,73 @@ static void check_bounds(const bt_case *c, const place *p, bt_idx i)
                   low[1], high[1], c->domain.y0, y1);
 }
 
-void bt_field_check_inside(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+/// Ready for pairs of floes of f, wherever in the domain they lie.
+static void begin_places(place *p, bt_yard *y, const bt_case *c, const bt_field *f)
 {
-    double *outline = bt_field_outlines(f);
-    const place p = {.f = f, .outline = outline, .noun = noun, .r = r};
-    for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
-    free(outline);
-}
-
-void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
-{
-    bt_field_check_inside(c, f, noun, r);
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_yard y;
     bt_errors ignored = {0}; // no room for ice is told by the reader
-    bt_yard_init(&y, &whole, 0, &ignored);
+    bt_yard_init(y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
     double size = 0;
     for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI) / f->n;
-    double *outline = bt_field_outlines(f);
-    place p = {f, outline, bt_alloc((size_t)f->n, sizeof *p.parts), bt_max(c->solver.slop, 1e-9) * size, noun, r};
+    p->allowed = bt_max(c->solver.slop, 1e-9) * size;
+    p->parts = bt_alloc((size_t)f->n, sizeof *p->parts);
     for (bt_idx i = 0; i < f->n; i++) {
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
         const double *v = f->vertices + 2 * f->offsets[i];
         if (bt_outline_convex(n, v)) continue;
-        p.parts[i] = bt_alloc(1, sizeof *p.parts[i]);
-        bt_outline_split(n, v, p.parts[i]);
+        p->parts[i] = bt_alloc(1, sizeof *p->parts[i]);
+        bt_outline_split(n, v, p->parts[i]);
     }
-    bt_field_visit_pairs(&y, f, outline, 1, visit, &p);
+}
+
+static void check_pairs(place *p, const bt_yard *y)
+{
+    bt_field_visit_pairs(y, p->f, p->outline, 1, visit, p);
+    if (p->overlapping <= 1) return;
+    // A line of its own, whatever has been told one by one.
+    bt_errors_add(p->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", p->r->path, (long long)p->overlapping, p->noun, p->deepest);
+}
+
+/// Floes in the towed body or a floe given by hand.
+static void check_obstacles(const place *p, const bt_yard *y)
+{
+    const bt_field *f = p->f;
     for (bt_idx i = 0; i < f->n; i++) {
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
-        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++) radius = bt_max(radius, hypot(outline[2 * k], outline[2 * k + 1]));
-        bt_yard_wrap(&y, &x, &z);
-        for (int o = 0; o < y.n_obstacles; o++) {
-            const bt_obstacle *b = &y.obstacles[o];
+        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++) radius = bt_max(radius, hypot(p->outline[2 * k], p->outline[2 * k + 1]));
+        bt_yard_wrap(y, &x, &z);
+        for (int o = 0; o < y->n_obstacles; o++) {
+            const bt_obstacle *b = &y->obstacles[o];
             if (hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
             piece rel = {.n = b->n};
             for (int k = 0; k < b->n; k++) rel.v[2 * k] = b->v[2 * k] - b->x, rel.v[2 * k + 1] = b->v[2 * k + 1] - b->y;
-            const double depth = depth_in(&p, i, rel.n, rel.v, b->x - x, b->y - z);
-            if (depth > p.allowed)
-                bt_refuse(r, "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it out, or move the body", noun, (int)i, depth,
-                          p.allowed);
+            const double depth = depth_in(p, i, rel.n, rel.v, b->x - x, b->y - z);
+            if (depth > p->allowed)
+                bt_refuse(p->r, "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it out, or move the body", p->noun, (int)i,
+                          depth, p->allowed);
         }
     }
+}
+
+static void check_places(const bt_case *c, const bt_field *f, const char *noun, bool obstacles, bt_refusals *r)
+{
+    double *outline = bt_field_outlines(f);
+    place p = {.f = f, .outline = outline, .noun = noun, .r = r};
+    bt_yard y;
+    for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
+    begin_places(&p, &y, c, f);
+    check_pairs(&p, &y);
+    if (obstacles) check_obstacles(&p, &y);
     for (bt_idx i = 0; i < f->n; i++) free(p.parts[i]);
     free(p.parts);
     free(outline);
     bt_yard_free(&y);
 }
+
+void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r) { check_places(c, f, noun, false, r); }
+
+void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r) { check_places(c, f, noun, true, r); }

@@ -3,6 +3,7 @@
 #include "bergtow/setup.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -297,6 +298,30 @@ static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
     return true;
 }
 
+/// What a body is to the user.
+static void name_body(const bt_field *f, const bt_roster *r, bt_gid gid, char out[64])
+{
+    if (gid < f->n) snprintf(out, 64, "floe %lld of the ice", (long long)gid);
+    else if (gid < r->n_floes) snprintf(out, 64, "floes[%lld]", (long long)(gid - f->n));
+    else snprintf(out, 64, "%s", r->names[gid - r->n_floes]);
+}
+
+/// Nothing lies in anything else by more than the position projection takes out.
+static bool check_apart(const bt_case *c, const bt_field *f, bt_world *w, const bt_roster *r, bt_errors *err)
+{
+    const double allowed = bt_max(w->par.slop, 1e-9 * r->mean_size);
+    const bt_overlaps o = bt_world_overlaps(w, allowed);
+    if (o.pairs == 0) return true;
+    char a[64], b[64];
+    name_body(f, r, o.a < o.b ? o.a : o.b, a);
+    name_body(f, r, o.a < o.b ? o.b : o.a, b);
+    bt_errors_add(err,
+                  "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g m), deepest %s and %s; move or "
+                  "shrink the floes given by hand, or make the field for this body and domain",
+                  c->path ? c->path : "case", (long long)o.pairs, o.pairs == 1 ? "" : "s", o.deepest, allowed, a, b);
+    return false;
+}
+
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
 {
     double sum = 0, v[2 * BT_MAX_VERTICES];
@@ -333,16 +358,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;
 
-    // Generated fields are free of overlap by construction; a field that was read or floes given by hand may not be.
-    const double overlap = bt_world_overlap(w);
-    const double allowed = bt_max(p.slop, 1e-9 * size);
-    if (overlap > allowed) {
-        bt_errors_add(err,
-                      "%s: floes, towed body or walls overlap by %.3g m at the start (allowed: %.3g m); move or shrink "
-                      "the floes given by hand, or make the field for this body and domain",
-                      c->path ? c->path : "case", overlap, allowed);
-        return BT_ERR_CASE;
-    }
+    // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls may not be.
+    if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
     memset(w->bodies.stirred, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
     return BT_OK;
 }

@@ -223,6 +223,16 @@ void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 /// One step Δt: forces, contacts, solve, advance; see src/step.c.
 void bt_world_step(bt_world *w);
 
+/// Bodies in each other at the present poses.
+typedef struct bt_overlaps {
+    int64_t pairs;        ///< that overlap by more than is allowed
+    double deepest;       ///< of all pairs, m, 0 = none
+    bt_gid a, b;          ///< the pair with it
+} bt_overlaps;
+
+/// Overlaps of the bodies of this rank.
+bt_overlaps bt_world_overlaps(bt_world *w, double allowed);
+
 /// Deepest overlap over all pairs at the present poses, m (0 = none). Collective.
 double bt_world_overlap(bt_world *w);
 
