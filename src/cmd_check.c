@@ -14,6 +14,7 @@
 #include "cmd.h"
 #include "cmd_check.h"
 #include "cost.h"
+#include "packing.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -145,6 +146,8 @@ void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
 {
     const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
     bt_arch_warn(&arch, warnings);
+    const bt_packing packing = bt_packing_of(c, n->concentration);
+    bt_packing_warn(&packing, c->run.duration, warnings);
     warn_of_step(c, n, warnings);
     bt_case_warn_start(c, warnings);
 }
@@ -315,6 +318,14 @@ static void print_width(const bt_case *c, const bt_check_ice *n)
     printf("%s: arches of rigid floes %s\n", a.sides, a.possible ? "POSSIBLE" : "not expected");
 }
 
+static void print_packing(const bt_case *c, const bt_check_ice *n)
+{
+    const bt_packing p = bt_packing_of(c, n->concentration);
+    if (p.time == 0) printf("wall ahead           the ice is packed (%g) up to it from the start\n", p.packed);
+    else if (isfinite(p.time))
+        printf("wall ahead           reached by packed ice (%g) at about %.3g s, after %.3g m of tow (estimate)\n", p.packed, p.time, p.way);
+}
+
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
 {
     const bt_comm *comm = bt_comm_world();
@@ -333,6 +344,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     print_outlines(&f->outlines, c);
     print_body(c);
     print_width(c, &n);
+    print_packing(c, &n);
     print_window(c);
     print_environment(c);
     print_lead(c, &lead);

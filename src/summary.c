@@ -8,6 +8,7 @@
 #include "summary.h"
 #include "arch.h"
 #include "case_check.h"
+#include "packing.h"
 #include "summary_window.h"
 
 #include <math.h>
@@ -85,13 +86,15 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
     }
 }
 
-/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start and its width.
+/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start, its width and its length.
 static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals *t)
 {
     if (s->window.verdict != BT_STEADY) bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
     bt_case_warn_start(c, &s->warnings);
     const bt_arch arch = bt_arch_of(c, t->concentration, t->mean_size);
     bt_arch_warn(&arch, &s->warnings);
+    const bt_packing packing = bt_packing_of(c, t->concentration);
+    bt_packing_warn(&packing, s->sim_time, &s->warnings); // where its window ends, too
 }
 
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,

@@ -4,7 +4,7 @@ import math
 import re
 
 import pytest
-from harness import CASE, DONE, call, changed, run, write_case
+from harness import CASE, DONE, ROOT, TOW, call, changed, run, write_case
 
 # A disc of 80 m on a line of 400 m, almost in open water: 3 million kg per metre of draft and a period of a minute and a half.
 BERG = {
@@ -101,3 +101,21 @@ def test_the_width_of_the_domain_is_told(tmp_path):
     wide = call("check", write_case(tmp_path, changed(narrow, domain__width=2500)))
     assert "arches of rigid floes not expected" in wide.stdout and "can carry arches" not in wide.stdout
     assert call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": -1}))).returncode == CASE
+
+
+def test_packed_ice_that_reaches_the_end_wall_is_told(tmp_path):
+    """In basin-80 it was seen at 180 to 200 s: a run of 165 s ends before it, one of 360 s does not."""
+    basin = ROOT / "cases/basin/basin-80.yml"
+    for duration, wanted in ((165, False), (360, True)):
+        checked = call("check", basin, "--set", f"run.duration={duration}")
+        assert checked.returncode == DONE and re.search(r"wall ahead +reached by packed ice \(0\.9\) at about 206 s, after 25\.8 m of tow \(estimate\)", checked.stdout)
+        assert ("reaches the wall at about 206 s, 179 s at the earliest" in checked.stdout) == wanted
+        assert re.search(r"domain\.length: .* the end is at 360 s", checked.stdout) if wanted else "domain.length" not in checked.stdout
+    # 80 % of ice, 8 m to the wall, a body of half the width: 8 m / (1 + 0.5 * 0.8/0.1) = 1.6 m, at 0.3 m/s from the ramp of 1 s on.
+    case = changed(TOW, run__duration=8, domain={"length": 12, "width": 4}, ice={"concentration": 0.8, "size": 0.5, "thickness": 0.04}, body={"length": 2, "x": 3, "draft": 0.5},
+                   tow={"mode": "line", "speed": 0.3, "ramp": 1, "line_length": 2, "line_stiffness": 500})
+    long = run(tmp_path, case, name="long")
+    said = [w for w in long.summary["warnings"] if "reaches the wall" in w]
+    assert len(said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
+    short = run(tmp_path, case, "--steps", 45, name="short")
+    assert not any("reaches the wall" in w for w in short.summary["warnings"])
