@@ -61,6 +61,15 @@ def test_the_division_is_sound(alone):
     assert_same(one, many(folder, 3, 1, name="valid", program=VALIDATE))
 
 
+def test_overlap_goes_with_the_square_of_the_step(tmp_path):
+    """The field with the deepest of eight, 0.0212 of a floe, as a check that it is the step's and nothing that the window leaves: 0.0212, 0.0044."""
+    coarse, fine = (run(tmp_path, changed(LINE, ice__seed=1, run__dt=dt, run__duration=40), "--quiet", name=str(dt)) for dt in (0.125, 0.0625))
+    assert coarse.summary["max_overlap_relative"] > 0.015 and coarse.summary["unconverged_steps"] == fine.summary["unconverged_steps"] == 0
+    assert fine.summary["max_overlap_relative"] < 0.3 * coarse.summary["max_overlap_relative"]
+    at = coarse.series("overlap").argmax()
+    assert coarse.series("window_renewed")[at - 4:at + 1].sum() == 0
+
+
 def test_what_is_recorded(alone):
     _, r, name = alone
     w, n = r.summary["moving_window"], r.summary["n_floes"]
@@ -73,6 +82,9 @@ def test_what_is_recorded(alone):
     places = (w["laps"] + (w["ice_drift_x_m"] / 26 if name == "line" else 0)) * n
     assert abs(w["renewed"] + w["missed"] - places) < 0.15 * n
     assert abs(w["renewed"] + w["kept"] - places) < 0.15 * n
+    # A step keeps the normal that it found, and floes turn and slide by up to s = V dt = 0.1 m meanwhile, which leaves overlap of the order of s^2 / size: 0.01
+    # at the body's speed, more where a floe is thrown aside faster. Eight fields of the scene on a line have 0.0085 to 0.0212, none of them where a floe
+    # was renewed; that it goes with dt^2 is shown below. So this is a limit on these two fields, and not one of the method.
     assert r.summary["max_overlap_relative"] < 0.02
     assert r.summary["momentum_residual"] < 1e-9
     assert warned(r, "gone [12]\\.[0-9]+ times its length")
