@@ -322,7 +322,7 @@ bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
             own.listed = false;
             bt_pairs_update(w, k, &own, 0, &s);
             const bt_overlaps here = overlaps_of(w, &own, allowed);
-#pragma omp critical(bt_overlaps)
+#pragma omp critical
             deeper(&all, &here);
             free(own.pairs);
         }

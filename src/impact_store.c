@@ -235,19 +235,39 @@ void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
     bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps), LOADS_WIDTH, s->blocks.load);
 }
 
+/// Can the rows that are kept be counted?
+static bool rows_sound(const bt_impact_store *s)
+{
+    bool sound = true;
+    for (int64_t i = 0; i < s->n_rows; i++) {
+        const bt_impact *e = &s->rows[i];
+        sound = sound && e->panel >= 0 && e->panel < s->n_panels && isfinite(e->time) && isfinite(e->peak);
+    }
+    return sound;
+}
+
+/// The first n rows of the old file into the new one.
 static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
 {
-    double *x = bt_alloc((size_t)n, sizeof *x);
-    s->cap_rows = n + CHUNK;
-    s->rows = bt_realloc(s->rows, (size_t)s->cap_rows, sizeof *s->rows);
-    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
-        char path[64];
-        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        bt_h5_read(old, path, H5T_NATIVE_DOUBLE, 0, n, 1, x);
-        put_column(s->rows, n, k, x);
+    double *x = bt_alloc(PIECE, sizeof *x);
+    s->cap_rows = PIECE;
+    s->rows = bt_realloc(s->rows, PIECE, sizeof *s->rows);
+    for (int64_t first = 0; first < n && old->status == BT_OK; first += PIECE) {
+        s->n_rows = n - first < PIECE ? n - first : PIECE;
+        for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+            char path[64];
+            snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+            bt_h5_read(old, path, H5T_NATIVE_DOUBLE, first, s->n_rows, 1, x);
+            put_column(s->rows, s->n_rows, k, x);
+        }
+        if (old->status == BT_OK && rows_sound(s)) {
+            write_rows(s);
+        } else if (old->status == BT_OK) {
+            bt_errors_add(old->err, "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is damaged: restore it", old->path);
+            old->status = BT_ERR_CASE;
+        }
     }
     free(x);
-    s->n_rows = n;
 }
 
 /// Steps up to `step` that do not end before the earliest start.

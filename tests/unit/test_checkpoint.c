@@ -23,6 +23,7 @@
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "bergtow/window.h"
+#include "seal.h"
 #include "snapshot.h"
 #include "state.h"
 
@@ -396,6 +397,13 @@ static void damage_is_refused(void **state)
     bytes[n] = 0;
     spill(path, bytes, n + 1); // longer by one
     refused(path, n);
+    // Whole, of another version of the program.
+    spill(path, bytes, n);
+    must(bt_seal_write(path, "checkpoint 1", &err), &err);
+    bt_snapshot old;
+    assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
+    assert_non_null(strstr(err.text[0], "has the format \"checkpoint 1\", this program reads \"checkpoint 2\"; use the program that wrote it"));
+    bt_errors_free(&err);
     // Two files of one length, the front of one on the back of the other.
     bt_world_step(w);
     bt_snapshot later = {0};

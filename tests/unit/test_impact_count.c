@@ -4,6 +4,7 @@
 
 #include "impact_count.h"
 #include "panel_blocks.h"
+#include "snapshot.h"
 
 enum { PANELS = 3 };
 
@@ -146,40 +147,128 @@ static void the_largest_peaks_are_kept(void **state)
     bt_impact_count_free(&c);
 }
 
-/// More collisions than are read back at once, and some that the record still holds when it ends: all of result.h5 is counted, once.
-static void every_row_of_the_file_is_counted(void **state)
-{
-    (void)state;
-    enum { STEPS = 200, EACH = 101 };
-    double square[8] = {1, -1, 1, 1, -1, 1, -1, -1};
+enum { STEPS = 200, EACH = 101 };
+
+/// Collisions of a body with square panels as a step after the other leaves them.
+typedef struct scene {
+    bt_case c;
+    bt_impacts m;
     bt_impact closed[EACH];
-    bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .tolerance = 1e-6, .closed = closed, .n_closed = EACH};
-    bt_panels_init(&m.panels, PANELS, 4, square);
-    bt_errors err = {0};
-    bt_case c = made_up_case();
-    c.output.window_start = 5;
-    const bt_record_bodies b = bodies();
-    bt_record *r;
-    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &c, &b, "", &err), BT_OK);
-    assert_int_equal(bt_record_watch_impacts(r, &m, &err), BT_OK);
-    for (int i = 0; i < STEPS; i++) {
+} scene;
+
+static void begin(scene *k)
+{
+    double square[8] = {1, -1, 1, 1, -1, 1, -1, -1};
+    *k = (scene){.c = made_up_case(), .m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .tolerance = 1e-6}};
+    k->c.output.window_start = 5;
+    bt_panels_init(&k->m.panels, PANELS, 4, square);
+    k->m.closed = k->closed;
+}
+
+static void go_on(scene *k, bt_record *r, int first, int end, bt_errors *err)
+{
+    for (int i = first; i < end; i++) {
         const bt_sample s = sample(i);
-        for (int k = 0; k < EACH; k++) closed[k] = (bt_impact){.time = s.time, .peak = i * EACH + k + 1, .panel = k % PANELS};
-        bt_record_sample(r, &s, &err);
+        for (int n = 0; n < EACH; n++) k->closed[n] = (bt_impact){.time = s.time, .peak = i * EACH + n + 1, .panel = n % PANELS};
+        for (int n = 0; n < PANELS; n++) k->m.panels.panel[n] = load_at(i, n);
+        k->m.n_closed = EACH;
+        bt_record_sample(r, &s, err);
     }
-    closed[0] = (bt_impact){.time = 5, .peak = 1e6, .panel = 1}; // open until the run ends
-    m.n_closed = 1;
+}
+
+/// Close it with one more collision, which was open until then, and look at the summary.
+static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
+{
+    k->closed[0] = (bt_impact){.time = 5, .peak = 1e6, .panel = 1};
+    k->m.n_closed = 1;
     const bt_run_totals t = totals(STEPS);
-    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
-    char *json = slurp(in_folder("rows/summary.json"));
-    char wanted[200];
+    assert_int_equal(bt_record_close(r, &t, err), BT_OK);
+    char path[200], wanted[200];
+    snprintf(path, sizeof path, "%s/summary.json", dir);
+    char *json = slurp(path);
     const int before = 49, all = STEPS * EACH + 1; // 49 steps end before 5 s
     snprintf(wanted, sizeof wanted, "\"collisions_whole_run\": %d,\n    \"collisions\": %d,", all, all - before * EACH);
     if (!strstr(json, "\"from_s\": 5,") || !strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
     snprintf(wanted, sizeof wanted, "\"start_largest_peak_n\": %d,\n    \"largest\": {\n      \"peak_n\": 1000000,", before * EACH);
     if (!strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
     free(json);
-    bt_panels_free(&m.panels);
+    snprintf(path, sizeof path, "%s/result.h5", dir);
+    const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    hsize_t dims[3];
+    double load[PANELS], most[PANELS];
+    assert_int_equal(read_all(file, "/panels/mean_load", H5T_NATIVE_DOUBLE, dims, load, sizeof load), 1);
+    assert_int_equal(read_all(file, "/panels/start_max_load", H5T_NATIVE_DOUBLE, dims, most, sizeof most), 1);
+    for (int n = 0; n < PANELS; n++) {
+        assert_float_equal(load[n], sum_of(before, STEPS, n).normal / (STEPS - before), 1e-9);
+        assert_true(most[n] == sum_of(0, before, n).most);
+    }
+    H5Fclose(file);
+}
+
+/// More collisions than are read back at once, and one that is open until the record ends: all of result.h5 is counted, once.
+static void every_row_of_the_file_is_counted(void **state)
+{
+    (void)state;
+    scene k;
+    begin(&k);
+    bt_errors err = {0};
+    const bt_record_bodies b = bodies();
+    bt_record *r;
+    assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("rows"), &k.c, &b, "", &err), BT_OK);
+    assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
+    go_on(&k, r, 0, STEPS, &err);
+    check_end(&k, r, in_folder("rows"), &err);
+    bt_panels_free(&k.m.panels);
+}
+
+/// The same, taken up before the window begins and within it; and what no step can have left is refused.
+static void a_record_that_goes_on_counts_the_same(void **state)
+{
+    (void)state;
+    const struct { int at; const char *dir, *name; double panel, time, load; } all[] = {
+        {31, "early", NULL, 1, 1, 1}, {120, "late", NULL, 1, 1, 1}, {120, "panel", "/impacts", PANELS, 1, 1}, {120, "negative", "/impacts", -1, 1, 1},
+        {120, "time", "/impacts", 1, NAN, 1}, {120, "load", "collisions/panel_blocks", 1, 1, NAN}};
+    for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
+        scene k;
+        begin(&k);
+        bt_errors err = {0};
+        const bt_record_bodies b = bodies();
+        const bt_events none = {0};
+        bt_record *r;
+        char dir[200];
+        snprintf(dir, sizeof dir, "%s", in_folder(all[i].dir));
+        assert_int_equal(bt_record_open(&r, &bt_comm_alone, dir, &k.c, &b, "", &err), BT_OK);
+        assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
+        go_on(&k, r, 0, all[i].at - 1, &err);
+        const bt_sample s = sample(all[i].at - 1); // as the others, but for one number
+        for (int n = 0; n < EACH; n++) k.closed[n] = (bt_impact){.time = s.time, .peak = (all[i].at - 1) * EACH + n + 1, .panel = n % PANELS};
+        k.closed[7].panel = all[i].panel;
+        k.closed[7].time *= all[i].time;
+        for (int n = 0; n < PANELS; n++) k.m.panels.panel[n] = load_at(all[i].at - 1, n);
+        k.m.panels.panel[2].normal *= all[i].load;
+        bt_record_sample(r, &s, &err);
+        bt_snapshot kept = {.path = "checkpoint", .err = &err};
+        bt_snapshot_add_int(&kept, "world/step", all[i].at);
+        assert_int_equal(bt_record_save(r, 0, &kept, &err), BT_OK);
+        assert_int_equal(bt_record_publish(r, &err), BT_OK);
+        bt_record_abandon(r);
+        assert_int_equal(err.n, 0);
+        assert_int_equal(bt_record_reopen(&r, &bt_comm_alone, dir, &k.c, &b, "", &err), BT_OK);
+        assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
+        const bt_status status = bt_record_load(r, &kept, &none, &err);
+        if (all[i].name) {
+            assert_int_equal(status, BT_ERR_CASE);
+            assert_true(err.n == 1 && strstr(err.text[0], all[i].name));
+            bt_record_abandon(r);
+        } else {
+            assert_int_equal(status, BT_OK);
+            go_on(&k, r, all[i].at, STEPS, &err);
+            check_end(&k, r, dir, &err);
+        }
+        bt_errors_free(&err);
+        bt_snapshot_free(&kept);
+        bt_panels_free(&k.m.panels);
+    }
 }
 
 int main(void)
@@ -189,6 +278,7 @@ int main(void)
         cmocka_unit_test(collisions_by_their_time),
         cmocka_unit_test(the_largest_peaks_are_kept),
         cmocka_unit_test(every_row_of_the_file_is_counted),
+        cmocka_unit_test(a_record_that_goes_on_counts_the_same),
     };
     int failed;
     RUN_IN_FOLDER(tests, failed);
