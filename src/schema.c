@@ -243,7 +243,7 @@ const bt_key bt_case_keys[] = {
 
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
     REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
-    REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the steady window of the means; negative = found from the series"),
+    REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the window of all means, peaks, collisions and panel loads; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
     INT("output.checkpoint_steps", output.checkpoint_steps, "0", "[0, 1e12]", "steps between checkpoints, 0 = none by steps"),
     REAL("output.checkpoint_wall", output.checkpoint_wall, TIME, "600 s", "[0, 1e9]", "wall time between checkpoints, 0 = none by time; one is always written at the end and at a stop"),
@@ -255,7 +255,7 @@ const bt_key bt_case_keys[] = {
     REAL("estimate.kappa", estimate.kappa, RATIO, "11", "[1, 100]", "work of rafting / potential energy gained, the middle of the range, assumed"),
     REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]", "low end of the range of estimate.kappa, assumed"),
     REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]", "high end of the range of estimate.kappa, that of pressure ridges [Flato & Hibler 1995]; for rafting assumed"),
-    REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]", "concentration to which the body sweeps ice together, in the momentum closure, assumed"),
+    REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]", "concentration to which the body sweeps ice together, in the momentum closure and towards a wall ahead, assumed"),
     REAL("estimate.length_scale", estimate.length_scale, RATIO, "1", "(0, 1e4]",
          "full scale / this case: p_star is divided by it and p_s by its square, 1 at full scale [Froude]"),
 

@@ -125,7 +125,10 @@ def test_floes_in_each_other(tmp_path, way, xs, pairs, deepest):
     if not pairs:
         return
     assert checked.stderr == ran.stderr and not (tmp_path / "out").exists()
-    assert "allowed: 0.00113 m" in ran.stderr and re.search({"by hand": r"floes\[\d+\] and floes\[\d+\]", "GeoJSON": r"feature \d and feature \d", "HDF5": r"floe \d and floe \d"}[way], ran.stderr)
+    assert "allowed: 0.00113 m" in ran.stderr
+    name = {"by hand": "floes[%d] and floes[%d]", "GeoJSON": "feature %d and feature %d", "HDF5": "floe %d and floe %d"}[way]
+    named = {1: (0, 1), 2: (1, 2)}  # the deepest; of 15 alike it may be any
+    assert pairs not in named or name % named[pairs] in ran.stderr, ran.stderr
     if pairs > 1 or way == "by hand":
         assert re.search(rf"{pairs} pairs? of \S+ .*overlap,? by (up to )?{deepest} m", ran.stderr), ran.stderr
 

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
 // What is counted of collisions and panel loads over a window that is known only at the end, against sums of the test's own.
+//
+// What turns these tests red (tried): a collision in the very step in which the window begins left out; counted from the end of the ramp; only the
+// first piece of the file read back; blocks that are not merged, not restored, or taken from one too early; the collision that is open at the end
+// dropped; rows of a file not checked when it is taken up.
 #include "made_up_run.h"
 
 #include "impact_count.h"
