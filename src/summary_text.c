@@ -3,7 +3,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 #include "estimate_text.h"
 #include "impact_report.h"
@@ -134,11 +133,12 @@ static void json_window(bt_json *j, const bt_summary *s)
 /// Largest of the two branches within the window, or before it.
 static double peak_tension(const bt_steady *w, bool before)
 {
-    const bt_reported *branch[] = {&w->series[BT_REPORTED_TENSION_1], &w->series[BT_REPORTED_TENSION_2]};
+    static const bt_reported_series branch[] = {BT_REPORTED_TENSION_1, BT_REPORTED_TENSION_2};
     double most = NAN;
     for (int k = 0; k < 2; k++) {
-        const double x = !branch[k]->present ? NAN : before ? branch[k]->start_peak : branch[k]->peak;
-        if (!(x <= most)) most = isnan(x) ? most : x;
+        const bt_reported *r = &w->series[branch[k]];
+        const double x = before ? r->start_peak : r->peak;
+        if (r->present && !(x <= most)) most = x;
     }
     return most;
 }
