@@ -180,7 +180,8 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
     deadline = time.time() + 30
     while time.time() < deadline:
         try:
-            if (tmp_path / "out/result.part.h5").stat().st_size > 600_000:
+            # 550 kB with 256 steps, 680 with 300: beyond it a flush under way is not the first after 256.
+            if (tmp_path / "out/result.part.h5").stat().st_size > 700_000:
                 break
         except FileNotFoundError:
             pass
