@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The interval is that of the program (src/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or six,
-the larger, is n var(mean), and Student's t has 4 degrees of freedom [after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
+Within a run. The interval is that of the program (src/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or three,
+the larger, is n var(mean), and Student's t has 3 degrees of freedom [after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
 autoregression through batch means.
 
 Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense ice are skewed; the
@@ -14,8 +14,8 @@ import numpy as np
 from scipy import stats
 
 BATCHES = 96         # as in src/stats.c, and the next three
-WAVES = (2, 6)
-FREEDOM = 4.0
+WAVES = (2, 3)
+FREEDOM = 3.0
 LEAST_CORRELATED = 12
 LEVEL = 0.95
 RESAMPLES = 1999

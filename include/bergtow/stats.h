@@ -8,7 +8,7 @@
 typedef struct bt_mean {
     double mean, sd;    ///< of the samples
     double se;          ///< standard error of the mean, from the slowest waves of the series; NaN when n < 2
-    double low, high;   ///< 95 % interval of the mean, 2.776 standard errors to either side; NaN when n < 2
+    double low, high;   ///< 95 % interval of the mean, 3.182 standard errors to either side; NaN when n < 2
     double tau;         ///< correlation time in samples, ½ for white noise, no less
     double n_eff;       ///< n / (2τ)
     int64_t n;

@@ -50,13 +50,13 @@ static void check_coverage(double phi, int n)
         tau_sum += m.tau / SERIES;
         var_sum += m.se * m.se / SERIES;
         sd_sum += m.sd / SERIES;
-        assert_true(fabs(m.high - m.mean - 2.776 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 2.776 * m.se) <= 1e-9 * m.se);
+        assert_true(fabs(m.high - m.mean - 3.182 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 3.182 * m.se) <= 1e-9 * m.se);
         assert_true(fabs(m.n_eff - n / (2 * m.tau)) <= 1e-9 * n);
     }
     free(x);
     const double covered = 100.0 * inside / SERIES, true_var = 4 * 2 * tau / n;
     print_message("phi %.2f n %d: coverage %.1f %%, variance %.3f of the true one, tau %.3f of %.3f\n", phi, n, covered, var_sum / true_var, tau_sum, tau);
-    assert_true(covered >= 95 && covered <= 99.5);
+    assert_true(covered >= 93.5 && covered <= 97.5);
     assert_true(var_sum / true_var > 1 && var_sum / true_var < 1.5); // the larger of two estimates, each right in the mean
     assert_true(fabs(tau_sum / tau - 1) < 0.15); // short series of batches see a little of the correlation as noise
     assert_true(fabs(sd_sum / 2 - 1) < 0.05);
@@ -90,7 +90,7 @@ static void what_is_taken_back_later_is_seen(void **state)
         inside += m.low <= 0 && 0 <= m.high;
     }
     print_message("variance %.3f, true %.3f, of white noise of the same sd %.3f; coverage %.1f %%\n", var, 0.25, 1.25, 100.0 * inside / SERIES);
-    assert_true(var > 0.2 && var < 0.45); // the highest of the six waves begins to see the noise
+    assert_true(var > 0.2 && var < 0.45); // the highest of the waves begins to see the noise
     assert_true(inside >= 0.93 * SERIES);
 }
 
