@@ -111,10 +111,15 @@ static inline void bt_moved_begin(bt_moved *m, const bt_tile *tile)
 }
 
 /// Into the totals of the sweep: what the tile turned against its move, J, and how many units were moved.
-static inline void bt_moved_end(bt_moved *m, const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+static inline void bt_rounds_moved(const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
 {
     bt_sum_add(&t->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * s->problem->per_energy)));
     if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], tile->n_list);
+}
+
+static inline void bt_moved_end(bt_moved *m, const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+{
+    bt_rounds_moved(tile, s, against, t);
     if (m->y != m->few) free(m->y);
 }
 
