@@ -49,12 +49,11 @@ static void put(bt_batch *o, const bt_tile *tile, bt_idx i, const bt_inv *inv)
     o->nx[l] = u->nx, o->ny[l] = u->ny;
     for (int c = 0; c < 2; c++) {
         o->ran[c][l] = u->ran[c], o->rbn[c][l] = u->rbn[c];
-        o->w[c][l] = u->w[c], o->mn[c][l] = c < u->n ? u->mn[c] : 0;
-        o->bias[c][l] = c < u->n ? u->bias[c] : 0;
+        o->w[c][l] = u->w[c], o->mn[c][l] = u->mn[c], o->bias[c][l] = u->bias[c];
         o->x[c][l] = u->ln[c];
     }
     o->rat[l] = u->rat, o->rbt[l] = u->rbt;
-    o->w12[l] = u->w12, o->per_det[l] = u->n == 2 ? u->per_det : 0;
+    o->w12[l] = u->w12, o->per_det[l] = u->per_det;
     o->wt[l] = u->wt, o->mt[l] = u->mt, o->mu[l] = u->mu;
     o->x[2][l] = u->lt;
     for (int c = 0; c < 3; c++) o->before[c][l] = tile->before[i][c];
@@ -101,6 +100,12 @@ static void pack(bt_tile *tile, const bt_inv *inv)
         n_open--;
         memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
     }
+}
+
+void bt_batch_order(const bt_tile *tile, bt_idx *unit)
+{
+    for (bt_idx k = 0; k < tile->n_batches; k++)
+        for (int l = 0; l < tile->batch[k].n; l++) *unit++ = tile->batch[k].unit[l];
 }
 
 void bt_batch_unpack(bt_tile *tile)
@@ -240,7 +245,7 @@ double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_swee
     if (!tile->packed) pack(tile, inv);
     if (s->moves) move(tile->batch, tile->n_batches, s->beta);
     double last = INFINITY;
-    for (int n = 0; n < times && last > enough; n++) {
+    for (int n = 0; n == 0 || (n < times && last > enough); n++) {
         last = pass(tile->batch, tile->n_batches, v);
         if (n == 0) *most = last;
         *done += tile->n_list;

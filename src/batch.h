@@ -21,9 +21,12 @@
 /// Are the units of this tile swept in batches?
 bool bt_batch_is_for(const bt_tile *tile);
 
-/// One visit of a sweep to the tile: its move, and at most `times` passes, fewer when one changes less than `enough`, m/s. Updates so many times the list
+/// One visit of a sweep to the tile: its move, and passes: at least one, at most `times`, and none after one that changes no more than `enough`, m/s. Updates so many times the list
 /// are counted in *done; the largest update of the first pass in *most. Returns how far it turned against its move, J.
 double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough, int64_t *done, double *most);
+
+/// The units of the list in the order in which they are swept, [n_list]; of a tile that has been swept.
+void bt_batch_order(const bt_tile *tile, bt_idx *unit);
 
 /// Impulses back into the units; nothing when they are there.
 void bt_batch_unpack(bt_tile *tile);

@@ -16,7 +16,7 @@
 #include "restitution.h"
 #include "rounds.h"
 
-#define UPDATES 3.0 // of every unit that one of max_sweeps stands for
+#define UPDATES 6.0 // of every unit that one of max_sweeps stands for
 #define ENOUGH 0.3 // of the tolerance: a tile that changes less is not swept again in the same turn
 
 bt_solver *bt_solver_create(void)
