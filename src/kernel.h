@@ -40,16 +40,11 @@ static inline void bt_store(bt_vel *v, bt_inv inv, const bt_vel *x)
 /// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them,
 /// none). Two points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
 /// times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points that coincide) the
-/// first of the single cases that holds is taken.
+/// first of the single cases that holds is taken; so it is for one point, whose second has no mass (mn 0).
 static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
 {
     const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
     const double u1 = un + u->rbn[0] * vb->w - u->ran[0] * va->w + u->bias[0];
-    *l2 = 0;
-    if (u->n == 1) {
-        *l1 = bt_max(0, u->ln[0] - u1 * u->mn[0]);
-        return;
-    }
     const double u2 = un + u->rbn[1] * vb->w - u->ran[1] * va->w + u->bias[1];
     // Velocities with both impulses taken off.
     const double b1 = u1 - u->w[0] * u->ln[0] - u->w12 * u->ln[1], b2 = u2 - u->w12 * u->ln[0] - u->w[1] * u->ln[1];
@@ -70,9 +65,6 @@ static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
     const double d1 = l1 - u->ln[0], d2 = l2 - u->ln[1];
-    if (d1 == 0 && d2 == 0 && l1 + l2 == 0) { // apart, as before: half of the units of a step
-        if (u->lt == 0) return 0;
-    }
     bt_apply(u, d1 + d2, d1 * u->ran[0] + d2 * u->ran[1], d1 * u->rbn[0] + d2 * u->rbn[1], 0, ia, ib, &va, &vb);
     const double t = bt_clamp(u->lt - bt_tangent_velocity(u, &va, &vb) * u->mt, u->mu * (l1 + l2)), dt = t - u->lt;
     bt_apply(u, 0, 0, 0, dt, ia, ib, &va, &vb);

@@ -10,12 +10,13 @@
 #include "domain.h"
 
 #define GAIN 0.8        // of the sum of squares, that ROUNDS rounds must take it below
-#define MOST_CAP 0.96
+#define MOST_CAP 0.98
 #define NARROWER 1.25   // of the distance of the cap from 1, and of the length of a round
-#define WIDER 2.0
-#define LEAST_CAP 0.05  // less is none
+#define WIDER 1.5
+#define LEAST_CAP 0.3   // less is none
+#define CALM 0.1         // of the limit of work, beyond it
 #define LEAST_SWEEP 0.01 // of the units, that a sweep counts for against the limit of work at least
-enum { ROUNDS = 3, MOST_LENGTH = 150, FREE_LENGTH = 1000, FEW_BAD = 100 };
+enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
 
 // Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
 // at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one unit
@@ -261,14 +262,17 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     }
     pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
     momentum m = {.theta = 1};
-    const double limit = spent(p, work) + p->limit * (p->plain ? 1 : (double)(work->units + 1));
+    const double all_work = p->limit * (p->plain ? 1 : (double)(work->units + 1));
+    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work); // between them no momentum
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
-        if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
+        const bool last = !p->plain && spent(p, work) >= calm;
+        if (last) a.cap = 0, a.length = p->length;
+        else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
         const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
         if (part) keep_near_bad(w);
-        settled = run_round(w, p, a.length, a.cap, on, limit, &m, work) && !part;
+        settled = run_round(w, p, a.length, a.cap, on, last ? limit : calm, &m, work) && !part;
         all = !part;
         bt_rounds_look(w, p, settled, work);
         if (settled || work->residual > p->tolerance) continue;

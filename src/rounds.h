@@ -17,9 +17,10 @@
 //
 // The problem is only piecewise smooth, and a Gauss–Seidel sweep is not a gradient step: with a fixed cap some jams run in circles (contacts that
 // open and close, stick and slip by turns). So the cap follows what it brings. Three rounds that take a fifth off the sum of squares bring it nearer
-// to 1, and make rounds longer; others double its distance from 1, down to no momentum at all. If that does not help either, three
-// rounds of 1,000 sweeps follow without a cap: chains of many floes, and heavy bodies that press on light ones, are not circling but
+// to 1, and make rounds longer; others take it half as far away again, down to none below 0.3. If that does not help either, three
+// rounds of 400 sweeps follow without a cap: chains of many floes, and heavy bodies that press on light ones, are not circling but
 // slow, and converge with β near 1 alone (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain ones need more than 500,000).
+// What has not converged within the limit of work gets a tenth of it more without momentum, which circles far from the solution where it does not converge.
 //
 // When few units are left that are far from the tolerance, every second round is over the tiles about them alone.
 //
@@ -30,7 +31,10 @@
 //
 // Rejected: Anderson acceleration around the sweep, over all units or the listed ones (0.6 to 1.8 times the time of the plain sweep in
 // dense ice; histories of 240 B a contact and 96 B a floe, against 24 and 32 here); over-relaxation (1.3 helps without momentum and hurts with it);
-// momentum with a step of its own for each tile or unit; sweeps in alternating direction.
+// momentum with a step of its own for each tile or unit; sweeps in alternating direction; proximal Newton steps over the listed units (M + Jᵀ D J of the
+// velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which a handful of contacts is left, but where a
+// wedge drives its impulses up over thousands of sweeps a Newton step takes as long as a hundred sweeps and the wedge needs as many steps as contacts
+// change their state. At equal work more steps missed the tolerance with them than without.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 
@@ -111,10 +115,15 @@ static inline void bt_moved_begin(bt_moved *m, const bt_tile *tile)
 }
 
 /// Into the totals of the sweep: what the tile turned against its move, J, and how many units were moved.
-static inline void bt_moved_end(bt_moved *m, const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+static inline void bt_rounds_moved(const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
 {
     bt_sum_add(&t->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * s->problem->per_energy)));
     if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], tile->n_list);
+}
+
+static inline void bt_moved_end(bt_moved *m, const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+{
+    bt_rounds_moved(tile, s, against, t);
     if (m->y != m->few) free(m->y);
 }
 

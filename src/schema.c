@@ -216,7 +216,7 @@ const bt_key bt_case_keys[] = {
 
     REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
     REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
-    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: three updates of every contact for each of so many sweeps, looks at contacts counted as updates; assumed"),
+    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: six updates of every contact for each of so many sweeps, looks at contacts counted as updates; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "without effect: sweeps no longer follow each other through large fields; accepted in cases written for earlier versions, and to be taken out"),
     REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),

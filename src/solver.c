@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "bergtow/tow.h"
+#include "batch.h"
 #include "domain.h"
 #include "kernel.h"
 #include "limit.h"
@@ -15,7 +16,7 @@
 #include "restitution.h"
 #include "rounds.h"
 
-#define UPDATES 3.0 // of every unit that one of max_sweeps stands for
+#define UPDATES 6.0 // of every unit that one of max_sweeps stands for
 #define ENOUGH 0.3 // of the tolerance: a tile that changes less is not swept again in the same turn
 
 bt_solver *bt_solver_create(void)
@@ -61,6 +62,7 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     bt_tile *tile = &w->tiles->tile[k];
     bt_vel *v = w->bodies.vel;
     const bt_inv *inv = w->bodies.inv;
+    bt_batch_unpack(tile);
     if (warm) start_impulses(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
@@ -91,6 +93,7 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
     const double near = BT_NEAR * p->tolerance;
     double sum = 0;
     int64_t rows = 0, bad = 0;
+    bt_batch_unpack(tile);
     bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
@@ -182,12 +185,27 @@ static double units_against(const bt_tile *tile, double (*y)[3])
     return sum;
 }
 
+static void sweep_in_batches(bt_world *w, bt_tile *tile, const bt_sweep *o, bt_totals *t)
+{
+    int64_t done = 0;
+    double most = 0;
+    const double against = bt_batch_sweep(tile, w->bodies.vel, w->bodies.inv, o, w->par.inner_sweeps, ENOUGH * o->problem->tolerance, &done, &most);
+    t->most = bt_max(t->most, most);
+    tile->updates += done;
+    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
+    if (o->moves) bt_rounds_moved(tile, o, against, t);
+}
+
 static void sweep_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_sweep *o = context;
     bt_tile *tile = &w->tiles->tile[k];
     bt_tow *line = line_of(w, k);
     if (tile->n_list == 0 && !line) return;
+    if (bt_batch_is_for(tile)) {
+        sweep_in_batches(w, tile, o, t);
+        return;
+    }
     bt_vel *v = w->bodies.vel, *towed = line ? &v[bt_world_towed(w)] : NULL;
     double line_y[BT_MAX_BRANCHES] = {0};
     bt_moved moved;

@@ -24,6 +24,7 @@ static void free_tile(bt_tile *t)
     free(t->scars);
     free(t->list);
     free(t->before);
+    free(t->batch);
     *t = (bt_tile){0};
 }
 

@@ -100,6 +100,9 @@ typedef struct bt_tile {
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_units] unknowns before the last sweep
     bt_idx n_list, cap_list;
+    struct bt_batch *batch;         ///< [n_batches] the listed units again (src/batch.h)
+    bt_idx n_batches, cap_batches;
+    bool packed;                    ///< their impulses are there, and not in the units
     int64_t updates;                ///< of units, since the balance of the ranks was last noted
     bool bad;                       ///< some unit is not yet near the tolerance
     bool kept;                      ///< swept in a round over a part of the field
