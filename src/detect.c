@@ -162,13 +162,18 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, (size_t)t->n_pairs);
     bool parts = false;
-    for (bt_idx i = 0; i < t->n_pairs; i++) {
+    const bool near = bt_pairs_near(w, k, t, t->margin);
+    const double far = t->margin + bt_pairs_near_gap(w);
+    for (bt_idx j = 0, n = near ? t->n_near : t->n_pairs; j < n; j++) {
+        const bt_idx i = near ? t->near[j] : j;
         bt_pair *p = &t->pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
         if (paths + t->margin < p->reach) {
             p->n_points = 0;
+            if (!near && !(paths + far < p->reach)) bt_pairs_add_near(t, i);
             continue;
         }
+        if (!near) bt_pairs_add_near(t, i);
         double gap;
         bt_manifold *m = bt_pack_next(&s->pack, i);
         const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);

@@ -2,12 +2,12 @@
 // Finding, cutting and parsing features; why: map_features.h.
 #include "map_features.h"
 
-#include <float.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/sum.h"
 #include "fileio.h"
 #include "largest.h"
 
@@ -86,22 +86,24 @@ static bool find_value(scan *s, const char *name)
     return false;
 }
 
-/// Decimal digits w · 10^−k as the nearest double, k from 0 to 27. False: too near the middle of two to tell.
+enum { MOST_DIGITS = 19 }; // of a number, and of a power of ten, that 64 bits hold
+
+/// w · 10^−k as the nearest double, k up to MOST_DIGITS. False: this needs more bits.
 static bool nearest(uint64_t w, int k, double *x)
 {
-    // In extended precision w and 10^k are exact, and the quotient is off by 2⁻⁶⁴ of it at most: when both ends of the interval round to
-    // the same double, so does the number. strtod takes five times as long for the 17 digits that programs write.
-    static const long double power[] = {1e0L,  1e1L,  1e2L,  1e3L,  1e4L,  1e5L,  1e6L,  1e7L,  1e8L,  1e9L,  1e10L, 1e11L, 1e12L, 1e13L,
-                                        1e14L, 1e15L, 1e16L, 1e17L, 1e18L, 1e19L, 1e20L, 1e21L, 1e22L, 1e23L, 1e24L, 1e25L, 1e26L, 1e27L};
-    const long double q = (long double)w / power[k], off = q * 0x1p-63L;
-    *x = (double)(q - off);
-    return LDBL_MANT_DIG >= 64 && *x == (double)(q + off);
+    // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the number itself. strtod takes
+    // four times as long for the 17 digits that programs write.
+    uint64_t power = 1;
+    for (int i = 0; i < k; i++) power *= 10;
+    const bt_uint128 units = (bt_uint128)w << 64, q = units / power;
+    *x = (double)(q | (q * power != units)) * 0x1p-64;
+    return q >> 55 > 0;
 }
 
 /// A number as JSON has it [RFC 8259], of those that jansson takes for the same.
 static bool take_number(scan *s, double *x)
 {
-    enum { MOST = 63, DIGITS = 15, ALL_DIGITS = 19 };
+    enum { MOST = 63, DIGITS = 15 };
     char copy[MOST + 1];
     const char *p = s->p, *begin = p;
     if (p < s->end && *p == '-') p++;
@@ -123,7 +125,7 @@ static bool take_number(scan *s, double *x)
     uint64_t w = 0;
     int places = 0;
     const char *point = NULL, *c = digits;
-    for (; c < p && *c != 'e' && *c != 'E' && places < ALL_DIGITS; c++) {
+    for (; c < p && *c != 'e' && *c != 'E' && places < MOST_DIGITS; c++) {
         if (*c == '.') point = c;
         else w = 10 * w + (uint64_t)(*c - '0'), places++;
     }

@@ -89,8 +89,9 @@ static void advance(bt_world *w)
         if (!moves && ts->still) continue;
         double path = 0;
         for (bt_idx i = t->first; i < t->end; i++) {
-            path = bt_max(path, move(w, i, w->solver->shifted && moves));
-            if (!last) out = bt_max(out, bt_tiles_outside(w, i));
+            const double way = move(w, i, w->solver->shifted && moves);
+            path = bt_max(path, way);
+            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_tiles_outside(w, i)); // no farther than before
         }
         ts->moved[k] += path;
         if (!last) farthest = bt_max(farthest, path);

@@ -18,6 +18,7 @@ bt_tiles *bt_tiles_create(void) { return bt_alloc(1, sizeof(bt_tiles)); }
 static void free_tile(bt_tile *t)
 {
     free(t->pairs);
+    free(t->near);
     free(t->units);
     free(t->gaps);
     free(t->limits);

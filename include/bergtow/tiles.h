@@ -91,6 +91,10 @@ typedef struct bt_tile {
     bool listed;                    ///< the list is valid for margin_listed
     double margin_listed;           ///< m
     double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
+    bt_idx *near;                   ///< [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    bt_idx n_near, cap_near;
+    bool near_known;                ///< they are those of the list
+    double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
     // contacts of this step
     bt_unit *units;                 ///< [n_units]
     bt_gaps *gaps;                  ///< [n_units] of the units
