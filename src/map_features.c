@@ -91,8 +91,8 @@ enum { MOST_DIGITS = 19 }; // of a number, and of a power of ten, that 64 bits h
 /// w · 10^−k as the nearest double, k up to MOST_DIGITS. False: this needs more bits.
 static bool nearest(uint64_t w, int k, double *x)
 {
-    // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the number itself. strtod takes
-    // four times as long for the 17 digits that programs write.
+    // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the number itself. By strtod, reading
+    // a number of 17 digits takes twice the instructions.
     uint64_t power = 1;
     for (int i = 0; i < k; i++) power *= 10;
     const bt_uint128 units = (bt_uint128)w << 64, q = units / power;

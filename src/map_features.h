@@ -7,7 +7,7 @@
 // left to the parser. Every byte but that of such a ring passes the parser, so what is no JSON is found; then the whole is parsed for the
 // words and the line of its fault.
 //
-// Rejected: yajl, the streaming parser that Debian has, without a release since 2014 and known faults open; jansson reads
+// Rejected: yajl, the streaming parser that Debian has, a second JSON library with words of its own for what is wrong; jansson reads
 // several texts of a stream, but no elements of one array.
 #ifndef BT_MAP_FEATURES_H
 #define BT_MAP_FEATURES_H

@@ -6,7 +6,7 @@
 // its share of the clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
 // floes of the tile itself; one that can be moved has its pairs in the last tile.
 //
-// Of a list some pairs in five are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so far towards each
+// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so far towards each
 // other, a step looks at these near ones alone.
 #include "pairs.h"
 
