@@ -69,6 +69,8 @@ void bt_domain_tell_tiles(bt_world *w, const double *value, bt_take_tile *take);
 void bt_domain_select(bt_world *w);
 /// Floes here that have a contact with a large movable body of another rank.
 void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
+/// Floes here that have a contact of this step on another rank.
+void bt_domain_moved_elsewhere(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
 /// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
 void bt_domain_send(bt_world *w, int phase, bt_vel *v);
 void bt_domain_receive(bt_world *w, int phase, bt_vel *v);

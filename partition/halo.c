@@ -258,12 +258,17 @@ void bt_domain_select(bt_world *w)
     }
 }
 
-void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body))
+static void mark_received(bt_world *w, int first_phase, void (*mark)(bt_world *w, bt_idx body))
 {
     const bt_domain *d = w->domain;
     for (int k = 0; d && k < d->n_links; k++)
-        for (bt_idx i = 0; i < d->link[k].n_receive_now[BT_COLOURS]; i++) mark(w, d->link[k].receive_now[BT_COLOURS][i]);
+        for (int p = first_phase; p < BT_PHASES; p++)
+            for (bt_idx i = 0; i < d->link[k].n_receive_now[p]; i++) mark(w, d->link[k].receive_now[p][i]);
 }
+
+void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body)) { mark_received(w, BT_COLOURS, mark); }
+
+void bt_domain_moved_elsewhere(bt_world *w, void (*mark)(bt_world *w, bt_idx body)) { mark_received(w, 0, mark); }
 
 void bt_domain_send(bt_world *w, int phase, bt_vel *v)
 {

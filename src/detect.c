@@ -15,8 +15,6 @@
 #include "pairs.h"
 #include "phases.h"
 
-enum { FEW_TILES = 64 }; // fewer are done by one thread: a team costs microseconds
-
 // A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun): a solution that flies apart
 // must not ask for tiles, and pair lists, of the whole field.
 static double most_margin(const bt_world *w) { return 16 * w->par.size; }
@@ -35,16 +33,15 @@ double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v)
     return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
 }
 
-/// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1; the bodies of those
-/// blocks, up to t + 2, may then be set in motion.
+/// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_tiles *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
-    for (int32_t y = y0 - 2; y <= y1 + 2; y++)
-        for (int32_t x = x0 - 2; x <= x1 + 2; x++) {
+    for (int32_t y = y0 - 2; y <= y1 + 1; y++)
+        for (int32_t x = x0 - 2; x <= x1 + 1; x++) {
             const bt_idx k = bt_tiles_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
             if (k < 0) continue;
-            t->awake[k] = 1;
-            if ((x <= x1 + 1 || t->wrap_x == 1) && (y <= y1 + 1 || t->wrap_y == 1)) t->bound[k] = bt_max(t->bound[k], s);
+            bt_tiles_wake(t, k);
+            t->bound[k] = bt_max(t->bound[k], s);
         }
 }
 
@@ -76,12 +73,17 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
     const double stir = 0.5 * w->par.slop / w->par.dt;
     const bt_idx n = t->n - 1;
     if (!keep) {
-        memset(t->bound, 0, (size_t)t->n * sizeof *t->bound);
-        memset(t->awake, 0, (size_t)t->n * sizeof *t->awake);
+        for (bt_idx j = 0; j < t->n_busy; j++) {
+            t->bound[t->busy[j]] = 0;
+            t->awake[t->busy[j]] = 0;
+        }
     }
-#pragma omp parallel for schedule(static) if (BT_MANY(b->n, 2000))
-    for (bt_idx k = 0; k < n; k++) {
+    const bt_idx n_busy = t->n_busy; // others rest
+#pragma omp parallel for schedule(static) if (BT_MANY(n_busy, BT_FEW_TILES))
+    for (bt_idx j = 0; j < n_busy; j++) {
+        const bt_idx k = t->busy[j];
         double s = 0;
+        if (k == n) continue;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
             s = bt_max(s, bt_max(bt_contacts_speed(w, i, &v[i]), bt_contacts_speed(w, i, &v2[i])));
             if (b->stirred[i]) s = bt_max(s, stir);
@@ -89,13 +91,15 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         t->speed[k] = s;
     }
     double fastest = 0;
-    for (bt_idx k = 0; k < n; k++)
-        if (t->speed[k] > 0 && t->tile[k].own) {
-            fastest = bt_max(fastest, t->speed[k]);
-            bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
-        }
+    for (bt_idx j = 0; j < n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        if (!(t->speed[k] > 0) || !t->tile[k].own) continue;
+        fastest = bt_max(fastest, t->speed[k]);
+        bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
+    }
     bt_domain_tell_tiles(w, t->speed, bt_contacts_spread);
     const double large = spread_large(w, v, v2);
+    bt_tiles_sort_busy(t);
     // The last tile meets floes anywhere: it is made for the fastest of them all.
     bool movable = false;
     for (bt_idx l = t->n_tiled; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
@@ -109,7 +113,8 @@ bool bt_contacts_outrun(const bt_world *w)
 {
     const bt_tiles *t = w->tiles;
     double any = 0;
-    for (bt_idx k = 0; k < t->n && any == 0; k++) {
+    for (bt_idx j = 0; j < t->n_busy && any == 0; j++) {
+        const bt_idx k = t->busy[j];
         const bt_tile *tile = &t->tile[k];
         any = tile->own && t->bound[k] > 0 &&
               (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * most_margin(w));
@@ -157,13 +162,18 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, (size_t)t->n_pairs);
     bool parts = false;
-    for (bt_idx i = 0; i < t->n_pairs; i++) {
+    const bool near = bt_pairs_near(w, k, t, t->margin);
+    const double far = t->margin + bt_pairs_near_gap(w);
+    for (bt_idx j = 0, n = near ? t->n_near : t->n_pairs; j < n; j++) {
+        const bt_idx i = near ? t->near[j] : j;
         bt_pair *p = &t->pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
         if (paths + t->margin < p->reach) {
             p->n_points = 0;
+            if (!near && !(paths + far < p->reach)) bt_pairs_add_near(t, i);
             continue;
         }
+        if (!near) bt_pairs_add_near(t, i);
         double gap;
         bt_manifold *m = bt_pack_next(&s->pack, i);
         const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
@@ -187,11 +197,42 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
 }
 
+static void wake_body(bt_world *w, bt_idx i)
+{
+    bt_tiles *t = w->tiles;
+    if (w->bodies.large[i]) return;
+    const bt_idx k = bt_tiles_at(t, w->bodies.tile[i][0], w->bodies.tile[i][1]);
+    t->awake[k] = 1;
+    bt_tiles_wake(t, k);
+}
+
+/// Tiles with bodies that units, here or on other ranks, may move; none of a step falls asleep when it is detected again.
+static void find_awake(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_tile *tile = &t->tile[t->order[i]];
+        if (tile->phase == BT_COLOURS) {
+            for (bt_idx j = 0; j < tile->n_units; j++) wake_body(w, tile->units[j].a), wake_body(w, tile->units[j].b);
+            continue;
+        }
+        const bt_idx block[4] = {t->order[i], tile->right, tile->above, tile->diagonal};
+        for (int j = 0; j < 4; j++) {
+            if (block[j] < 0) continue;
+            t->awake[block[j]] = 1;
+            bt_tiles_wake(t, block[j]);
+        }
+    }
+    bt_domain_moved_elsewhere(w, wake_body);
+    bt_tiles_sort_busy(t);
+}
+
 static void detect(bt_world *w, bool again)
 {
     bt_tiles *t = w->tiles;
-    bt_idx *due = bt_alloc((size_t)t->n, sizeof *due), n_due = 0;
-    for (bt_idx k = 0; k < t->n; k++) {
+    bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
         bt_tile *tile = &t->tile[k];
         if (!tile->own) continue;
         const bool active = t->bound[k] > 0;
@@ -206,7 +247,7 @@ static void detect(bt_world *w, bool again)
         tile->margin = margin;
         due[n_due++] = k;
     }
-#pragma omp parallel if (BT_MANY(n_due, FEW_TILES))
+#pragma omp parallel if (BT_MANY(n_due, BT_FEW_TILES))
     {
         thread_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)
@@ -217,6 +258,8 @@ static void detect(bt_world *w, bool again)
     free(due);
     bt_phases_order(w);
     bt_domain_select(w);
+    find_awake(w);
+    bt_tiles_leave(t);
 }
 
 void bt_contacts_detect(bt_world *w, bool again) { detect(w, again); }
@@ -225,6 +268,7 @@ void bt_contacts_detect_all(bt_world *w, double margin)
 {
     bt_tiles_begin(w);
     bt_tiles_update(w, margin);
+    bt_tiles_wake_all(w->tiles);
     // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
     for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
     bool movable = false;
@@ -310,7 +354,7 @@ bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
     const bt_tiles *t = w->tiles;
     bt_overlaps all = {0};
     // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel if (BT_MANY(t->n, FEW_TILES))
+#pragma omp parallel if (BT_MANY(t->n, BT_FEW_TILES))
     {
         bt_pair_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)

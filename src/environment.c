@@ -125,8 +125,9 @@ void bt_environment_begin(bt_world *w)
     p->air_u = air[0], p->air_v = air[1];
     p->balance_u = balance[0], p->balance_v = balance[1];
     p->tilt_ax = tilt[0], p->tilt_ay = tilt[1];
-    if (!same)
-        for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NO;
+    if (same) return;
+    bt_tiles_wake_all(w->tiles);
+    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NO;
 }
 
 void bt_environment_advance(bt_world *w)

@@ -75,8 +75,9 @@ void bt_forces_predict(bt_world *w)
     bt_bodies *b = &w->bodies;
     bt_tiles *t = w->tiles;
     const double turn = w->par.coriolis * w->par.dt, cos_f = cos(turn), sin_f = sin(turn);
-#pragma omp parallel for schedule(dynamic, 16) if (BT_MANY(b->n, 2000))
-    for (bt_idx k = 0; k < t->n; k++) {
+#pragma omp parallel for schedule(dynamic, 16) if (BT_MANY(t->n_busy, BT_FEW_TILES))
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
         if (t->rest[k] == BT_REST_KNOWN) continue;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
             if (b->motion[i] == BT_DYNAMIC) predict(w, i, cos_f, sin_f);

@@ -19,7 +19,6 @@
 // is passed over. Files of this program before had metres [x, y] of the frame, by their mark `bergtow`: they are read
 // as they were written.
 #include <errno.h>
-#include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
@@ -34,6 +33,7 @@
 #include "ice_bounds.h"
 #include "largest.h"
 #include "map_crs.h"
+#include "map_features.h"
 #include "suggest.h"
 
 static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
@@ -72,7 +72,7 @@ static const char *name_of(const json_t *feature, size_t index, char out[96])
     return out;
 }
 
-/// The outer ring of a feature, or NULL and why not.
+/// The outer ring of a feature that the parser was left, or NULL and why not.
 static const json_t *ring_of(const json_t *feature, const char **why)
 {
     const json_t *geometry = json_object_get(feature, "geometry"), *polygon = json_object_get(geometry, "coordinates");
@@ -99,39 +99,54 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     return NULL;
 }
 
-/// Coordinates as they are in the file, the closing one left out; their number, 0 and why not.
-static int coordinates_of(const json_t *ring, double *v, const char **why)
+/// Coordinates of feature i as they are in the file, the closing one left out; their number, 0 and why not.
+static int coordinates_of(bt_features *features, size_t i, double *v, const char **why)
 {
-    size_t n = json_array_size(ring);
-    for (size_t i = 0; i < n; i++) {
-        const json_t *p = json_array_get(ring, i), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
+    size_t n;
+    const double *read = bt_features_ring(features, i, &n);
+    const json_t *feature = bt_features_at(features, i), *ring = read ? NULL : ring_of(feature, why);
+    if (!read && !ring) return 0;
+    if (json_object_get(feature, "crs") || json_object_get(json_object_get(feature, "geometry"), "crs")) {
+        *why = "it has a crs of its own; give one to the whole FeatureCollection";
+        return 0;
+    }
+    if (read) memcpy(v, read, 2 * n * sizeof *v);
+    else n = json_array_size(ring);
+    for (size_t k = 0; ring && k < n; k++) {
+        const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
         if (!json_is_number(x) || !json_is_number(y)) {
             *why = "a vertex is no pair of numbers; write [east, north]";
             return 0;
         }
-        v[2 * i] = json_number_value(x);
-        v[2 * i + 1] = json_number_value(y);
+        v[2 * k] = json_number_value(x);
+        v[2 * k + 1] = json_number_value(y);
     }
     if (n > 1 && v[0] == v[2 * n - 2] && v[1] == v[2 * n - 1]) n--;
     if (n < 3) *why = "it has fewer than 3 vertices";
     return n < 3 ? 0 : (int)n;
 }
 
+/// A vertex of feature i into the survey.
+static void see(survey *b, size_t i, double x, double y, double lon)
+{
+    const double q[3] = {x, y, x < 0 ? x + 360 : x};
+    for (int a = 0; a < 3; a++) b->low[a] = bt_min(b->low[a], q[a]), b->high[a] = bt_max(b->high[a], q[a]);
+    if (b->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90)) b->feature = i, b->odd[0] = x, b->odd[1] = y;
+}
+
 /// Box of all coordinates; lon: the farthest longitude that is one.
-static survey look_over(const json_t *features, double lon)
+static survey look_over(bt_features *features, double lon)
 {
     survey b = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}, .feature = SIZE_MAX};
-    for (size_t i = 0; i < json_array_size(features); i++) {
+    for (size_t i = 0; i < features->n; i++) {
         const char *why;
-        const json_t *ring = ring_of(json_array_get(features, i), &why);
+        size_t n;
+        const double *read = bt_features_ring(features, i, &n);
+        for (size_t k = 0; read && k < n; k++) see(&b, i, read[2 * k], read[2 * k + 1], lon);
+        const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
         for (size_t k = 0; ring && k < json_array_size(ring); k++) {
-            const json_t *p = json_array_get(ring, k);
-            if (!json_is_number(json_array_get(p, 0)) || !json_is_number(json_array_get(p, 1)))
-                continue; // told with its feature
-            const double x = json_number_value(json_array_get(p, 0)), y = json_number_value(json_array_get(p, 1)),
-                         q[3] = {x, y, x < 0 ? x + 360 : x};
-            for (int a = 0; a < 3; a++) b.low[a] = bt_min(b.low[a], q[a]), b.high[a] = bt_max(b.high[a], q[a]);
-            if (b.feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90)) b.feature = i, b.odd[0] = x, b.odd[1] = y;
+            const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
+            if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon); // others are told with their feature
         }
     }
     return b;
@@ -151,7 +166,7 @@ static void take_origin(const json_t *mark, double origin[2])
 /// Degrees that are none, or that are latitude before longitude; and the place of x = y = 0: the case's, that of the
 /// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
 /// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
-static void begin_degrees(reader *s, const json_t *features, const json_t *mark)
+static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
 {
     const bt_case *c = s->c;
     const survey b = look_over(features, s->assumed ? 180 : 360);
@@ -193,7 +208,7 @@ static void begin_degrees(reader *s, const json_t *features, const json_t *mark)
 
 /// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
 /// whose zeros are far away; otherwise zero.
-static void begin_plane(reader *s, const json_t *features, const json_t *mark)
+static void begin_plane(reader *s, bt_features *features, const json_t *mark)
 {
     const bt_case *c = s->c;
     const survey b = look_over(features, 180);
@@ -310,15 +325,12 @@ static void look_for_thickness(reader *s, const json_t *properties)
     o->unnamed += any;
 }
 
-static void read_feature(reader *s, const json_t *feature, size_t index, double *v)
+static void read_feature(reader *s, bt_features *features, size_t index, double *v)
 {
     char name[96], text[BT_ICE_WHY];
-    name_of(feature, index, name);
+    const json_t *feature = bt_features_at(features, index);
     const char *why = NULL;
-    const json_t *ring = ring_of(feature, &why);
-    if (ring && (json_object_get(feature, "crs") || json_object_get(json_object_get(feature, "geometry"), "crs")))
-        why = "it has a crs of its own; give one to the whole FeatureCollection";
-    int n = ring && !why ? coordinates_of(ring, v, &why) : 0;
+    int n = coordinates_of(features, index, v, &why);
     if (n) why = place(s, n, v);
     bt_outline_counts *counts = &s->f->outlines;
     if (!why) {
@@ -333,7 +345,7 @@ static void read_feature(reader *s, const json_t *feature, size_t index, double 
         why = bt_outline_admit(s->c->ice.nonconvex, &n, v, counts);
     }
     if (why) {
-        bt_refuse(&s->r, "%s is refused: %s", name, why);
+        bt_refuse(&s->r, "%s is refused: %s", name_of(feature, index, name), why);
         return;
     }
     const json_t *properties = json_object_get(feature, "properties"),
@@ -353,7 +365,7 @@ static void read_feature(reader *s, const json_t *feature, size_t index, double 
                               thickness,
                               f->area[i],
                               1e-6};
-    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&s->r, "%s: %s", name, why);
+    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&s->r, "%s: %s", name_of(feature, index, name), why);
 }
 
 /// Metres as the case calls them, of a file that does not say it.
@@ -460,16 +472,16 @@ static void check_whole(reader *s)
                   size / s->f->n, thickness / s->f->n);
 }
 
-static void read_features(reader *s, const json_t *root)
+static void read_features(reader *s, bt_features *features)
 {
-    const json_t *features = json_object_get(root, "features"), *mark = json_object_get(root, "bergtow");
+    const json_t *root = features->root, *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(root, "type"));
-    if (!type || strcmp(type, "FeatureCollection") || !json_is_array(features)) {
+    if (!type || strcmp(type, "FeatureCollection") || !features->listed) {
         bt_refuse(&s->r, "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
-    if (json_array_size(features) == 0 || json_array_size(features) > BT_MOST_FLOES) {
-        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", json_array_size(features), BT_MOST_FLOES);
+    if (features->n == 0 || features->n > BT_MOST_FLOES) {
+        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n, BT_MOST_FLOES);
         return;
     }
     choose_coordinates(s, root);
@@ -477,7 +489,7 @@ static void read_features(reader *s, const json_t *root)
     else if (s->r.status == BT_OK) begin_plane(s, features, mark);
     if (s->r.status != BT_OK) return;
     double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
-    for (size_t i = 0; i < json_array_size(features); i++) read_feature(s, json_array_get(features, i), i, v);
+    for (size_t i = 0; i < features->n; i++) read_feature(s, features, i, v);
     free(v);
     bt_outline_counts *o = &s->f->outlines;
     o->lon = s->kind == DEGREES ? s->lon0 : NAN;
@@ -492,38 +504,15 @@ static void read_features(reader *s, const json_t *root)
     if (s->r.status == BT_OK) bt_field_check_places(s->c, s->f, "feature", &s->r);
 }
 
-/// The file as a tree. What a hostile one could make of it is known before: the tree takes far more room than the text.
-static bt_status load(const char *path, json_t **root, bt_errors *err)
-{
-    char *text;
-    size_t size;
-    bt_status status = bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &text, &size, err);
-    int64_t lists = 0;
-    for (size_t i = 0; status == BT_OK && i < size; i++) lists += text[i] == '[';
-    if (lists > BT_MOST_LISTS) {
-        bt_errors_add(err, "%s: holds %" PRId64 " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files", path, lists, BT_MOST_LISTS);
-        status = BT_ERR_CASE;
-    }
-    json_error_t why;
-    if (status == BT_OK && !(*root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why))) {
-        bt_errors_add(err, "%s:%d: is not JSON: %s; mend the file", path, why.line, why.text);
-        status = BT_ERR_CASE;
-    }
-    free(text);
-    return status;
-}
-
 bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err)
 {
     const char *path = c->ice.outlines;
     bt_field_free(f);
     bt_field_init(f);
-    json_t *root = NULL;
-    const bt_status status = load(path, &root, err);
-    if (status != BT_OK) return status;
-    reader s = {.c = c, .r = {.path = path, .err = err, .status = BT_OK}, .f = f};
-    read_features(&s, root);
-    json_decref(root);
+    bt_features features;
+    reader s = {.c = c, .r = {.path = path, .err = err, .status = bt_features_open(&features, path, err)}, .f = f};
+    if (s.r.status == BT_OK) read_features(&s, &features);
+    bt_features_close(&features);
     if (s.r.status != BT_OK) {
         bt_field_free(f);
         bt_field_init(f);

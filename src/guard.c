@@ -142,8 +142,10 @@ static bool look_at_bodies(bt_guard *g, const bt_world *w, bool all)
     const bt_tiles *ts = w->tiles;
     const range r = range_of(g, w);
     double broken = -1, gone = -1;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(w->bodies.n, 2000))
-    for (bt_idx k = 0; k < ts->n; k++) {
+    const bt_idx n = all ? ts->n : ts->n_busy;
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_TILES))
+    for (bt_idx j = 0; j < n; j++) {
+        const bt_idx k = all ? j : ts->busy[j];
         // As in the step: what drifts with water at rest has not moved. BT_REST_NEW has, and has come to rest in it.
         const bool moved = k == ts->n - 1 || ts->rest[k] != BT_REST_KNOWN || ts->awake[k] || !ts->still;
         if (ts->tile[k].own && (moved || all)) look_at(w, &r, ts->tile[k].first, ts->tile[k].end, &broken, &gone);

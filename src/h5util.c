@@ -154,10 +154,11 @@ static hid_t quiet_creation(void)
     return p;
 }
 
+/// Level 1: half a per cent more bytes than level 4 (tows of 700 and 30,000 floes), at three quarters of the work.
 static void deflate(hid_t create)
 {
     H5Pset_shuffle(create);
-    H5Pset_deflate(create, 4);
+    H5Pset_deflate(create, 1);
 }
 
 /// Takes over (closes) the creation properties and the space.

@@ -63,7 +63,7 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
         return why;
     }
     *part = BT_ICE_OUTLINE;
-    const bt_moments m = bt_shape_moments(f->n, f->v);
+    const bt_moments m = bt_shape_extent(f->n, f->v);
     // Only the mean has the range of ice.size: a single floe of a law, or a piece, is larger or smaller.
     if (!(m.area > 0) || !(2 * m.radius <= l->length.hi)) {
         snprintf(why, BT_ICE_WHY,

@@ -28,7 +28,7 @@ enum {
     BT_MOST_FRAMES = 1000000,
     BT_MOST_ROWS = 2000000,            ///< of a CSV table
     BT_MOST_RING = 10000,              ///< vertices of one outline before it is simplified or refused
-    BT_MOST_LISTS = 40000000,          ///< `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes while it is read
+    BT_MOST_LISTS = 40000000,          ///< `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes where the file is not taken apart (map_features.h)
 };
 
 // What is less is no ice, but a slip of units; and products of smaller numbers leave the range of a double.

@@ -62,12 +62,14 @@ static bt_totals observe_tiles(const bt_world *w, double slow2)
 {
     const bt_tiles *ts = w->tiles;
     bt_totals all = {.n_sums = N_SEEN};
-#pragma omp parallel if (BT_MANY(w->bodies.n, 2000))
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
     {
         bt_totals t = {.n_sums = N_SEEN};
 #pragma omp for schedule(dynamic, 16)
-        for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx j = 0; j < ts->n_busy; j++) {
+            const bt_idx k = ts->busy[j];
             if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || ts->tile[k].n_units > 0 || !ts->still)) observe_tile(w, k, slow2, &t);
+        }
 #pragma omp critical
         bt_totals_merge(&all, &t);
     }

@@ -5,6 +5,9 @@
 // memory is quicker than any finer grid. The list holds while no body of the block has travelled (path of its fastest point) farther than
 // its share of the clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
 // floes of the tile itself; one that can be moved has its pairs in the last tile.
+//
+// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so far towards each
+// other, a step looks at these near ones alone.
 #include "pairs.h"
 
 #include <math.h>
@@ -207,23 +210,61 @@ static void replace(bt_world *w, bt_tile *t, bt_pair_scratch *s, size_t n)
     t->n_pairs = (bt_idx)n;
 }
 
+/// What moves the bodies of the pairs of tile k, m: of its four tiles, or of any for the last one; and large bodies.
+static void paths_of(const bt_world *w, bt_idx k, const bt_tile *t, double moved[4], double *large)
+{
+    const bt_tiles *ts = w->tiles;
+    const bool last = k == ts->n - 1;
+    const bt_idx block[4] = {k, t->right, t->above, t->diagonal};
+    for (int i = 0; i < 4; i++) moved[i] = last ? ts->moved_any : block[i] >= 0 ? ts->moved[block[i]] : 0;
+    *large = ts->moved[ts->n - 1];
+}
+
+double bt_pairs_near_gap(const bt_world *w) { return 0.05 * w->par.size; }
+
+bool bt_pairs_near(const bt_world *w, bt_idx k, bt_tile *t, double margin)
+{
+    double moved[4], large, most;
+    paths_of(w, k, t, moved, &large);
+    most = large - t->large_near;
+    for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - t->moved_near[i]);
+    // A hundredth is for the rounding of sums of paths.
+    if (t->near_known && 2 * most + margin - t->margin_near <= 0.99 * bt_pairs_near_gap(w)) return true;
+    memcpy(t->moved_near, moved, sizeof moved);
+    t->large_near = large;
+    t->margin_near = margin;
+    t->n_near = 0;
+    t->near_known = true;
+    return false;
+}
+
+void bt_pairs_add_near(bt_tile *t, bt_idx i)
+{
+    if (t->n_near == t->cap_near) {
+        t->cap_near = t->cap_near ? 2 * t->cap_near : 16;
+        t->near = bt_realloc(t->near, (size_t)t->cap_near, sizeof *t->near);
+    }
+    t->near[t->n_near++] = i;
+}
+
 void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s)
 {
     bt_tiles *ts = w->tiles;
     const bool last = k == ts->n - 1;
     const double skin = 0.2 * w->par.size, skin_large = w->par.size;
-    const bt_idx block[4] = {k, t->right, t->above, t->diagonal};
-    bool stale = !t->listed || margin > t->margin_listed || ts->moved[ts->n - 1] - t->large_listed > 0.5 * skin_large;
-    if (last) stale = stale || ts->moved_any - t->moved_listed[0] > 0.5 * skin; // its floes may be in any tile
-    for (int i = 0; i < 4 && !stale && !last; i++) stale = block[i] >= 0 && ts->moved[block[i]] - t->moved_listed[i] > 0.5 * skin;
+    double moved[4], large_moved;
+    paths_of(w, k, t, moved, &large_moved);
+    bool stale = !t->listed || margin > t->margin_listed || large_moved - t->large_listed > 0.5 * skin_large;
+    for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->moved_listed[i] > 0.5 * skin;
     if (!stale) return;
     const double large = margin + 0.5 * skin + 0.5 * skin_large;
     const size_t n = last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
     replace(w, t, s, n);
     t->listed = true;
     t->margin_listed = margin;
-    t->large_listed = ts->moved[ts->n - 1];
-    for (int i = 0; i < 4; i++) t->moved_listed[i] = last ? ts->moved_any : block[i] >= 0 ? ts->moved[block[i]] : 0;
+    t->near_known = false;
+    t->large_listed = large_moved;
+    memcpy(t->moved_listed, moved, sizeof moved);
 #pragma omp atomic
     ts->n_listings++;
 }

@@ -17,6 +17,12 @@ typedef struct bt_pair_scratch {
 /// Make the list of tile k, kept in t, anew unless it holds for this margin.
 void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s);
 
+/// Do the near pairs of tile k hold for this margin? If not, they are to be found anew: clears them, and keeps what has moved by now.
+bool bt_pairs_near(const bt_world *w, bt_idx k, bt_tile *t, double margin);
+/// Pair i is near when it has less than this between its bodies beyond the margin, m.
+double bt_pairs_near_gap(const bt_world *w);
+void bt_pairs_add_near(bt_tile *t, bt_idx i);
+
 void bt_pair_scratch_free(bt_pair_scratch *s);
 
 /// Tiles (unwrapped coordinates) that the box of body i covers, widened by pad, m.

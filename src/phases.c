@@ -72,14 +72,15 @@ void bt_phases_order(bt_world *w)
     bt_tiles *t = w->tiles;
     bt_idx at[BT_STRETCHES + 1] = {0};
     t->n_units = 0;
-    for (bt_idx k = 0; k < t->n; k++) at[stretch_of(w, k) + 1] += has_work(w, k);
+    for (bt_idx j = 0; j < t->n_busy; j++) at[stretch_of(w, t->busy[j]) + 1] += has_work(w, t->busy[j]);
     for (int s = 0; s < BT_STRETCHES; s++) at[s + 1] += at[s];
     for (int p = 0; p < BT_PHASES; p++) {
         t->start[p] = at[2 * p];
         t->n_border[p] = at[2 * p + 1] - at[2 * p];
     }
     t->start[BT_PHASES] = t->n_order = at[BT_STRETCHES];
-    for (bt_idx k = 0; k < t->n; k++) {
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
         if (!has_work(w, k)) continue;
         t->order[at[stretch_of(w, k)]++] = k;
         t->n_units += t->tile[k].n_units;
@@ -172,5 +173,5 @@ void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
 {
     const bt_tiles *ts = w->tiles;
 #pragma omp parallel for schedule(static) num_threads(ts->n_shares)
-    for (bt_idx k = 0; k < ts->n; k++) visit(w, k, context, NULL);
+    for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
 }

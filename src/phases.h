@@ -46,7 +46,7 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 /// Visit the tiles with work in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
-/// Visit all tiles, also those without contacts and of other ranks, for the sake of their bodies, in any order; no totals (NULL).
+/// Visit all busy tiles, also those without contacts and of other ranks, for the sake of their bodies, in any order; no totals (NULL).
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
 
 #endif

@@ -125,9 +125,11 @@ void bt_solver_project(bt_world *w)
         free(s->shift);
         s->shift = bt_alloc_aligned((size_t)s->cap_bodies, sizeof *s->shift);
     }
-    for (bt_idx k = 0; k < ts->n; k++)
+    for (bt_idx j = 0; j < ts->n_busy; j++) {
+        const bt_idx k = ts->busy[j];
         if (k == ts->n - 1 || bt_tiles_moves(ts, k))
             memset(s->shift + ts->tile[k].first, 0, (size_t)(ts->tile[k].end - ts->tile[k].first) * sizeof *s->shift);
+    }
     bt_problem p = {.look = look_at_tile, .sweep = push_tile, .vel = s->shift, .tolerance = 0.1 * w->par.slop, .cap = 0.9, .length = 25,
                     .limit = (double)w->par.position_sweeps, .plain = w->par.plain_sweeps};
     bt_rounds_scale(&p, ts->heaviest);

@@ -76,7 +76,9 @@ static void mark_swept(bt_world *w)
     const bt_idx last = t->n - 1;
     const bt_tile *large = &t->tile[last];
     double *listed = bt_alloc((size_t)t->n, sizeof *listed);
-    for (bt_idx k = 0; k < last; k++) {
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        if (k == last) continue;
         t->tile[k].still = !t->tile[k].swept;
         t->tile[k].swept = false;
     }

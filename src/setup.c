@@ -104,7 +104,7 @@ static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
         bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
                          .vx = g->vx, .vy = g->vy, .yaw_rate = g->yaw_rate};
         floe_def(c, n, v, g->thickness, &d);
-        d.large = bt_shape_moments(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
+        d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = g->thickness;
     }
 }

@@ -29,7 +29,7 @@ static double cubic_antiderivative(double h, double s)
     return h / 5 * (s * (2 * s * s + 5 * h2) * r / 8 + 0.375 * h2 * h2 * asinh(s / fabs(h)));
 }
 
-bt_moments bt_shape_moments(int n, const double *v)
+static bt_moments moments(int n, const double *v, bool cubic)
 {
     bt_moments m = {0};
     if (n < 1) return m;
@@ -59,12 +59,16 @@ bt_moments bt_shape_moments(int n, const double *v)
         double c = cross(px, py, qx, qy), h = c / l;
         m.polar += c * (px * px + py * py + px * qx + py * qy + qx * qx + qy * qy) / 12;
         double sp = (px * ex + py * ey) / l, sq = (qx * ex + qy * ey) / l;
-        m.cubic += cubic_antiderivative(h, sq) - cubic_antiderivative(h, sp);
+        if (cubic) m.cubic += cubic_antiderivative(h, sq) - cubic_antiderivative(h, sp);
         m.inradius = bt_min(m.inradius, h);
     }
     if (!isfinite(m.inradius)) m.inradius = 0;
     return m;
 }
+
+bt_moments bt_shape_moments(int n, const double *v) { return moments(n, v, true); }
+
+bt_moments bt_shape_extent(int n, const double *v) { return moments(n, v, false); }
 
 /// near: neighbouring vertices coincide, over the extent; angle: a corner turns the wrong way, rad.
 static const char *fault_of(int n, const double *v, double near, double angle)
@@ -109,7 +113,7 @@ bool bt_shape_broken(int n, const double *v) { return fault_of(n, v, 1e-12, 1e-6
 
 bt_moments bt_shape_centre(int n, double *v)
 {
-    bt_moments m = bt_shape_moments(n, v);
+    bt_moments m = bt_shape_extent(n, v);
     for (int i = 0; i < n; i++) {
         v[2 * i] -= m.cx;
         v[2 * i + 1] -= m.cy;

@@ -81,19 +81,23 @@ static void advance(bt_world *w)
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
     double farthest = 0, out = 0;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(w->bodies.n, 2000))
-    for (bt_idx k = 0; k < ts->n; k++) {
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+    for (bt_idx j = 0; j < ts->n_busy; j++) {
+        const bt_idx k = ts->busy[j];
         const bt_tile *t = &ts->tile[k];
         const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
         if (!moves && ts->still) continue;
         double path = 0;
         for (bt_idx i = t->first; i < t->end; i++) {
-            path = bt_max(path, move(w, i, w->solver->shifted && moves));
-            if (!last) out = bt_max(out, bt_tiles_outside(w, i));
+            const double way = move(w, i, w->solver->shifted && moves);
+            path = bt_max(path, way);
+            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_tiles_outside(w, i)); // no farther than before
         }
         ts->moved[k] += path;
         if (!last) farthest = bt_max(farthest, path);
-        if (moves && !last) ts->rest[k] = ts->calm && at_rest(w, t) ? BT_REST_NEW : BT_REST_NO;
+        if (!moves || last) continue;
+        if (!ts->calm || !at_rest(w, t)) ts->rest[k] = BT_REST_NO;
+        else if (!ts->rest[k]) ts->rest[k] = BT_REST_NEW; // where forces have been told, they would find what they found
     }
     ts->moved_any += farthest;
     bt_domain_maxima(w, &out, 1);
@@ -131,7 +135,6 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
         bt_sum_add(&t->sum[APPLIED_Y], sign * (normal * u->ny + u->lt * u->nx));
     }
     bt_sum_add(&t->sum[POINTS], (double)tile->n_points);
-    if (tile->active) bt_sum_add(&t->sum[ACTIVE], tile->end - tile->first);
     t->most = bt_max(t->most, tile->overlap);
 }
 
@@ -142,12 +145,17 @@ static void balance(bt_world *w)
     const bt_tiles *ts = w->tiles;
     bt_step_stats *st = &w->stats;
     bt_totals all = {.n_sums = N_BALANCE};
-#pragma omp parallel if (BT_MANY(w->bodies.n, 2000))
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
     {
         bt_totals t = {.n_sums = N_BALANCE};
 #pragma omp for schedule(dynamic, 16)
-        for (bt_idx k = 0; k < ts->n; k++)
-            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || !ts->still)) balance_tile(w, k, &t);
+        for (bt_idx j = 0; j < ts->n_busy; j++) {
+            const bt_idx k = ts->busy[j];
+            const bt_tile *tile = &ts->tile[k];
+            if (!tile->own) continue;
+            if (tile->active) bt_sum_add(&t.sum[ACTIVE], tile->end - tile->first);
+            if (k == ts->n - 1 || bt_tiles_moves(ts, k) || !ts->still) balance_tile(w, k, &t);
+        }
 #pragma omp critical
         bt_totals_merge(&all, &t);
     }

@@ -18,6 +18,7 @@ bt_tiles *bt_tiles_create(void) { return bt_alloc(1, sizeof(bt_tiles)); }
 static void free_tile(bt_tile *t)
 {
     free(t->pairs);
+    free(t->near);
     free(t->units);
     free(t->gaps);
     free(t->limits);
@@ -32,7 +33,7 @@ void bt_tiles_free(bt_tiles *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->order, t->share, t->tile, t};
+    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->busy, t->is_busy, t->order, t->share, t->tile, t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -67,6 +68,55 @@ bool bt_tiles_calm(const bt_world *w)
     const bt_params *p = &w->par;
     const bool balanced = p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
     return balanced && p->tilt_ax == 0 && p->tilt_ay == 0 && p->air_u == p->water_u && p->air_v == p->water_v;
+}
+
+// --- busy tiles ------------------------------------------------------------------------------------------------------
+
+void bt_tiles_wake(bt_tiles *t, bt_idx k)
+{
+    if (t->is_busy[k]) return;
+    t->is_busy[k] = 1;
+    t->busy_sorted = false;
+    t->busy[t->n_busy++] = k;
+}
+
+void bt_tiles_wake_all(bt_tiles *t)
+{
+    if (t->n_busy == t->n) return;
+    for (bt_idx k = 0; k < t->n; k++) {
+        t->busy[k] = k;
+        t->is_busy[k] = 1;
+    }
+    t->n_busy = t->n;
+    t->busy_sorted = true;
+}
+
+static int ascending(const void *p, const void *q)
+{
+    const bt_idx a = *(const bt_idx *)p, b = *(const bt_idx *)q;
+    return (a > b) - (a < b);
+}
+
+void bt_tiles_sort_busy(bt_tiles *t)
+{
+    if (!t->busy_sorted) qsort(t->busy, (size_t)t->n_busy, sizeof *t->busy, ascending);
+    t->busy_sorted = true;
+}
+
+void bt_tiles_leave(bt_tiles *t)
+{
+    if (!t->still) return;
+    bt_idx kept = 0;
+    for (bt_idx i = 0; i < t->n_busy; i++) {
+        const bt_idx k = t->busy[i];
+        if (k == t->n - 1 || t->rest[k] != BT_REST_KNOWN || t->awake[k] || t->bound[k] > 0) {
+            t->busy[kept++] = k;
+        } else {
+            t->is_busy[k] = 0;
+            t->tile[k].swept = false; // as a look would have it: nothing here moved on
+        }
+    }
+    t->n_busy = kept;
 }
 
 double bt_tiles_outside(const bt_world *w, bt_idx i)
@@ -293,7 +343,11 @@ static void make_tiles(bt_world *w)
     t->rest = bt_realloc(t->rest, n, sizeof *t->rest);
     t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
     t->order = bt_realloc(t->order, n, sizeof *t->order);
+    t->busy = bt_realloc(t->busy, n, sizeof *t->busy);
+    t->is_busy = bt_realloc(t->is_busy, n, sizeof *t->is_busy);
     for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->rest[k] = t->awake[k] = 0;
+    t->n_busy = 0;
+    bt_tiles_wake_all(t);
 }
 
 // --- what the contacts were ------------------------------------------------------------------------------------------
@@ -434,6 +488,7 @@ void bt_tiles_begin(bt_world *w)
     }
     t->calm = bt_tiles_calm(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
+    if (!t->still) bt_tiles_wake_all(t);
 }
 
 bool bt_tiles_update(bt_world *w, double margin)

@@ -111,16 +111,16 @@ bt_touch *bt_touch_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
 {
     const bt_tiles *ts = w->tiles;
     const bt_idx towed = bt_world_towed(w);
-    // A large movable body has its contacts in the last tile; one of infinite mass has them in the tiles of the floes.
-    const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->n - 1 : 0;
+    // A large movable body has its contacts in the last tile, which comes last of all; one of infinite mass has them in the tiles of the floes.
+    const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     touches all = {0};
-#pragma omp parallel if (BT_MANY(w->bodies.n, 2000) && from == 0)
+#pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_TILES))
     {
         touches mine = {0};
 #pragma omp for schedule(dynamic, 16)
-        for (bt_idx k = from; k < ts->n; k++) {
-            const bt_tile *tile = &ts->tile[k];
-            for (bt_idx j = 0; tile->own && j < tile->n_units; j++) {
+        for (bt_idx i = from; i < ts->n_order; i++) {
+            const bt_tile *tile = &ts->tile[ts->order[i]];
+            for (bt_idx j = 0; j < tile->n_units; j++) {
                 const bt_unit *u = &tile->units[j];
                 if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
                 const bt_touch t = touch_of(w, m, tile, u, towed);

@@ -127,7 +127,7 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->index_of[b->n_global] = i;
     b->offset[i + 1] = first + n_vertices;
     add_polygons(b, i, d);
-    bt_moments m = bt_shape_moments(d->n_vertices, d->vertices);
+    bt_moments m = bt_shape_extent(d->n_vertices, d->vertices);
     b->gid[i] = b->n_global++;
     b->pose[i] = (bt_pose){.x = d->x, .y = d->y, .yaw = d->yaw};
     b->vel[i] = b->vel_start[i] = b->vel_free[i] =

@@ -23,6 +23,9 @@ typedef struct bt_moments {
 /// Area, centroid and moments by exact integration over the triangle fan (∫r³ by closed form per triangle).
 bt_moments bt_shape_moments(int n, const double *v);
 
+/// The same without ∫ r³ dA, which stays 0: two asinh an edge are two thirds of the work, and only drag asks for it.
+bt_moments bt_shape_extent(int n, const double *v);
+
 /// Why a polygon cannot be a body, or NULL: too few or many vertices, clockwise, not convex, zero area,
 /// repeated vertices. The text is a static string that completes "... is refused: ".
 const char *bt_shape_fault(int n, const double *v);
@@ -30,7 +33,7 @@ const char *bt_shape_fault(int n, const double *v);
 /// The same with more patience: true only for what rounding cannot have made of a sound outline that was centred, shrunk or cut.
 bool bt_shape_broken(int n, const double *v);
 
-/// Move the centroid to the origin, in place; returns the moments taken before the move.
+/// Move the centroid to the origin, in place; returns what bt_shape_extent found before the move.
 bt_moments bt_shape_centre(int n, double *v);
 
 /// Width across the direction (ux, uy) (unit vector, body frame): extent of the projection on its normal, m.

@@ -24,6 +24,11 @@
 // moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
 // never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
 // caught after the solve (step.c).
+//
+// A step goes over the list of busy tiles alone: those that are not at rest, those that are not idle, and those whose bodies may be moved by a
+// contact that was found. Tiles enter the list where they are woken (something moves near, forces have changed, labels are new) and leave it when they are
+// none of these. Everything in the others is as it was, and their part of every sum is zero. Floes that drift with moving water are
+// moved in every step: then all tiles are busy.
 #ifndef BERGTOW_TILES_H
 #define BERGTOW_TILES_H
 
@@ -86,6 +91,10 @@ typedef struct bt_tile {
     bool listed;                    ///< the list is valid for margin_listed
     double margin_listed;           ///< m
     double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
+    bt_idx *near;                   ///< [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    bt_idx n_near, cap_near;
+    bool near_known;                ///< they are those of the list
+    double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
     // contacts of this step
     bt_unit *units;                 ///< [n_units]
     bt_gaps *gaps;                  ///< [n_units] of the units
@@ -117,6 +126,8 @@ typedef struct bt_share {
     char apart[64 - 3 * sizeof(bt_idx)]; ///< a cache line each
 } bt_share;
 
+enum { BT_FEW_TILES = 64 }; ///< fewer are done by one thread: a team costs microseconds
+
 enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
 
 typedef struct bt_tiles {
@@ -141,7 +152,11 @@ typedef struct bt_tiles {
     double *moved;                  ///< [n] path length that no body of the tile exceeds, m; grows only
     double moved_any;               ///< the same for any body in a tile
     uint8_t *rest;                  ///< [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
-    uint8_t *awake;                 ///< [n] contacts may move the tile's bodies in this step
+    uint8_t *awake;                 ///< [n] contacts of this step may move the tile's bodies
+    bt_idx *busy;                   ///< [n_busy] tiles that a step looks at, ascending; the last tile is always one
+    bt_idx n_busy;
+    uint8_t *is_busy;               ///< [n]
+    bool busy_sorted;
     bt_idx *order;                  ///< [n_order] tiles of this rank with work, by phase, in each those at the border of the rank first
     bt_idx n_order;
     bt_idx start[BT_PHASES + 1];    ///< first tile of each phase in the order
@@ -163,6 +178,14 @@ void bt_tiles_begin(bt_world *w);
 
 /// The same if the tiles are too small for this margin, m. True when renewed: every index of a body has changed. Collective.
 bool bt_tiles_update(bt_world *w, double margin);
+
+/// Tile k, or every tile, is looked at from now on.
+void bt_tiles_wake(bt_tiles *t, bt_idx k);
+void bt_tiles_wake_all(bt_tiles *t);
+/// The list of busy tiles in its order, after some have been woken.
+void bt_tiles_sort_busy(bt_tiles *t);
+/// Leave out of the list what is at rest, idle, and not moved by contacts.
+void bt_tiles_leave(bt_tiles *t);
 
 /// How far the centroid of body i stands outside its tile, m.
 double bt_tiles_outside(const bt_world *w, bt_idx i);

@@ -237,6 +237,7 @@ static void memory(void **state)
         vel(w, 0)->x = -0.5;
         w->bodies.stirred[bt_world_index(w, 0)] = 1;
         w->tiles->rest[0] = BT_REST_NO;
+        bt_tiles_wake(w->tiles, 0);
         while (pose(w, 0)->x > -out) bt_world_step(w);
         vel(w, 0)->x = back;
         double free_until = 0;
