@@ -185,6 +185,27 @@ static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors
     return lost == 0;
 }
 
+void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+{
+    floe[0] = floe[1] = body[0] = body[1] = NAN;
+    if (c->ice.start != BT_START_DRIFT) return;
+    bt_params p = bt_setup_params(c, size);
+    bt_world *w = bt_world_create(&p);
+    double v[2 * BT_MAX_VERTICES], thicknesses[2];
+    bt_shape_regular(24, BT_PI / 4 * size * size, v);
+    bt_body_def d = {.motion = BT_DYNAMIC};
+    floe_def(c, 24, v, thickness, &d);
+    bt_world_add(w, &d);
+    bt_errors unfound = {0}; // NaN says it
+    if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
+    if (begin_drift(c, w, 1, &unfound)) {
+        floe[0] = w->bodies.vel[0].x, floe[1] = w->bodies.vel[0].y;
+        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1)) body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
+    }
+    bt_errors_free(&unfound);
+    bt_world_free(w);
+}
+
 static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
 
 /// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners.

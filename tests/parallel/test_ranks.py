@@ -109,7 +109,7 @@ def test_the_cases_show_what_they_are_for(alone, name):
         area = r.dataset("/floes/area")
         assert area.max() > 15 * area.min()
     if name == "crush":
-        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.5, r.summary
+        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.6, r.summary
     if name == "round":
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 
