@@ -50,13 +50,13 @@ static balance balance_at(const bt_world *w, bt_idx i, const double u[2])
     const bt_drag *d = &b->drag[i];
     const bt_turning r = bt_forces_turning(p, b->share[i]);
     const double rate = b->mass[i] / p->dt, water[2] = {p->water_u, p->water_v}, air[2] = {p->air_u, p->air_v};
-    bt_vel turned = {.x = u[0], .y = u[1]};
-    bt_forces_turn(p, &r, &turned);
+    // U' − U without the cancellation of the whole velocities.
+    const double x = u[0] - p->balance_u, y = u[1] - p->balance_v;
     balance a = {
-        .f = {rate * (turned.x - u[0]), rate * (turned.y - u[1])},
+        .f = {rate * ((r.c - 1) * x - r.s * y + r.vx), rate * (r.s * x + (r.c - 1) * y + r.vy)},
         .df = {{rate * (r.c - 1), -rate * r.s}, {rate * r.s, rate * (r.c - 1)}},
     };
-    a.scale = rate * (fabs(r.s) * hypot(u[0] - p->balance_u, u[1] - p->balance_v) + hypot(r.vx, r.vy));
+    a.scale = rate * (fabs(r.s) * hypot(x, y) + hypot(r.vx, r.vy));
     add_drag(b, i, d->water_skin, d->water_form, water, u, &a);
     add_drag(b, i, d->air_skin, d->air_form, air, u, &a);
     return a;
