@@ -15,7 +15,7 @@ typedef struct {
 /// From the lowest to the highest vertex of the outline across v, m.
 static void extent_across(const bt_bodies *b, bt_idx i, const double v[2], double d[2])
 {
-    const double *low = NULL, *high = NULL;
+    const double *low = b->outline + 2 * b->offset[i], *high = low;
     double least = INFINITY, most = -INFINITY;
     for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
         const double *p = b->outline + 2 * k, s = v[0] * p[1] - v[1] * p[0];

@@ -6,8 +6,8 @@
 
 #include "bergtow/tiles.h"
 
-/// Implicit drag Σ g Jᵀ (U_ref − J U), J U = U + ω×r, a symmetric matrix over (U, ω): g = Σ g (kg/s), gx, gy = Σ g r (kg m/s), gw = Σ g r² and the
-/// skin's k|ω| (kg m²/s); jx, jy = Σ g U_ref (N), jw = Σ g r×U_ref (N m).
+/// Implicit drag Σ g Jᵀ (U_ref − J U), J U = U + ω×r, a symmetric matrix over (U, ω): g = Σ g (kg/s), gx, gy = Σ g r
+/// (kg m/s), gw = Σ g r² and the skin's k|ω| (kg m²/s); jx, jy = Σ g U_ref (N), jw = Σ g r×U_ref (N m).
 typedef struct {
     double g, gx, gy, gw, jx, jy, jw;
 } drag_load;
@@ -21,8 +21,9 @@ static void add_skin(double rx, double ry, double k, double ref_x, double ref_y,
     l->jy += g * ref_y;
 }
 
-/// Form drag along the convex hull of the outline of body i, form · v max(0, −v·n) dl; (rx, ry): U_ref − U, w: ω. On an edge v is linear and n constant, so that
-/// g = form max(0, −v·n) dl and its moments to r² are polynomials up to the third degree where water comes in: two points of Gauss are exact.
+/// Form drag along the convex hull of the outline of body i, form · v max(0, −v·n) dl; (rx, ry): U_ref − U, w: ω. On an
+/// edge v is linear and n constant, so that g = form max(0, −v·n) dl and its moments to r² are polynomials up to the
+/// third degree where water comes in: two points of Gauss are exact.
 static void add_outline(const bt_bodies *b, bt_idx i, double rx, double ry, double w, double form, double ref_x, double ref_y, drag_load *l)
 {
     if (form == 0 || (rx == 0 && ry == 0 && w == 0)) return;
@@ -144,7 +145,8 @@ bt_external bt_forces_external(const bt_world *w, bt_idx i)
         .coriolis = {m * (c1 * u1->x - s * u1->y), m * (s * u1->x + c1 * u1->y)},
         .tilt = {m * (r.vx - (c1 * ub - s * vb)), m * (r.vy - (s * ub + c1 * vb))},
     };
-    // Of the step, M_e (U2 − U*) is what contacts and line gave, M_e = M + Δt diag K; the rest of M (U2 − U') is drag, U' = U1 + Coriolis and tilt.
+    // Of the step, M_e (U2 − U*) is what contacts and line gave, M_e = M + Δt diag K; the rest of M (U2 − U') is drag,
+    // U' = U1 + Coriolis and tilt.
     const double me = 1 / b->inv[i].m, ie = 1 / b->inv[i].i;
     e.drag[0] = me * (f->x - u->x) - m * (u1->x - u->x) - e.coriolis[0] - e.tilt[0];
     e.drag[1] = me * (f->y - u->y) - m * (u1->y - u->y) - e.coriolis[1] - e.tilt[1];

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: MIT
-// Form drag along the outline against plain sums, width and hull; no reversal at any step; added mass; free drift that stays.
+// SPDX-License-Identifier: MIT Form drag along the outline against plain sums, width and hull; no reversal at any step;
+// added mass; free drift that stays.
 #include "scene.h"
 
 #include "bergtow/drift.h"
@@ -94,7 +94,8 @@ static void a_bay_is_passed_by(void **state)
         }
 }
 
-/// One step of any length: the velocity relative to the fluid loses energy and does not turn round, drift and rotation together.
+/// One step of any length: the velocity relative to the fluid loses energy and does not turn round, drift and rotation
+/// together.
 static void drag_never_reverses(void **state)
 {
     (void)state;
