@@ -21,7 +21,7 @@
 // lie in the middle of its width has a moment in translation, too. On a straight side v is linear along l and n
 // constant: where water comes in, dF and r×dF are polynomials of second and third degree, and two points of Gauss on
 // that stretch exact; no square root is left. A bay of an outline that is not convex is passed by: water meets the hull
-// across it. Floes have the same law as the towed body: it costs 1 % of a step in 80 % ice, and what a floe resists to
+// across it. Floes have the same law as the towed body: it costs 1 % of a step in 80 % ice and 4 % in 20 %, and what a floe resists to
 // being turned aside counts (docs/theory.md says how much).
 //
 // In time, drag is linearised about the velocities at the start of the step, g = ½ρ C d max(0, −v1·n) dl and ρ C_s A
