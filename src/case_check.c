@@ -159,6 +159,14 @@ static void follow_file(const bt_case *c, char **file)
     free(folder);
 }
 
+/// A velocity of which nothing is given stays open where the body drifts freely at the start; otherwise what is not given is 0.
+static void follow_start(bool drifts, double *vx, double *vy)
+{
+    if (drifts && isnan(*vx) && isnan(*vy)) return;
+    fill(vx, 0);
+    fill(vy, 0);
+}
+
 static void follow(bt_case *c)
 {
     bool basin = c->domain.frame == BT_FRAME_BASIN;
@@ -175,10 +183,13 @@ static void follow(bt_case *c)
     fill(&c->body.sail, bt_max(0, c->body.draft * (c->water.density / c->body.density - 1)));
     fill(&c->body.friction, c->ice.friction);
     fill(&c->body.restitution, c->ice.restitution);
+    const bool drift = c->ice.start == BT_START_DRIFT;
+    follow_start(drift && c->tow.mode == BT_TOW_NONE && c->body.shape != BT_BODY_ABSENT, &c->body.vx, &c->body.vy);
     for (bt_idx i = 0; i < c->n_floes; i++) {
         bt_floe_def *f = &c->floes[i];
         fill(&f->width, f->length);
         fill(&f->thickness, c->ice.thickness);
+        follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
     follow_file(c, &c->ice.field);
@@ -555,8 +566,10 @@ double bt_case_reference_speed(const bt_case *c)
     if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
     u = bt_max(u, bt_environment_fastest(c, true));
-    u = bt_max(u, hypot(c->body.vx, c->body.vy));
-    for (bt_idx i = 0; i < c->n_floes; i++) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
+    // A velocity that is not given is that of free drift.
+    if (!isnan(c->body.vx)) u = bt_max(u, hypot(c->body.vx, c->body.vy));
+    for (bt_idx i = 0; i < c->n_floes; i++)
+        if (!isnan(c->floes[i].vx)) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
     u = bt_max(u, 0.02 * bt_environment_fastest(c, false));
     return u > 0 ? u : 0.1;

@@ -265,6 +265,16 @@ static void print_environment(const bt_case *c)
     }
 }
 
+/// What ice and a free body begin with, where water, wind or slope move them.
+static void print_drift(const bt_case *c, const bt_check_ice *n)
+{
+    double v[2][2];
+    bt_setup_drift(c, n->size, n->thickness, v[0], v[1]);
+    static const char *const names[] = {"free drift, mean floe", "free drift, body"};
+    for (int k = n->count < 1; k < 2; k++)
+        if (hypot(v[k][0], v[k][1]) > 0) printf("%-20s (%.4g, %.4g) m/s at the start\n", names[k], v[k][0], v[k][1]);
+}
+
 static void print_step(const bt_case *c, const bt_check_ice *n)
 {
     double speed = bt_case_reference_speed(c), dt = c->run.dt;
@@ -347,6 +357,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     print_packing(c, &n);
     print_window(c);
     print_environment(c);
+    print_drift(c, &run);
     print_lead(c, &lead);
     print_step(c, &n);
     print_cost(c, comm, &run);

@@ -31,8 +31,8 @@ static const struct argp_option estimate_options[] = {
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp estimate_argp = {
     .options = estimate_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
-    .doc = "Print the resistance of broken ice by Lichey & Hellmer 2001, by three closures of Marchenko et al. 2010 and in the dilute "
-           "limit, and the drag of open water, for the body, ice and speed of a case. Nothing is simulated."};
+    .doc = "Print the resistance of broken ice by Lichey & Hellmer 2001, by three closures of Marchenko et al. 2010, in the dilute "
+           "limit and by a regression of ships in pack ice, and the drag of open water, for the body, ice and speed of a case. Nothing is simulated."};
 
 static void print_table(const options *o, const bt_case *c, const bt_estimate_input *in)
 {

@@ -20,6 +20,8 @@ const bt_estimate_kind_info bt_estimate_kinds[BT_N_ESTIMATES] = {
                          "our closure of Marchenko et al. 2010: ice swept together to phi"},
     [BT_EST_DILUTE] = {"dilute_limit", "dilute limit", "(4/3) (1 + e) A rho_i h (R + r) V^2, R = W / 2",
                        "derived: disc-like floes at rest, each met once by a heavy disc"},
+    [BT_EST_SHIPS] = {"ships_in_pack_ice", "ships in pack ice", "0.5 k Fr_p^b rho_i W h V^2 A^n, Fr_p = V / sqrt(g h A); blunt hull, range to slender",
+                      "form of Colbourne 2000 (not at hand); k, b, n as in PolarRoute (British Antarctic Survey), for ships, range not given"},
     [BT_EST_OPEN_WATER] = {"open_water_drag", "open-water drag", "(0.5 rho_w C_w draft b + rho_w C_ws A_wl) |dV| dV",
                            "the drag law of this program; no ice resistance, to be added to the others"},
 };
@@ -79,7 +81,21 @@ static bt_estimate dilute(const bt_estimate_input *in)
     return just(force, thin, thin ? "A <= 0.25 (assumed): floes are met one by one" : "A > 0.25 (assumed): floes hit each other");
 }
 
-bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in)
+/// Regression of the resistance of ships over the pack-ice Froude number.
+static double ships_of(const bt_estimate_input *in, double k, double b, double n)
+{
+    const double froude = in->along / sqrt(GRAVITY * in->thickness * in->concentration);
+    return 0.5 * k * pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along * pow(in->concentration, n);
+}
+
+static bt_estimate ships(const bt_estimate_input *in)
+{
+    const double blunt = ships_of(in, 16.1, -1.7937, 3), slender = ships_of(in, 4.4, -0.8267, 2);
+    return (bt_estimate){.force = blunt, .low = bt_min(blunt, slender), .high = bt_max(blunt, slender), .valid = in->ship,
+                         .note = in->ship ? "a ship; ice and speeds of the regression are not known here" : "extrapolated: a regression of ships, and this is none"};
+}
+
+static bt_estimate force_of(bt_estimate_kind kind, const bt_estimate_input *in)
 {
     if (isnan(in->along)) return just(NAN, false, "no tow: free drift");
     if (kind == BT_EST_OPEN_WATER) return just(in->drag * in->speed * in->along, true, "drag of the water alone");
@@ -92,10 +108,20 @@ bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in)
     case BT_EST_RAFTING: return rafting(in);
     case BT_EST_MOMENTUM: return momentum(in);
     case BT_EST_DILUTE: return dilute(in);
+    case BT_EST_SHIPS: return ships(in);
     case BT_EST_OPEN_WATER:
     case BT_N_ESTIMATES: break;
     }
     return just(NAN, false, "unknown");
+}
+
+bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in)
+{
+    bt_estimate e = force_of(kind, in);
+    // Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9, and open water knows no ice.
+    const bool knows = kind != BT_EST_OPEN_WATER && (kind != BT_EST_LICHEY_HELLMER || in->concentration >= BT_EST_DENSE);
+    e.compares = e.valid && knows && e.force > 0;
+    return e;
 }
 
 // Mean diameter weighted with area, <d³>/<d²>. Power law: density ∝ d^(−a−1) on [lo, hi]; lognormal with mean m and relative spread s:
@@ -120,6 +146,7 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
         .speed = NAN,
         .along = NAN,
         .restitution = c->body.restitution,
+        .ship = c->body.shape == BT_BODY_SHIP,
         .ice_density = c->ice.density,
         .water_density = c->water.density,
         .p_star = c->estimate.p_star / scale,

@@ -46,7 +46,7 @@ static void curves(bt_json *j, const bt_estimate_input *in)
     bt_json_close(j, '}');
 }
 
-/// Simulated / estimate, NaN where that says nothing.
+/// Simulated / estimate, NaN where there is none.
 static double ratio_of(int kind, const bt_estimate *e, double simulated)
 {
     return kind == BT_EST_OPEN_WATER || !(e->force > 0) ? NAN : simulated / e->force;
@@ -72,6 +72,7 @@ void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in,
         bt_json_number(j, "high_n", e.high);
         bt_json_number(j, "simulated_over_estimate", ratio_of(k, &e, simulated));
         bt_json_bool(j, "valid", e.valid);
+        bt_json_bool(j, "compares", e.compares);
         bt_json_string(j, "note", e.note);
         bt_json_string(j, "formula", bt_estimate_kinds[k].formula);
         bt_json_string(j, "source", bt_estimate_kinds[k].source);
@@ -89,9 +90,9 @@ void bt_estimates_print(const bt_estimate_input *in, double simulated, const cha
         char force[32] = "no value", low[32], high[32];
         if (isfinite(e.force)) bt_force_text(force, e.force);
         printf("%s%-22s %-12s", indent, bt_estimate_kinds[k].label, force);
-        if (isfinite(ratio)) printf(" %-9.3g", ratio);
+        if (e.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
         else if (!isnan(simulated)) printf(" %-9s", "-");
-        printf(" %s%s", e.valid ? "" : "not valid: ", e.note);
+        printf(" %s%s", e.valid || k == BT_EST_SHIPS ? "" : "not valid: ", e.note);
         if (isfinite(e.force) && e.low != e.high) printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
         printf("\n");
         if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_kinds[k].formula, indent, bt_estimate_kinds[k].source);

@@ -70,9 +70,10 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
         if (b->motion[i] != BT_DYNAMIC || !bt_domain_owns(w, i)) continue;
         double start = 0;
         const bt_gid by_hand = b->gid[i] - (n_floes - c->n_floes);
-        if (b->gid[i] == w->towed) start = energy_of(b->mass[i], b->inertia[i], c->body.vx, c->body.vy, c->body.yaw_rate);
+        // A velocity that is not given is that of free drift, below the driven speed.
+        if (b->gid[i] == w->towed) start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy), c->body.yaw_rate);
         else if (by_hand >= 0 && by_hand < c->n_floes)
-            start = energy_of(b->mass[i], b->inertia[i], c->floes[by_hand].vx, c->floes[by_hand].vy, c->floes[by_hand].yaw_rate);
+            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx), bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
         bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, b, i), 0, 0)) / UNIT);
     }
     bt_domain_reduce(w, &t);

@@ -27,6 +27,7 @@ static const char *const ice_shapes[] = {"voronoi", "rectangles", "polygons", NU
 static const char *const size_laws[] = {"single", "lognormal", "power", NULL};
 static const char *const crss[] = {"file", "lonlat", "plane", "frame", "metres", NULL};
 static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
+static const char *const starts[] = {"drift", "rest", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
 static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
 static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
@@ -105,6 +106,8 @@ const bt_key bt_case_keys[] = {
     REAL("ice.drag.water_skin", ice.drag.water_skin, RATIO, "5.5e-3", "[0, 10]", "skin drag of water under a floe [Hunke & Comeau 2011]"),
     REAL("ice.drag.air_form", ice.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag of the floe's edge in air [Hunke & Comeau 2011]"),
     REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]", "skin drag of air over a floe [Hunke & Comeau 2011]"),
+    CHOICE("ice.start", ice.start, starts, "drift",
+           "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, water, Coriolis and slope at time zero balance, none across walls; rest: 0"),
     INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
     REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
     TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
@@ -129,8 +132,8 @@ const bt_key bt_case_keys[] = {
     REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin), 0 (geographic)", ANYWHERE, "centroid at time zero"),
     REAL("body.y", body.y, LENGTH, "0 m", ANYWHERE, "centroid at time zero"),
     REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the body's own x from the x axis towards y at time zero"),
-    REAL("body.vx", body.vx, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero, tow modes none and line"),
-    REAL("body.vy", body.vy, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero, tow modes none and line"),
+    REAL("body.vx", body.vx, SPEED, "none", ANY_SPEED, "velocity at time zero, tow modes none and line; none: 0, or free drift in mode none without body.vy (ice.start)"),
+    REAL("body.vy", body.vy, SPEED, "none", ANY_SPEED, "velocity at time zero, tow modes none and line; none: as body.vx"),
     REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero, tow modes none and line"),
     REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]", "depth below the waterline; no default in the geographic frame; assumed"),
     REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]", "height above the waterline"),
@@ -276,8 +279,8 @@ const bt_key bt_floe_keys[] = {
     REAL("x", x, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("y", y, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("yaw", yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the floe's own x from the x axis towards y"),
-    REAL("vx", vx, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero"),
-    REAL("vy", vy, SPEED, "0 m/s", ANY_SPEED, "velocity at time zero"),
+    REAL("vx", vx, SPEED, "none", ANY_SPEED, "velocity at time zero; none: 0 where vy is given, otherwise as ice.start has it"),
+    REAL("vy", vy, SPEED, "none", ANY_SPEED, "velocity at time zero; none: as vx"),
     REAL("yaw_rate", yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero"),
     REAL("thickness", thickness, LENGTH, "= ice.thickness", "(0, 100]", "thickness"),
     BOOL("fixed", fixed, "false", "at rest for ever, as a structure or grounded ice"),

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/drift.h"
 #include "bergtow/environment.h"
 #include "bergtow/forces.h"
 #include "bergtow/impact.h"
@@ -52,6 +53,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .air_u = air[0],
         .air_v = air[1],
         .coriolis = turn,
+        .tilt_moves_water = c->water.tilt == BT_TILT_DYNAMIC,
     };
     if (c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC) {
         p.balance_u = water[0];
@@ -71,6 +73,7 @@ static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body
     d->n_vertices = n;
     d->vertices = v;
     d->mass = sheet * m.area * (1 + c->ice.added_mass);
+    d->added = sheet * m.area * c->ice.added_mass;
     d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
     d->friction = c->ice.friction;
     d->restitution = c->ice.restitution;
@@ -102,7 +105,7 @@ static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
         double v[2 * BT_MAX_VERTICES];
         int n = bt_case_floe_outline(g, v);
         bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
-                         .vx = g->vx, .vy = g->vy, .yaw_rate = g->yaw_rate};
+                         .vx = bt_case_start(g->vx), .vy = bt_case_start(g->vy), .yaw_rate = g->yaw_rate};
         floe_def(c, n, v, g->thickness, &d);
         d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = g->thickness;
@@ -124,10 +127,11 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
         .x = c->body.x,
         .y = c->body.y,
         .yaw = c->body.yaw,
-        .vx = c->body.vx,
-        .vy = c->body.vy,
+        .vx = bt_case_start(c->body.vx),
+        .vy = bt_case_start(c->body.vy),
         .yaw_rate = c->body.yaw_rate,
         .mass = mass * (1 + c->body.added_mass),
+        .added = mass * c->body.added_mass,
         // Uniform over the waterline plane, as a prism.
         .inertia = mass * m.polar / m.area * (1 + c->body.added_inertia),
         .friction = c->body.friction,
@@ -153,6 +157,54 @@ static void add_wall(const bt_case *c, bt_world *w, double x, double y, double h
                      .x = x, .y = y, .vx = vx, .vy = vy, .friction = c->domain.wall_friction,
                      .restitution = c->domain.wall_restitution};
     bt_world_add(w, &d);
+}
+
+/// Does body i begin with its free drift?
+static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, bt_idx n_field)
+{
+    if (c->ice.start != BT_START_DRIFT || w->bodies.motion[i] != BT_DYNAMIC) return false;
+    return i < n_field || (i == w->towed ? isnan(c->body.vx) : isnan(c->floes[i - n_field].vx));
+}
+
+/// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given. Ice between walls has nowhere to
+/// drift across them: it has been there for long, and lies against one of them. False when it was not found.
+static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors *err)
+{
+    bt_bodies *b = &w->bodies;
+    const bool hold[2] = {c->domain.ends == BT_BOUND_WALL, c->domain.sides == BT_BOUND_WALL};
+    bt_idx lost = 0;
+#pragma omp parallel for schedule(dynamic, 64) reduction(+ : lost) if (BT_MANY(b->n, 2000))
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!begins_adrift(c, w, i, n_field)) continue;
+        double u[2];
+        if (!bt_drift_velocity(w, i, hold, u)) lost++;
+        b->vel[i] = b->vel_start[i] = b->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = b->vel[i].w};
+    }
+    if (lost > 0)
+        bt_errors_add(err, "%s: ice.start: for %d bodies no velocity was found at which wind, water, Coriolis and slope balance; set it to rest, or check drag, current and wind",
+                      c->path ? c->path : "case", (int)lost);
+    return lost == 0;
+}
+
+void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+{
+    floe[0] = floe[1] = body[0] = body[1] = NAN;
+    if (c->ice.start != BT_START_DRIFT) return;
+    bt_params p = bt_setup_params(c, size);
+    bt_world *w = bt_world_create(&p);
+    double v[2 * BT_MAX_VERTICES], thicknesses[2];
+    bt_shape_regular(24, BT_PI / 4 * size * size, v);
+    bt_body_def d = {.motion = BT_DYNAMIC};
+    floe_def(c, 24, v, thickness, &d);
+    bt_world_add(w, &d);
+    bt_errors unfound = {0}; // NaN says it
+    if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
+    if (begin_drift(c, w, 1, &unfound)) {
+        floe[0] = w->bodies.vel[0].x, floe[1] = w->bodies.vel[0].y;
+        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1)) body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
+    }
+    bt_errors_free(&unfound);
+    bt_world_free(w);
 }
 
 static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
@@ -349,12 +401,14 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
         add_towed_body(c, w, r);
         r->names[n++] = "towed body";
     }
+    const bool drifts = begin_drift(c, w, f->n, err);
     w->impacts = bt_impacts_create(c, w);
     const bt_idx first_wall = w->bodies.n;
     add_walls(c, w, r->names + n);
     if (c->domain.ends == BT_BOUND_MOVING && with_body)
         bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes, c->domain.sides == BT_BOUND_WALL);
     *out = w;
+    if (!drifts) return BT_ERR_CASE;
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;
 

@@ -115,13 +115,14 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
     for (bt_idx i = tile->first; i < tile->end; i++) {
         if (b->motion[i] != BT_DYNAMIC) continue;
         const bt_vel *v = &b->vel[i];
+        const double dx = v->x - b->vel_free[i].x, dy = v->y - b->vel_free[i].y;
+        if (dx != 0 || dy != 0) { // also of a floe that its contacts have stopped
+            bt_sum_add(&t->sum[GAINED_X], dx / b->inv[i].m);
+            bt_sum_add(&t->sum[GAINED_Y], dy / b->inv[i].m);
+        }
         if (v->x == 0 && v->y == 0 && v->w == 0) continue;
         bt_sum_add(&t->sum[CARRIED], b->mass[i] * (fabs(v->x) + fabs(v->y)));
         bt_sum_add(&t->sum[ENERGY], 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
-        const double dx = v->x - b->vel_free[i].x, dy = v->y - b->vel_free[i].y;
-        if (dx == 0 && dy == 0) continue;
-        bt_sum_add(&t->sum[GAINED_X], dx / b->inv[i].m);
-        bt_sum_add(&t->sum[GAINED_Y], dy / b->inv[i].m);
     }
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];

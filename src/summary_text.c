@@ -352,7 +352,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (s->body) print_forces(s, c);
     bt_impacts_print(s->impacts);
     if (s->body && !isnan(s->estimate.along)) {
-        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate, regime\n", s->estimate.along);
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate where that knows the concentration and holds, regime\n", s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
     }
     if (h->n)

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "bergtow/contacts.h"
+#include "bergtow/forces.h"
 #include "bergtow/tiles.h"
 #include "bergtow/tow.h"
 #include "domain.h"
@@ -40,6 +41,7 @@ static void mean_floe(const bt_world *w, bt_window *v)
         double perimeter = 0;
         for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
         v->mass += b->mass[i];
+        v->share += b->share[i] * b->mass[i];
         v->water += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
         v->air += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
         v->vel.x += b->vel[i].x;
@@ -47,6 +49,7 @@ static void mean_floe(const bt_world *w, bt_window *v)
         n++;
     }
     if (n == 0) return;
+    v->share /= v->mass;
     v->mass /= n, v->water /= n, v->air /= n;
     v->vel.x /= n, v->vel.y /= n;
 }
@@ -364,13 +367,8 @@ void bt_window_advance(bt_world *w)
     const bt_params *p = &w->par;
     bt_vel u = v->vel;
     const double water = v->water * hypot(p->water_u - u.x, p->water_v - u.y), air = v->air * hypot(p->air_u - u.x, p->air_v - u.y);
-    const double turn = p->coriolis * p->dt, x = u.x - p->balance_u, y = u.y - p->balance_v;
-    if (turn != 0) {
-        u.x = p->balance_u + cos(turn) * x - sin(turn) * y;
-        u.y = p->balance_v + sin(turn) * x + cos(turn) * y;
-    }
-    u.x += p->dt * p->tilt_ax;
-    u.y += p->dt * p->tilt_ay;
+    const bt_turning r = bt_forces_turning(p, v->share);
+    bt_forces_turn(p, &r, &u);
     if (water + air > 0) {
         const double per_mass = 1 / (v->mass + p->dt * (water + air));
         u.x = (v->mass * u.x + p->dt * (water * p->water_u + air * p->air_u)) * per_mass;

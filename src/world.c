@@ -31,7 +31,7 @@ bt_world *bt_world_create(const bt_params *p)
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
     FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
-    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
+    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
     FIELD(stirred), FIELD(tile), FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
@@ -94,6 +94,29 @@ static void close_polygon(bt_bodies *b, int64_t first, int n)
     b->mark[first].count = (uint8_t)n;
 }
 
+/// The convex hull of the outline of body i: its vertices are those that the hull of a copy has kept.
+static void mark_hull(bt_bodies *b, bt_idx i, int n, bool convex)
+{
+    bt_mark *mark = b->mark + b->offset[i];
+    const double *v = b->vertices + 2 * b->offset[i];
+    for (int k = 0; k < n; k++) mark[k].next = (uint8_t)((k + 1) % n);
+    if (convex) return;
+    double hull[2 * BT_MAX_VERTICES];
+    memcpy(hull, v, 2 * sizeof *v * (size_t)n);
+    const int n_hull = bt_shape_hull(n, hull);
+    int first = -1, last = -1;
+    for (int k = 0; k < n; k++) {
+        bool on = false;
+        for (int j = 0; j < n_hull; j++) on = on || (hull[2 * j] == v[2 * k] && hull[2 * j + 1] == v[2 * k + 1]);
+        mark[k].next = (uint8_t)k;
+        if (!on) continue;
+        if (last >= 0) mark[last].next = (uint8_t)k;
+        else first = k;
+        last = k;
+    }
+    mark[last].next = (uint8_t)first;
+}
+
 /// The outline of a new body i, and its parts.
 static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
 {
@@ -101,6 +124,7 @@ static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
     memcpy(b->vertices + 2 * at, d->vertices, 2 * sizeof(double) * (size_t)d->n_vertices);
     for (int k = 0; k < d->n_vertices; k++) b->mark[at + k].corner = (uint8_t)k;
     close_polygon(b, at, d->n_vertices);
+    mark_hull(b, i, d->n_vertices, !d->parts);
     at += d->n_vertices;
     const bt_parts *p = d->parts;
     for (int j = 0, from = 0; p && j < p->n; from += p->count[j++], at = b->offset[i] + d->n_vertices + from) {
@@ -138,6 +162,7 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->area[i] = m.area;
     b->mass[i] = d->mass;
     b->inertia[i] = d->inertia;
+    b->share[i] = d->added > 0 ? 1 - d->added / d->mass : 1;
     b->friction[i] = d->friction;
     b->restitution[i] = d->restitution;
     b->thickness[i] = d->thickness;

@@ -56,7 +56,7 @@ SCENE = set("""
 run.dt run.duration
 domain.frame domain.length domain.width domain.x0 domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing domain.ahead
 ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max
-ice.size_exponent ice.thickness ice.thickness_law ice.crushing.pressure
+ice.size_exponent ice.thickness ice.thickness_law ice.crushing.pressure ice.start
 body.shape body.length body.width body.vertices body.x body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass
 tow.mode tow.speed tow.direction tow.ramp tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
 tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness
@@ -435,6 +435,7 @@ def draw(seed, table):
     for name, spec in FREE.items():
         if d.chance(0.35):
             values[name] = free_value(d, keys[name], spec)
+    values["ice.start"] = d.one(keys["ice.start"]["choices"]) # last: the draws of before stay
     case = {}
     for name, value in values.items():
         *sections, key = name.split(".")

@@ -18,6 +18,7 @@ typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;  
 /// Coordinates of outlines: file, lonlat, plane, frame, metres.
 typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME, BT_CRS_METRES } bt_crs;
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
+typedef enum { BT_START_DRIFT, BT_START_REST } bt_start;                           // drift, rest
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
 typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE, BT_TOW_THRUST } bt_tow_mode; // none, speed, line, thrust
@@ -49,7 +50,7 @@ typedef struct bt_floe_def {
     double *vertices;          ///< [n_vertices][2] m, shape: polygon
     int n_vertices;
     double x, y, yaw;          ///< m, m, rad
-    double vx, vy, yaw_rate;   ///< m/s, m/s, rad/s
+    double vx, vy, yaw_rate;   ///< at time zero, m/s, m/s, rad/s; NaN: as ice.start has it
     double thickness;          ///< m
     bool fixed;                ///< infinite mass, at rest
     int line;                  ///< where in the case file it stands, for messages
@@ -98,6 +99,7 @@ typedef struct bt_case {
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;
+        bt_start start;                 ///< velocity at time zero
         int64_t seed;
         double shake;                   ///< relaxation length of the generator, in mean free gaps (0 = none)
         char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
@@ -115,7 +117,7 @@ typedef struct bt_case {
         double *vertices;        ///< [n_vertices][2] m, shape: polygon
         int n_vertices;
         double x, y, yaw;        ///< centroid at time zero, m, m, rad
-        double vx, vy, yaw_rate; ///< velocity at time zero (tow: none or line), m/s, rad/s
+        double vx, vy, yaw_rate; ///< velocity at time zero (tow: none or line), m/s, rad/s; vx, vy NaN: free drift
         double draft, sail;      ///< m
         double density;          ///< ρ of the body, kg/m³, used when mass is not given
         double mass;             ///< kg; 0 = density × waterline area × (draft + sail)
@@ -276,6 +278,9 @@ static inline bool bt_bound_wraps(bt_bound b) { return b == BT_BOUND_PERIODIC ||
 
 /// +1 when the tow goes towards +x, −1 towards −x: where the moving window goes.
 static inline double bt_case_tow_sign(const bt_case *c) { return cos(c->tow.direction) < 0 ? -1 : 1; }
+
+/// A velocity at time zero of a case as a number: 0 where it is left to free drift.
+static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }
 
 /// Steps of the whole run: duration / dt rounded up, with a slack of 1e-12 of it, so that 2.1 s / 0.3 s is 7.
 int64_t bt_case_steps(const bt_case *c);

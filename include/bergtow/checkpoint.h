@@ -16,7 +16,7 @@
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
 //   bt_bodies         S pose (x, y, yaw), vel, path, tile, stirred, home.copy, home.lap
-//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length, radius, area, mass, inertia,
+//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length, radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no tile is known to rest
 //   bt_tiles          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels decide which tile owns a contact, and

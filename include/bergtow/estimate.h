@@ -15,9 +15,19 @@
 //     momentum       F = ρ_i h W V² A φ/(φ − A)                 the ice of the strip is swept together to φ, with the front at V φ/(φ − A)
 //   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²         resting disc-like floes of radius r, each met once by a heavy disc of
 //                                                               radius R = W/2, without friction and drag (derived; tests/physics/test_resistance.c)
+//   ships in pack    F = ½ k Fr_p^b ρ_i W h V² A^n,  Fr_p = V/√(g h A): a regression of ship resistance in pack ice over the pack-ice Froude number [Colbourne 2000:
+//                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in PolarRoute, the route planner of the British
+//                    Antarctic Survey (class SDA, ice_resistance; antarctica/PolarRoute, 2022). A berg is taken as blunt, the range goes to slender. The
+//                    source gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says extrapolated
 //   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/forces.c computes; no ice resistance
 //
 // Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
+//
+// Left out. The other regression that is known here, R = a ρ_i W h V² A^1.5 / Fr^b [Huang et al. 2021], has constants of a ship and its floes that were found only
+// in the source of a third, without range. It stays out until the paper is at hand.
+//
+// A run is held against estimates that know the concentration, within their range: a ratio to one that does not, or beyond its range, would tell of the
+// estimate and not of the run (bt_estimate.compares).
 #ifndef BERGTOW_ESTIMATE_H
 #define BERGTOW_ESTIMATE_H
 
@@ -25,7 +35,7 @@
 #include "bergtow/field.h"
 
 typedef enum {
-    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_OPEN_WATER, BT_N_ESTIMATES
+    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_SHIPS, BT_EST_OPEN_WATER, BT_N_ESTIMATES
 } bt_estimate_kind;
 
 #define BT_EST_LOOSE 0.15      ///< A up to which Lichey & Hellmer have no force
@@ -43,6 +53,7 @@ typedef struct bt_estimate_input {
     double width;            ///< W, m
     double speed, along;     ///< |ΔV| and ΔV·d, m/s; NaN: nothing is towed
     double restitution;      ///< e, ice on body
+    bool ship;               ///< the body is a ship
     double ice_density, water_density; ///< kg/m³
     double drag;             ///< ½ ρ_w C_w draft b + ρ_w C_ws A_wl, kg/m
     double p_star, p_s;      ///< Pa, N/m: divided by the length scale and its square
@@ -55,6 +66,7 @@ typedef struct bt_estimate {
     double force;     ///< N against the tow; NaN: the formula has no value here
     double low, high; ///< N, its range; equal to force where there is none
     bool valid;       ///< the formula is meant for these conditions
+    bool compares;    ///< valid, and it knows the concentration of the ice: a run is held against it
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;
 

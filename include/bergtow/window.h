@@ -34,6 +34,7 @@ typedef struct bt_window {
     bt_gid n_floes;       ///< bodies below this id are renewed
     bool held;            ///< walls at the sides: the mother field does not drift across
     double mass, water, air; ///< mean floe: kg; drag per squared velocity of water and air, kg/m
+    double share;         ///< m/M of all floes together
     // state
     double start, rear;   ///< σx of the rear end at first and now, m
     double drift_x, drift_y; ///< way of undisturbed ice since the start, m

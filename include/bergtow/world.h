@@ -40,7 +40,7 @@ typedef struct bt_home {
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
 typedef struct bt_drag {
     double water_skin;  ///< ρ_w C_ws A, kg/m
-    double water_form;  ///< ½ ρ_w C_w draft, kg/m²; times the width across the flow
+    double water_form;  ///< ½ ρ_w C_w draft, kg/m²; along the hull of the outline (forces.h)
     double air_skin;    ///< ρ_a C_as A, kg/m
     double air_form;    ///< ½ ρ_a C_a sail, kg/m²
     double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
@@ -52,6 +52,7 @@ typedef struct bt_drag {
 typedef struct bt_mark {
     uint8_t count;  ///< at the first vertex of the outline or a part: its number of vertices; 0 elsewhere
     uint8_t corner; ///< vertex of the outline that stands here
+    uint8_t next;   ///< of the outline: the vertex after this one on its convex hull; itself where it lies in a bay
 } bt_mark;
 
 /// What bt_world_add needs of a body.
@@ -64,6 +65,7 @@ typedef struct bt_body_def {
     double x, y, yaw;       ///< m, m, rad
     double vx, vy, yaw_rate;///< m/s, m/s, rad/s
     double mass, inertia;   ///< M = m(1+C_m), I(1+C_I); ignored unless dynamic, but kept for the inertia force
+    double added;           ///< m C_m, the part of the mass that Coriolis and the slope of the sea do not act on, kg
     double friction, restitution;
     double thickness;       ///< of ice, m; 0 = no ice: it is never crushed (crush.h)
     bt_drag drag;
@@ -89,6 +91,7 @@ typedef struct bt_bodies {
     double *radius;       ///< [n] m
     double *area;         ///< [n] m²
     double *mass, *inertia; ///< [n] M kg, I kg m²
+    double *share;        ///< [n] m/M, the body without its added mass over the whole
     double *friction, *restitution; ///< [n]
     double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
@@ -124,7 +127,8 @@ typedef struct bt_params {
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
     double balance_u, balance_v; ///< velocity in geostrophic balance with the tilt (Coriolis acts on U minus this), m/s
-    double tilt_ax, tilt_ay;     ///< −g ∇η, m/s²
+    double tilt_ax, tilt_ay;     ///< −g ∇η beyond that balance, m/s²
+    bool tilt_moves_water;       ///< that is dU_w/dt (tilt: dynamic), which acts on the added mass, too
 } bt_params;
 
 struct bt_tiles;

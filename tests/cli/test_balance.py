@@ -50,11 +50,55 @@ def test_forces_on_the_body(balanced):
     assert not warned(r, "balance")
 
 
+def moment(v):
+    """Polar moment of area about the centroid, which is the origin."""
+    x, y = v.T
+    cross = x * np.roll(y, -1) - np.roll(x, -1) * y
+    nx, ny = np.roll(x, -1), np.roll(y, -1)
+    return np.sum(cross * (x * x + x * nx + nx * nx + y * y + y * ny + ny * ny)) / 12
+
+
+def cubic(v):
+    """Integral of r³ over the area, by triangles to the origin: a fifth of the cube of the distance along the edge, times its distance."""
+    t, weight = np.polynomial.legendre.leggauss(20)
+    total = 0
+    for p, q in zip(v, np.roll(v, -1, axis=0)):
+        r = np.hypot(*(p[:, None] + (q - p)[:, None] * (t + 1) / 2))
+        total += (p[0] * q[1] - p[1] * q[0]) * np.sum(weight / 2 * r**3) / 5
+    return total
+
+
+def outline_drag(outline, yaw, at, ref, skin, form):
+    """Drag of one fluid as load - matrix @ (u, v, w): skin |v| v, and form max(0, -v.n) v along the outline by quadrature over the sides that water meets."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    corners = outline @ np.array([[c, s], [-s, c]])
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+
+    def local(r):
+        return ref - at[:2] - at[2] * np.array([-r[1], r[0]])
+
+    points = [(skin * np.hypot(*(ref - at[:2])), np.zeros(2))]
+    for p, q in zip(corners, np.roll(corners, -1, axis=0)):
+        normal = np.array([q[1] - p[1], p[0] - q[0]])
+        low, high = -local(p) @ normal, -local(q) @ normal
+        cut = [0, low / (low - high), 1] if low * high < 0 else [0, 1]
+        for a, b in zip(cut, cut[1:]):
+            for x, weight in zip(nodes, weights):
+                r = p + (q - p) * (a + (b - a) * (x + 1) / 2)
+                points.append((form * weight * (b - a) / 2 * max(0, -local(r) @ normal), r))
+    matrix, load = np.zeros((3, 3)), np.zeros(3)
+    for g, r in points:
+        j = np.array([[1, 0, -r[1]], [0, 1, r[0]]])
+        matrix += g * j.T @ j
+        load += g * j.T @ ref
+    return matrix, load
+
+
 def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
     """Each from the recorded velocities and the case's own numbers: the budget closes term by term, not in the sum alone."""
     case, r = balanced
-    names = "time body_vx body_vy body_yaw drag_force coriolis_force tilt_force current_x current_y wind_x wind_y".split()
-    t, vx, vy, yaw, drag, coriolis, tilt, *fluids = r.series(*names)
+    names = "time body_vx body_vy body_yaw_rate body_yaw drag_force coriolis_force tilt_force current_x current_y wind_x wind_y".split()
+    t, vx, vy, spin, yaw, drag, coriolis, tilt, *fluids = r.series(*names)
     water, air = case.get("water", {}), case.get("air", {})
     flow = np.array(fluids).reshape(2, 2, -1)
     tide = water.get("tide", {})
@@ -73,34 +117,41 @@ def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
     with h5py.File(r.dir / "result.h5") as f:
         area, height, outline = f["bodies/area"][0], f["bodies/height"][0], f["bodies/vertices"][:f["bodies/offsets"][1]]
     mass, draft = 1.5 * 900 * area * height, 0.5
-    u = np.array([vx, vy])
     prescribed = case["tow"].get("mode", "speed") == "speed"
-    start = np.array([[case["body"].get("vx", 0), 0]] + list(u.T[:-1])).T
+    u = np.array([vx, vy, spin])
+    start = np.column_stack([[case["body"].get("vx", 0), 0, 0], u[:, :-1]])
     before = np.concatenate([[0], yaw[:-1]])
-    want = np.zeros_like(u)
-    # The coefficient is that of the speed at the start of the step (of the prescribed speed itself), the velocity that at its end.
-    for k in range(len(t)):
-        for ref, skin, form in ((flow[0, :, k], 1027 * 5e-4 * area, 0.5 * 1027 * 0.85 * draft),
-                                (flow[1, :, k], 1.29 * 2.5e-4 * area, 0.5 * 1.29 * 0.4 * (height - draft))):
-            rel = ref - (u if prescribed else start)[:, k]
-            speed = np.hypot(*rel)
-            if speed > 0:
-                c, s = np.cos(before[k]), np.sin(before[k])
-                width = np.ptp(outline @ np.array([[c, s], [-s, c]]) @ [-rel[1], rel[0]]) / speed
-                want[:, k] += (skin + form * width) * speed * (ref - u[:, k])
-    scale = np.abs(want).max()
-    np.testing.assert_allclose(drag, -(along @ want), atol=1e-9 * scale)
 
     right = 1 if case["domain"].get("frame") == "geographic" else -1
     f = right * 2 * 7.292115e-5 * np.sin(np.radians(water.get("latitude", 0)))
-    spin = np.array([[0, -f], [f, 0]])
-    moving = u if prescribed else start
+    gyre = np.array([[0, -f], [f, 0]])
+    moving = (u if prescribed else start)[:2]
     slope = water.get("tilt", "none")
     here, last = current(t - 0.05), current(np.maximum(t - 0.15, 0))
-    push = {"none": np.zeros_like(u), "slope": np.full_like(u, 0) + np.array([[-9.81 * water.get("slope_x", 0)], [0]]),
-            "geostrophic": -spin @ here, "dynamic": -spin @ last + (here - last) / 0.1}[slope]
+    # Added mass takes no part in Coriolis and slope (a third of the whole here), but goes along with water that is accelerated.
+    push = {"none": np.zeros_like(moving), "slope": np.zeros_like(moving) + np.array([[-9.81 * water.get("slope_x", 0)], [0]]) / 1.5,
+            "geostrophic": -gyre @ here / 1.5, "dynamic": -gyre @ last / 1.5 + (here - last) / 0.1}[slope]
+    want = np.zeros_like(moving)
+    inertia = np.diag([mass, mass, mass * moment(outline) / area])
+    # The coefficient is that of the speed at the start of the step (of the prescribed speed itself), the velocity that at its end; what couples
+    # turning and drift, that of the body without contacts and line.
+    for k in range(len(t)):
+        at = (u if prescribed else start)[:, k]
+        matrix, load = outline_drag(outline, before[k], at, flow[0, :, k], 1027 * 5e-4 * area, 0.5 * 1027 * 0.85 * draft)
+        of_air = outline_drag(outline, before[k], at, flow[1, :, k], 1.29 * 2.5e-4 * area, 0.5 * 1.29 * 0.4 * (height - draft))
+        matrix, load = matrix + of_air[0], load + of_air[1]
+        matrix[2, 2] += (1027 * 5e-4 + 1.29 * 2.5e-4) * cubic(outline) * abs(at[2])
+        force = load - matrix @ u[:, k]
+        if not prescribed:
+            turned = at + 0.1 * np.append(push[:, k] + gyre @ at[:2] / 1.5, 0)
+            free = np.linalg.solve(inertia + 0.1 * matrix, inertia @ turned + 0.1 * load)
+            force += (matrix - np.diag(np.diag(matrix))) @ (u[:, k] - free)
+        want[:, k] = force[:2]
+    scale = np.abs(want).max()
+    np.testing.assert_allclose(drag, -(along @ want), atol=1e-9 * scale)
+
     # The rotation by f dt is that force but for f dt / 2 = 7e-6 of it.
-    np.testing.assert_allclose(coriolis, -mass * (along @ spin @ moving), atol=1e-5 * mass * abs(f) * 0.5)
+    np.testing.assert_allclose(coriolis, -mass / 1.5 * (along @ gyre @ moving), atol=1e-5 * mass * abs(f) * 0.5)
     np.testing.assert_allclose(tilt, -mass * (along @ push), atol=1e-5 * mass * abs(f) * 0.5 + 1e-12 * mass)
     # A body that is led along a straight line has its Coriolis force across.
     assert (np.abs(coriolis).max() > 0) == (f != 0 and not prescribed) and (np.abs(tilt).max() > 0) == (slope != "none")

@@ -9,7 +9,7 @@ import pytest
 from harness import CASE, DONE, TOW, USAGE, call, changed, run, write_case
 
 G = 9.81
-KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
+KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "ships_in_pack_ice", "open_water_drag")
 BERG = {
     "run": {"dt": 5, "duration": 1000},
     "domain": {"frame": "geographic", "length": 5000, "width": 2000},
@@ -35,6 +35,7 @@ def by_formula(a, h, w, v, r, e, rho=910.0, rho_w=1027.0, p_star=20e3, p_s=13e3,
         "marchenko_rafting": kappa * 0.5 * rho * (1 - rho / rho_w) * G * h * h * a * w,
         "marchenko_momentum": rho * h * w * v * v * a * phi / (phi - a) if a < phi else None,
         "dilute_limit": 4 / 3 * (1 + e) * a * rho * h * (w / 2 + r) * v * v,
+        "ships_in_pack_ice": 0.5 * 16.1 * (v / math.sqrt(G * h * a)) ** -1.7937 * rho * w * h * v * v * a**3 if a else 0.0,
     }
 
 
@@ -60,9 +61,19 @@ def test_curves_are_the_estimates_over_the_concentration(tmp_path):
             elif min(abs(a - 0.15), abs(a - 0.9)) > 1e-9:  # the grid is printed with 7 digits
                 assert x == pytest.approx(y, rel=2e-6, abs=1e-12), (name, a)
     assert curves["valid_range"] == {"lichey_hellmer": [0.01, 0.98], "marchenko_compaction": [0.65, 0.98], "marchenko_rafting": [0.65, 0.98],
-                                     "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "open_water_drag": [0.01, 0.98]}
+                                     "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "ships_in_pack_ice": [None, None], "open_water_drag": [0.01, 0.98]}
     jump = grid.tolist().index(0.9)
     assert curves["lichey_hellmer"][jump] > 10 * curves["lichey_hellmer"][jump - 1] > 0
+
+
+def test_a_ship_is_what_the_regression_of_ships_is_for(tmp_path):
+    """Blunt and slender hull by their constants; a berg is an extrapolation, and a run is not held against it."""
+    berg, ship = (estimate(tmp_path, changed(BERG, body__shape=shape))["ships_in_pack_ice"] for shape in ("rectangle", "ship"))
+    froude = 0.5 / math.sqrt(G * 0.8)
+    slender = 0.5 * 4.4 * froude**-0.8267 * 910 * 60 * 0.25 * 0.8**2
+    assert berg["low_n"] == pytest.approx(slender) and berg["high_n"] == berg["force_n"] == pytest.approx(0.5 * 16.1 * froude**-1.7937 * 910 * 60 * 0.25 * 0.8**3)
+    assert not berg["valid"] and berg["note"].startswith("extrapolated") and ship["valid"] and ship["compares"] and not berg["compares"]
+    assert "PolarRoute" in ship["source"] and ship["force_n"] == pytest.approx(berg["force_n"])
 
 
 def test_a_table_for_readers(tmp_path):
@@ -103,6 +114,13 @@ def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
     assert found["open_water_drag"]["simulated_over_estimate"] is None
     for word in ("Lichey-Hellmer", "Marchenko, momentum", "open-water drag"):
         assert word in r.result.stdout
+    # The printed ratio is one to estimates that know the concentration, within their range.
+    assert {name for name in KINDS if found[name]["compares"]} == {"marchenko_momentum"}
+    lines = {name: next(line for line in r.result.stdout.splitlines() if line.strip().startswith(name)) for name in
+             ("Lichey-Hellmer", "Marchenko, momentum", "dilute limit", "ships in pack ice")}
+    assert f" {mean / want['marchenko_momentum']:.3g} " in lines["Marchenko, momentum"] and "extrapolated" in lines["ships in pack ice"]
+    for name in ("Lichey-Hellmer", "dilute limit", "ships in pack ice"):
+        assert " - " in lines[name], lines[name]
     drift = run(tmp_path, changed(TOW, tow={"mode": "none"}, water__current_x=0.1), name="drift")
     assert drift.summary["estimates"]["lichey_hellmer"]["force_n"] is None and "Lichey" not in drift.result.stdout
     nobody = run(tmp_path, changed(TOW, body={"shape": "none"}, tow={}), name="nobody")

@@ -227,7 +227,7 @@ def test_colours_by_speed_and_by_force(page, tow):
     assert 0.1 * top < force[frame, floe] < 0.3 * top
     still = int(np.argmax(clear[frame] & (force[frame] == 0)))
     seek(page, int(frame))
-    want = 255 * np.array(style.SPEED_MAP(min(1, speed[frame, floe] / 0.13))[:3])
+    want = 255 * np.array(style.SPEED_MAP(min(1.0, speed[frame, floe] / 0.13))[:3])
     assert np.abs(np.array(pixel(page, int(floe))) - want).max() < 9
     Select(page.find_element("id", "replay-colour")).select_by_visible_text("contact force")
     seek(page, int(frame))

@@ -54,8 +54,8 @@ TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
 # Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
 CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
-# A ring of tiles in packed ice: many lists, and rounds over a part of them.
-RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal"})
+# A ring of tiles in packed ice: many lists, and rounds over a part of them. From rest: what drifts as a whole gives no rank more to do than another.
+RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal", "start": "rest"})
 CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH, "ring": RING}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
 PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
@@ -109,7 +109,7 @@ def test_the_cases_show_what_they_are_for(alone, name):
         area = r.dataset("/floes/area")
         assert area.max() > 15 * area.min()
     if name == "crush":
-        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.5, r.summary
+        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.6, r.summary
     if name == "round":
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 

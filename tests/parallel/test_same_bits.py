@@ -147,9 +147,10 @@ def test_sampling_and_frames_do_not_touch_the_state(tmp_path):
 def test_the_hash_sees_the_last_bit(tmp_path):
     """A hash that ignored something would make every test above pass."""
     base = run(tmp_path, changed(HAND, run__duration=0.1), name="base").hash
-    # A few bits more of a velocity are too little to change the pose in one step: the hash must see both.
+    # A few bits more of a velocity are too little to change the pose in one step: the hash must see both. One bit more of x = 2 is, too: x + 0.036 lies half-way
+    # between two numbers, and both are rounded to the same even one.
     nudged = []
-    for key, value in (("x", 2 * (1 + 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 50 * (1 + 2e-16)), ("vx", 0.37 * (1 + 1e-15)), ("yaw_rate", 7 * (1 + 1e-15))):
+    for key, value in (("x", 2 * (1 - 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 50 * (1 + 2e-16)), ("vx", 0.37 * (1 + 1e-15)), ("yaw_rate", 7 * (1 + 1e-15))):
         case = changed(HAND, run__duration=0.1)
         case["floes"][0][key] = value
         assert value != HAND["floes"][0][key]
