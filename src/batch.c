@@ -23,7 +23,6 @@ typedef struct bt_batch {
     int n;
 } bt_batch;
 
-#pragma GCC diagnostic ignored "-Wpsabi" // how vectors are handed to functions: here all of those are inlined
 // One copy for each instruction set that the program is built for, chosen when it starts.
 #if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
 #define FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
