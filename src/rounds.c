@@ -68,6 +68,24 @@ static void mark_block(bt_tiles *t, int32_t x, int32_t y, double listed)
     }
 }
 
+/// Tell the value of each tile that has work, 1 or 0, to `take`, which spreads it to the tiles around; on all ranks. Collective.
+static void spread(bt_world *w, double (*value_of)(const bt_tile *tile), bt_take_tile *take)
+{
+    bt_tiles *t = w->tiles;
+    double *value = w->domain ? bt_alloc((size_t)t->n, sizeof *value) : NULL;
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_idx k = t->order[i];
+        const double x = value_of(&t->tile[k]);
+        if (value) value[k] = x;
+        if (k < t->n - 1) take(t, t->tile[k].x, t->tile[k].y, x);
+    }
+    if (value) bt_domain_tell_tiles(w, value, take);
+    free(value);
+}
+
+static double has_list(const bt_tile *tile) { return tile->n_list > 0; }
+static double is_bad(const bt_tile *tile) { return tile->bad; }
+
 /// Mark the tiles whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body always. Exactly
 /// these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the marks must not depend on ranks. Collective.
 static void mark_swept(bt_world *w)
@@ -75,20 +93,13 @@ static void mark_swept(bt_world *w)
     bt_tiles *t = w->tiles;
     const bt_idx last = t->n - 1;
     const bt_tile *large = &t->tile[last];
-    double *listed = bt_alloc((size_t)t->n, sizeof *listed);
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
         if (k == last) continue;
         t->tile[k].still = !t->tile[k].swept;
         t->tile[k].swept = false;
     }
-    for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_idx k = t->order[i];
-        listed[k] = t->tile[k].n_list > 0;
-        if (k < last) mark_block(t, t->tile[k].x, t->tile[k].y, listed[k]);
-    }
-    bt_domain_tell_tiles(w, listed, mark_block);
-    free(listed);
+    spread(w, has_list, mark_block);
     t->tile[last].swept = large->own;
     for (bt_idx j = 0; large->own && j < large->n_units; j++) {
         mark_tile_of(w, large->units[j].a);
@@ -135,15 +146,8 @@ static void keep_beside(bt_tiles *t, int32_t x, int32_t y, double bad)
 static void keep_near_bad(bt_world *w)
 {
     bt_tiles *t = w->tiles;
-    double *bad = bt_alloc((size_t)t->n, sizeof *bad);
-    for (bt_idx k = 0; k < t->n; k++) t->tile[k].kept = k == t->n - 1;
-    for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_idx k = t->order[i];
-        bad[k] = t->tile[k].bad;
-        if (k < t->n - 1) keep_beside(t, t->tile[k].x, t->tile[k].y, bad[k]);
-    }
-    bt_domain_tell_tiles(w, bad, keep_beside);
-    free(bad);
+    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].kept = t->order[i] == t->n - 1;
+    spread(w, is_bad, keep_beside);
     for (bt_idx i = 0; i < t->n_order; i++)
         if (!t->tile[t->order[i]].kept) t->tile[t->order[i]].n_list = 0;
     lists_are_new(w);
