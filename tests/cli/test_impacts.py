@@ -116,7 +116,7 @@ def test_a_long_run_that_was_killed_counts_the_same(tmp_path):
     case = changed(FOUND, run__dt=0.0025, ice__concentration=0.2, output={"panels": True, "checkpoint_steps": 1500, "frame_interval": 60})
     r = run(tmp_path, case, "--quiet", "--threads", 1)
     start = assert_counted_over_the_window(r)
-    assert r.summary["n_steps"] == 24000 and 2 < start < 25
+    assert r.summary["n_steps"] == 24000 and 2 < start < 30
     steps = []
     for seconds in (0.7, 1.0, 1.3, 1.6, 0.4, 0.4):
         killed_after(seconds, 1, *(("resume", "cut") if steps else ("run", "case.yml", "-o", "cut")), "--quiet", "--threads", 1, cwd=tmp_path)
