@@ -69,3 +69,90 @@ def test_overlap_falls_faster_than_the_step(tmp_path):
         assert all(r.summary["unconverged_steps"] == 0 for r in runs)
         deepest.append(np.mean([r.summary["max_overlap_relative"] for r in runs]))
     assert deepest[0] > 0.007 and deepest[1] < 0.5 * deepest[0]
+
+
+def test_what_is_recorded(alone):
+    _, r, name = alone
+    w, n = r.summary["moving_window"], r.summary["n_floes"]
+    x, renewed, waiting, body = r.series("window_x", "window_renewed", "window_waiting", "body_x")
+    assert renewed.sum() == w["renewed"] and waiting[-1] == w["waiting"] and x[-1] == w["x_m"]
+    # The body keeps its place, within a stride (no more than two floes).
+    front = x + 26 - body if name == "speed" else body - x
+    assert np.all(front[50:] > w["ahead_m"] - 2) and np.all(front < w["ahead_m"] + 3)
+    # Every place that the front has reached was taken or missed; every floe that fell behind was renewed or kept. The field drifts along x.
+    places = (w["laps"] + (w["ice_drift_x_m"] / 26 if name == "line" else 0)) * n
+    assert abs(w["renewed"] + w["missed"] - places) < 0.15 * n
+    assert abs(w["renewed"] + w["kept"] - places) < 0.15 * n
+    # A step keeps the normal that it found, and floes turn and slide by up to s = V dt = 0.1 m meanwhile, which leaves overlap of the order of s^2 / size: 0.01
+    # at the body's speed, more where a floe is thrown aside faster. Eight fields of the scene on a line have 0.0085 to 0.0212, none of them where a floe
+    # was renewed; that it goes with dt^2 is shown below. So this is a limit on these two fields, and not one of the method.
+    assert r.summary["max_overlap_relative"] < 0.02
+    assert r.summary["momentum_residual"] < 1e-9
+    assert warned(r, "gone [12]\\.[0-9]+ times its length")
+    assert "moving window" in run(r.dir.parent, CASES[name], "--steps", 3, name="short").result.stdout
+
+
+def test_open_water_does_not_see_it(tmp_path):
+    bare = changed(TOW, ice__concentration=0, body__x=6, run__duration=150, tow__ramp=3)
+    still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
+    assert moving.summary["moving_window"]["laps"] > 1 and still.summary["moving_window"] is None
+    assert differing(still.dir / "result.h5", moving.dir / "result.h5",
+                     but=("/case", "/case_as_given", "/series/window_x", "/series/window_renewed", "/series/window_waiting")) == []
+
+
+def test_no_lap_no_difference(tmp_path):
+    """What is renewed is far from the body: at first the force is that in a periodic domain, but for the order of the contacts, within the
+    tolerance of the solver."""
+    bare = changed(TOW, body__x=6, domain__sides="periodic", domain__length=30, run__duration=15, solver={"tolerance": 1e-8, "max_sweeps": 5000})
+    still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
+    assert moving.summary["moving_window"]["renewed"] > 3
+    assert moving.series("ice_resistance").max() > 0
+    np.testing.assert_allclose(still.series("ice_resistance"), moving.series("ice_resistance"), rtol=1e-4, atol=1e-4)
+
+
+def test_the_resolved_case_is_the_same_case(tmp_path):
+    case = changed(LINE, run__duration=20)
+    first = run(tmp_path, case, name="first")
+    again = run(tmp_path, first.dir / "case.resolved.yml", name="again")
+    assert first.hash == again.hash and first.summary["moving_window"]["renewed"] > 0
+    # Without moving ends the resolved file is a valid case, too, though it has every key.
+    still = run(tmp_path, changed(TOW, run__duration=1), name="still")
+    assert run(tmp_path, still.dir / "case.resolved.yml", name="still again").hash == still.hash
+
+
+def test_defaults(tmp_path):
+    """The body stands where domain.ahead says, domain.ahead is where the body stands, and in the geographic frame the window lies about it."""
+    def check(**changes):
+        r = run(tmp_path, changed(SPEED, run__duration=0.2, **changes), "--force", name="d")
+        return r.series("body_x")[0], r.series("window_x")[0], r.summary["moving_window"]["ahead_m"]
+
+    np.testing.assert_allclose(check(), (10.4, 0, 15.6), atol=0.1)
+    np.testing.assert_allclose(check(domain__ahead=12), (14, 0, 12), atol=0.1)
+    np.testing.assert_allclose(check(body__x=9), (9, 0, 17), atol=0.1)
+    np.testing.assert_allclose(check(tow__direction=180), (15.6, 0, 15.6), atol=0.1)
+    np.testing.assert_allclose(check(body__x=9, domain__ahead=12), (9, -5, 12), atol=0.1)
+    np.testing.assert_allclose(check(domain__frame="geographic"), (0, -10.4, 15.6), atol=0.1)
+    np.testing.assert_allclose(check(domain__frame="geographic", tow__direction=180), (0, -15.6, 15.6), atol=0.1)
+
+
+@pytest.mark.parametrize("changes, text", [
+    ({"tow": {"mode": "none"}}, "domain.ends: moving follows a body that is towed"),
+    ({"body": {"shape": "none"}, "tow": None}, "domain.ends: moving follows a body that is towed"),
+    ({"tow__direction": 80}, "tow.direction: 80 deg: a moving window goes along x"),
+    ({"water": {"current_x": 0.9}}, "water.current_x: 0.9 m/s carries the ice along"),
+    ({"domain__ahead": 4}, "domain.ahead: 4 m of the 26 m"),
+    ({"domain__ahead": 22}, "domain.ahead: 22 m of the 26 m"),
+    ({"domain__sides": "wall", "domain__sides_closing": 0.01}, "domain.sides_closing: 0.01 m/s: closing walls"),
+    ({"domain__ends": "wall", "domain__ahead": 3}, "domain.ahead: 3 m has no effect without domain.ends: moving"),
+    ({"domain__sides": "moving"}, "domain.sides"),
+    ({"floes": [{"shape": "disc", "length": 0.5, "x": 3, "y": 9, "fixed": True}], "ice__concentration": 0.1}, "cannot take floes[0] along"),
+])
+def test_refused(tmp_path, changes, text):
+    result = run(tmp_path, changed(SPEED, **changes), code=CASE).result
+    assert text in result.stderr, result.stderr
+
+
+def test_check_tells(tmp_path):
+    run(tmp_path, changed(SPEED, run__duration=0.2))
+    result = call("check", tmp_path / "case.yml")
+    assert result.returncode == DONE and "moving window        the body keeps 15.6 m from its front" in result.stdout
