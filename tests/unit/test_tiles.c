@@ -154,8 +154,7 @@ static void check_busy(const bt_tiles *t)
     assert_int_equal(n, t->n_busy);
 }
 
-// Red: a tile that contacts wake left out of the list, or awake no more when a step is detected again; old marks of the sweeps in a tile that comes back;
-// a pair left out of the near ones while it may close.
+// Red: a tile that contacts wake left out of the list; an awake tile that leaves it; a pair left out of the near ones while it may close.
 static void a_step_looks_at_busy_tiles_alone(void **state)
 {
     (void)state;
