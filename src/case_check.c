@@ -256,6 +256,8 @@ static void check_sizes(const check *k)
     if (sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
         fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
               BT_LEAST_THICKNESS);
+    if (sound(k, "ice.density water.density") && c->ice.density > c->water.density)
+        fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
     if (sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
         fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water", c->ice.concentration,

@@ -56,6 +56,8 @@ TEXTS = {
     "infinity": (GOOD + "tow: {speed: .inf}\n", 'bad.yml:5: tow.speed: ".inf" is not a number'),
     "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
     "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"), "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
+    "ice that sinks": (GOOD.replace("size: 1", "density: 1000") + "water: {density: 900}\n", "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3",
+                       "correct one"),
     "concentration above one": (GOOD.replace("0.3", "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
     "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed", "m/s"),
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
