@@ -14,6 +14,7 @@ HEAVY = {
     "run": {"dt": 1, "duration": 20},
     "domain": {"length": 1e6, "width": 1e6, "ends": "open", "sides": "open"},
     "ice": {"concentration": 0, "density": 1100, "added_mass": 10, "size": 1e5},
+    "water": {"density": 1100},
     "body": {"shape": "none"},
     "floes": [{"shape": "disc", "length": 1e5, "x": 3e5, "y": 0, "thickness": 100, "vx": 100}],
 }
