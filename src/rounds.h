@@ -30,7 +30,7 @@
 // are added in 128-bit fixed point (bergtow/sum.h). So every decision is the same for any number of threads and ranks.
 //
 // Rejected: Anderson acceleration around the sweep, over all units or the listed ones (0.6 to 1.8 times the time of the plain sweep in
-// dense ice; histories of 240 B a contact and 96 B a floe, against 24 and 32 here); over-relaxation (1.3 helps without momentum and hurts with it);
+// dense ice; histories of 240 B a contact and 96 B a floe, against 72 a listed contact, 24 a contact and 32 a floe here); over-relaxation (1.3 helps without momentum and hurts with it);
 // momentum with a step of its own for each tile or unit; sweeps in alternating direction; proximal Newton steps over the listed units (M + Jᵀ D J of the
 // velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which a handful of contacts is left, but where a
 // wedge drives its impulses up over thousands of sweeps a Newton step takes as long as a hundred sweeps and the wedge needs as many steps as contacts

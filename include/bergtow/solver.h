@@ -10,7 +10,8 @@
 // Data flow of a step. units (bt_tile.units, with the impulses of the last step) and vel_free -> vel -> look -> lists -> sweeps -> vel, units:
 //   look     reads all units and vel; writes bt_tile.list (units that bear load or close), the residual, and what is bad;
 //   sweep    goes over the lists only, inner_sweeps times a tile before the next has its turn: its data are then in the first-level cache, and
-//            between ranks nothing need be exchanged. It touches listed units, vel and inv, and 24 B of bt_tile.before a unit;
+//            between ranks nothing need be exchanged. The listed units are packed for it, four a batch, and their impulses put back
+//            before the next look (src/batch.h); those of large bodies and with bounds are swept where they are;
 //   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
 //   settle   at the end: vel anew from vel_free and the impulses, then a look: the residual that is reported.
 // Rounds of sweeps, momentum, what ends them and what they may cost: src/rounds.h. The position projection is the same, with displacements in
