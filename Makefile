@@ -17,9 +17,9 @@ HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
 
 # -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler, for any processor. So the program is built for every x86-64
-# (and ARM): src/batch.c alone, where the time goes, is translated for AVX2 as well.
+# (and ARM): src/solve/batch.c alone, where the time goes, is translated for AVX2 as well.
 # -Wno-psabi: how vectors of four are handed to functions is of no matter where all of those are inlined.
-BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -Ipartition -MMD -MP -ffp-contract=off -fno-math-errno \
+BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -MMD -MP -ffp-contract=off -fno-math-errno \
           -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
@@ -40,8 +40,8 @@ LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
-LIB_SRC := $(filter-out src/main.c $(wildcard src/cmd_*.c),$(wildcard src/*.c partition/*.c))
-BIN_SRC := src/main.c $(wildcard src/cmd_*.c)
+BIN_SRC := $(wildcard src/app/*.c)
+LIB_SRC := $(filter-out $(BIN_SRC),$(wildcard src/*/*.c partition/*.c))
 LIB_OBJ := $(LIB_SRC:%.c=$(BUILD)/%.o)
 BIN_OBJ := $(BIN_SRC:%.c=$(BUILD)/%.o)
 TEST_SRC := $(wildcard tests/unit/test_*.c tests/physics/test_*.c)

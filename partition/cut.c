@@ -12,14 +12,14 @@
 //   4. Labels of a new cut are exchanged so that little moves: the (new part, old part) overlaps in falling order, each taken
 //      if both are free. Such a matching keeps at least half of the weight that the best one would. The best (Hungarian
 //      method) costs n_parts³, 7·10¹⁰ operations at 4,096 parts, against n log n here with n tiles.
-#include "cut.h"
+#include "partition/cut.h"
 
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/base.h"
-#include "cut_method.h"
+#include "partition/cut_method.h"
 
 static const double KEEP = 1.25;  // what the old labels may be worse by
 static const double CLOSE = 1.1;  // imbalances within this factor of the best count as equal when none is within the tolerance

@@ -3,7 +3,7 @@
 #ifndef BT_CUT_METHOD_H
 #define BT_CUT_METHOD_H
 
-#include "cut.h"
+#include "partition/cut.h"
 
 /// Cut by METIS. false: it failed, left a part empty or wrote a label out of range; part then holds nothing of use.
 /// n_parts >= 2, g->n > n_parts, weights not all zero.

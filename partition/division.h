@@ -4,10 +4,10 @@
 #define BERGTOW_DIVISION_H
 
 #include "bergtow/comm.h"
-#include "bergtow/contacts.h"
-#include "bergtow/solver.h"
-#include "domain.h"
-#include "pairs.h"
+#include "contact/contacts.h"
+#include "solve/solver.h"
+#include "partition/domain.h"
+#include "space/pairs.h"
 
 /// What is exchanged with one other rank.
 typedef struct bt_link {

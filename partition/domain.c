@@ -3,14 +3,14 @@
 //
 // Work of a tile, modelled from counts rather than timed, so that a run can be repeated: what a unit, a pair and a body
 // cost in a step. Timing single tiles costs more than it tells, and noise would move tiles to and fro.
-#include "domain.h"
+#include "partition/domain.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "cut.h"
-#include "division.h"
+#include "partition/cut.h"
+#include "partition/division.h"
 
 #define IMBALANCE 0.05 // of the work, above which tiles are dealt anew
 #define TOLERANCE 0.01 // asked of the cut

@@ -4,9 +4,9 @@
 #define BERGTOW_DOMAIN_H
 
 #include "bergtow/comm.h"
-#include "bergtow/tiles.h"
+#include "space/tiles.h"
 #include "bergtow/world.h"
-#include "phases.h"
+#include "space/phases.h"
 
 typedef struct bt_domain bt_domain;
 

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "division.h"
-#include "domain.h"
+#include "partition/division.h"
+#include "partition/domain.h"
 
 enum { TAG_FLAGS = 10, TAG_TILES = 11, TAG_VELOCITIES = 20 };
 

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "division.h"
-#include "domain.h"
+#include "partition/division.h"
+#include "partition/domain.h"
 
 /// Bytes for every rank.
 typedef struct {

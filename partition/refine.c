@@ -8,7 +8,7 @@
 // ten tiles a part it stops with slopes of one tile a part over the whole field.
 // Cut. A vertex goes to the neighbour part that it has more edges with, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
-#include "cut_method.h"
+#include "partition/cut_method.h"
 
 #include <stdlib.h>
 

@@ -5,9 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "bergtow/tow.h"
-#include "division.h"
-#include "domain.h"
+#include "tow/tow.h"
+#include "partition/division.h"
+#include "partition/domain.h"
 
 void bt_domain_settle(bt_world *w)
 {

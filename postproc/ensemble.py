@@ -24,7 +24,7 @@ import numpy as np
 
 ESTIMATES = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
 LEAST_DRIFT = 5  # fields
-MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/steady.h
+MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/output/steady.h
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
 
 

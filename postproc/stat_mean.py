@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The interval is that of the program (src/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or three,
+Within a run. The interval is that of the program (src/base/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or three,
 the larger, is n var(mean), and Student's t has 3 degrees of freedom [after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
 autoregression through batch means.
 
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-BATCHES = 96         # as in src/stats.c, and the next three
+BATCHES = 96         # as in src/base/stats.c, and the next three
 WAVES = (2, 3)
 FREEDOM = 3.0
 LEAST_CORRELATED = 12

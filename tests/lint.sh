@@ -36,7 +36,7 @@ if have shellcheck; then shellcheck $(files '*.sh' .ci/run) || complain "shellch
 if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
 if have cppcheck; then
     cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" --suppressions-list=tests/cppcheck.supp \
-        --suppress=missingIncludeSystem -Iinclude -Isrc -Ipartition -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
+        --suppress=missingIncludeSystem -Iinclude -Isrc -I. -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
         --template='{file}:{line}: {id}: {message}' src partition || complain "cppcheck: see above"
 fi
 exit $bad

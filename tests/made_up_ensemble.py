@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An ensemble's folder with numbers of the test's own, of the layout that src/ensemble_file.c writes."""
+"""An ensemble's folder with numbers of the test's own, of the layout that src/run/ensemble_file.c writes."""
 import json
 import sys
 from pathlib import Path
@@ -59,7 +59,7 @@ def write_member(folder, m):
 
 
 def seal(path, kind="ensemble 1"):
-    """The seal of a file with room for one, as src/seal.h has it."""
+    """The seal of a file with room for one, as src/base/seal.h has it."""
     raw = path.read_bytes()
     text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw[soundness.SEAL_BYTES:])}\n".encode()
     path.write_bytes(text.ljust(soundness.SEAL_BYTES, b"\0") + raw[soundness.SEAL_BYTES:])

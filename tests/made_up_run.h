@@ -16,7 +16,7 @@
 #include <cmocka.h>
 #include <hdf5.h>
 
-#include "bergtow/record.h"
+#include "output/record.h"
 
 static char folder[64];
 

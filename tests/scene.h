@@ -13,12 +13,12 @@
 // cmocka.h wants the five above first
 #include <cmocka.h>
 
-#include "bergtow/contacts.h"
-#include "bergtow/tiles.h"
+#include "contact/contacts.h"
+#include "space/tiles.h"
 #include "bergtow/forces.h"
 #include "bergtow/shape.h"
-#include "bergtow/solver.h"
-#include "bergtow/tow.h"
+#include "solve/solver.h"
+#include "tow/tow.h"
 #include "bergtow/world.h"
 
 static inline bt_params scene_params(double dt, double size)

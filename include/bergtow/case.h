@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A case: everything a run depends on, as read from the YAML file, in SI units and radians.
 //
-// The schema table in src/schema.c is the one place that names each key with its unit, default, range and one
+// The schema table in src/case/schema.c is the one place that names each key with its unit, default, range and one
 // sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
 // holds the values. Choices are indices into the name lists of the schema.
 #ifndef BERGTOW_CASE_H
@@ -198,7 +198,7 @@ typedef struct bt_case {
         int64_t position_sweeps; ///< limit of the position projection
         double rest_speed;       ///< approach below this speed has no restitution, m/s
     } solver;
-    struct {                     ///< what ends a run, see src/guard.h; 0 or false = not looked at
+    struct {                     ///< what ends a run, see src/run/guard.h; 0 or false = not looked at
         double overlap;          ///< / mean floe size
         double energy;           ///< / what the case can drive the bodies to
         int64_t unconverged;     ///< steps in a row
@@ -257,7 +257,7 @@ char *bt_case_resolved(const bt_case *c);
 /// The same below comment lines of one's own. Caller frees.
 char *bt_case_text(const bt_case *c, const char *head);
 
-/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/froude.c): the twin moves alike in
+/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/case/froude.c): the twin moves alike in
 /// times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for keys that name files of numbers with a dimension.
 bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
 

@@ -6,12 +6,12 @@
 // what the division among ranks has cost, are those of the pieces. A run that is killed before its first checkpoint starts again from
 // case.resolved.yml, which is then also its case as given.
 //
-// The file. DIR/checkpoint.h5 is a sealed HDF5 file (src/seal.h) of named arrays (src/snapshot.h); rank 0 gathers and writes it. It is written
+// The file. DIR/checkpoint.h5 is a sealed HDF5 file (src/base/seal.h) of named arrays (src/base/snapshot.h); rank 0 gathers and writes it. It is written
 // as checkpoint.h5.tmp, brought to the disk, the one before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is
 // one that is whole. It holds the case as text with its tables of current and wind, and the ice field as made, with the lead in it: a
 // run that goes on reads no other file but DIR/result.h5, and makes no field. The number of format is part of the seal; another one is refused.
 //
-// What is state. Everything that steps carry on is in the tables of src/state.c, src/record_resume.c, src/impact_store.c and src/run_state.c; nothing
+// What is state. Everything that steps carry on is in the tables of src/output/state.c, src/output/record_resume.c, src/output/impact_store.c and src/run/run_state.c; nothing
 // else writes or reads it. Member by member, S saved, D derived from case and field by the same functions as in a fresh run, - of one step alone:
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
@@ -31,13 +31,13 @@
 //   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats
 //   bt_impacts        S open                       D rule, panels' places                         - touch, closed, collision, largest_push, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way               the entries and frames themselves: result.h5
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/panel_blocks.h)      the rows: result.h5
+//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)      the rows: result.h5
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field   D the rest
 //   bt_domain         not state: which rank owns what steers no bit
-//   random numbers    are keyed by seed, purpose and id (src/rng.h) and used by the field alone: there is no counter
+//   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: there is no counter
 //
 // That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c). What no step can leave is refused, under a sound
-// seal too (src/state_check.c).
+// seal too (src/output/state_check.c).
 #ifndef BERGTOW_CHECKPOINT_H
 #define BERGTOW_CHECKPOINT_H
 

@@ -7,7 +7,7 @@
 // for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
 // order, ranks, or how often the ensemble was stopped.
 //
-// Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest (src/ensemble_record.h). Each call
+// Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest (src/run/ensemble_record.h). Each call
 // reads them all and compares them, shared among its ranks, before it begins (as fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each
 // maker of ensemble.h5 what others have finished since. What is missing or damaged is told, taken away and run again; what the system does not let us read is left as it is,
 // told, and a hole. A call ends with 0 only when every member is finished and sound.

@@ -19,7 +19,7 @@
 //                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in PolarRoute, the route planner of the British
 //                    Antarctic Survey (class SDA, ice_resistance; antarctica/PolarRoute, 2022). A berg is taken as blunt, the range goes to slender. The
 //                    source gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says extrapolated
-//   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/forces.c computes; no ice resistance
+//   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no ice resistance
 //
 // Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
 //

@@ -53,7 +53,7 @@ bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err);
 /// The field of a case, made or read as it says (ice.field, ice.outlines). Errors: those of the function it calls.
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err);
 
-/// Floes of the case's GeoJSON file ice.outlines, positions [east, north] in what its crs says (src/geojson.c). Refused
+/// Floes of the case's GeoJSON file ice.outlines, positions [east, north] in what its crs says (src/field/geojson.c). Refused
 /// with the number of the feature, from 0: what is no polygon, has holes, too few or too many vertices, no area, edges
 /// that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body (both are
 /// named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.

@@ -23,7 +23,7 @@ typedef struct bt_run_options {
 } bt_run_options;
 
 /// Collective. Run a case. Errors, the same status on all ranks: BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL (a signal at any
-/// rank, the stop file, max_wall, see src/halt.h: what was computed is on disk, complete, marked as stopped, and can be taken up
+/// rank, the stop file, max_wall, see src/run/halt.h: what was computed is on disk, complete, marked as stopped, and can be taken up
 /// again). The case is the same on all ranks.
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err);
 

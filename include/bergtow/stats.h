@@ -24,7 +24,7 @@ typedef struct bt_trend {
 
 enum { BT_TREND_LEAST = 12 }; ///< samples below which no trend is looked for
 
-/// Mean, standard error and interval of x[n], spaced evenly. The method and its measured coverage: src/stats.c. Linear in n.
+/// Mean, standard error and interval of x[n], spaced evenly. The method and its measured coverage: src/base/stats.c. Linear in n.
 bt_mean bt_stats_mean(const double *x, int64_t n);
 
 /// Does the mean of x[n] drift? Least squares on batch means, with the correlation of what the line leaves. Linear in n.

@@ -224,7 +224,7 @@ extern const int bt_n_vertex_fields;
 /// Room for n bodies and n_vertices vertices.
 void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 
-/// One step Δt: forces, contacts, solve, advance; see src/step.c.
+/// One step Δt: forces, contacts, solve, advance; see src/step/step.c.
 void bt_world_step(bt_world *w);
 
 /// Bodies in each other at the present poses.

@@ -22,8 +22,8 @@
 #include <string.h>
 
 #include "bergtow/base.h"
-#include "cut.h"
-#include "cut_method.h"
+#include "partition/cut.h"
+#include "partition/cut_method.h"
 
 static const double DIAMETER = 30, CONCENTRATION = 0.8, JITTER = 0.3, REACH = 1.05, BERG = 100, TOLERANCE = 0.03;
 static const double POINTS = 2, WAKE = 4;

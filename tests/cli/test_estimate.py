@@ -128,7 +128,7 @@ def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
 
 
 def test_open_water_drag_is_what_a_tow_in_open_water_meets(tmp_path):
-    """The same law in src/forces.c and in the estimate, with a current at an angle, a body that is no disc, and the air taken away."""
+    """The same law in src/force/forces.c and in the estimate, with a current at an angle, a body that is no disc, and the air taken away."""
     case = changed(TOW, ice__concentration=0, body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20}, air__density=0,
                    water={"current_x": -0.05, "current_y": 0.04}, output__window_start=10)
     r = run(tmp_path, case)

@@ -7,12 +7,12 @@
 #include "bergtow/case.h"
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
-#include "bergtow/lead.h"
+#include "field/lead.h"
 #include "bergtow/setup.h"
-#include "bergtow/tiles.h"
+#include "space/tiles.h"
 #include "bergtow/world.h"
-#include "case_check.h"
-#include "domain.h"
+#include "case/case_check.h"
+#include "partition/domain.h"
 #include "fuzz.h"
 
 /// Files that a case names are left alone: what they hold is not part of the input.

@@ -13,12 +13,12 @@
 #include <unistd.h>
 
 #include "bergtow/checkpoint.h"
-#include "bergtow/impact.h"
-#include "bergtow/observe.h"
-#include "domain.h"
-#include "fileio.h"
+#include "loads/impact.h"
+#include "output/observe.h"
+#include "partition/domain.h"
+#include "base/fileio.h"
 #include "fuzz.h"
-#include "run_parts.h"
+#include "run/run_parts.h"
 
 static const struct { const char *text; int64_t steps; } bases[] = {
     {"run: {dt: 0.1, duration: 3}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.5, size: 1, thickness: 0.05, crushing: {pressure: 20 kPa}}\nbody: {x: 3, length: 1}\n"
@@ -235,7 +235,7 @@ static void step_on(bt_running *r)
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
 }
 
-/// As src/run.c does it, without the files. True when it was accepted.
+/// As src/run/run.c does it, without the files. True when it was accepted.
 static bool take_up_arrays(bt_snapshot *s)
 {
     bt_errors err = {0};

@@ -8,8 +8,8 @@
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 #include "fuzz.h"
-#include "ice_bounds.h"
-#include "largest.h"
+#include "case/ice_bounds.h"
+#include "base/largest.h"
 
 static bool prepare(bt_case *c, int how)
 {

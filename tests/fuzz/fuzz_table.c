@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "fuzz.h"
-#include "table.h"
+#include "base/table.h"
 
 void bt_fuzz_table(const uint8_t *data, size_t n)
 {

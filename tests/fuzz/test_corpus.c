@@ -9,7 +9,7 @@
 // cmocka.h wants the five above first
 #include <cmocka.h>
 
-#include "fileio.h"
+#include "base/fileio.h"
 #include "fuzz.h"
 
 static void replay(const char *name, void (*harness)(const uint8_t *, size_t), int least)

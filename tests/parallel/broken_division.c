@@ -9,10 +9,10 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "bergtow/contacts.h"
+#include "contact/contacts.h"
 #include "bergtow/shape.h"
-#include "division.h"
-#include "domain.h"
+#include "partition/division.h"
+#include "partition/domain.h"
 
 static bt_world *make_world(void)
 {

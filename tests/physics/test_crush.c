@@ -2,7 +2,7 @@
 // Crushing-limited contact against closed forms: creep at the limit force, stops, corners, friction, memory.
 #include "scene.h"
 
-#include "bergtow/crush.h"
+#include "contact/crush.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
 

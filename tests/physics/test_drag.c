@@ -2,8 +2,8 @@
 // added mass; free drift that stays.
 #include "scene.h"
 
-#include "bergtow/drift.h"
-#include "bergtow/window.h"
+#include "force/drift.h"
+#include "step/window.h"
 
 /// A convex outline of n corners on an ellipse, at random; vertices [2n].
 static void random_outline(uint64_t *rng, int n, double *v)

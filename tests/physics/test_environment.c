@@ -4,8 +4,8 @@
 
 #include <string.h>
 
-#include "bergtow/environment.h"
-#include "table.h"
+#include "force/environment.h"
+#include "base/table.h"
 
 static const double hour = 3600, deg = BT_PI / 180;
 

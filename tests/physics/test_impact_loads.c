@@ -2,8 +2,8 @@
 // Collisions and pushes on the towed body against closed forms: impulse, effective mass, peak, duration, panels.
 #include "scene.h"
 
-#include "bergtow/impact.h"
-#include "bergtow/observe.h"
+#include "loads/impact.h"
+#include "output/observe.h"
 
 static const double speed = 0.4, sheet = 910 * 0.5; // m/s; kg/m² of floes 0.5 m thick
 

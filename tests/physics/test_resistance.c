@@ -2,7 +2,7 @@
 // Resistance of broken ice in its two closed-form limits: dilute floes on a disc, and a plough that fills a channel.
 #include "scene.h"
 
-#include "bergtow/observe.h"
+#include "output/observe.h"
 
 static const double sheet = 36.4; // ρ_i h, kg/m²
 

@@ -3,8 +3,8 @@
 // rounding as in one long domain that holds the same field over and over.
 #include "scene.h"
 
-#include "bergtow/observe.h"
-#include "bergtow/window.h"
+#include "output/observe.h"
+#include "step/window.h"
 
 static const double sheet = 36.4; // ρ_i h, kg/m²
 

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <cmocka.h>
 
-#include "arch.h"
+#include "case/arch.h"
 
 /// A body of 4 × 2 m that is towed along x, in a domain of 40 m.
 static bt_case narrow(void)

@@ -5,8 +5,8 @@
 
 #include "scene.h"
 
-#include "batch.h"
-#include "kernel.h"
+#include "solve/batch.h"
+#include "solve/kernel.h"
 
 enum { BODIES = 60, UNITS = 230, LANES = 4 };
 

@@ -2,11 +2,11 @@
 // Case files: defaults, every error at once with its line, overrides, cross checks, and the resolved file.
 #include "bergtow/case.h"
 #include "bergtow/shape.h"
-#include "case_check.h"
-#include "largest.h"
-#include "schema.h"
-#include "suggest.h"
-#include "value.h"
+#include "case/case_check.h"
+#include "base/largest.h"
+#include "case/schema.h"
+#include "base/suggest.h"
+#include "case/value.h"
 
 #include <math.h>
 #include <setjmp.h>

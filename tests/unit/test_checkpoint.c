@@ -17,15 +17,15 @@
 #include <cmocka.h>
 
 #include "bergtow/checkpoint.h"
-#include "bergtow/impact.h"
-#include "bergtow/observe.h"
+#include "loads/impact.h"
+#include "output/observe.h"
 #include "bergtow/setup.h"
-#include "bergtow/tiles.h"
-#include "bergtow/tow.h"
-#include "bergtow/window.h"
-#include "seal.h"
-#include "snapshot.h"
-#include "state.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "step/window.h"
+#include "base/seal.h"
+#include "base/snapshot.h"
+#include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-checkpoint-XXXXXX";
 

@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
-#include "bergtow/record.h"
-#include "cost.h"
+#include "output/record.h"
+#include "case/cost.h"
 
 static bt_case a_case(void)
 {

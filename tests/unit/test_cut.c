@@ -13,8 +13,8 @@
 #include <unistd.h>
 
 #include "bergtow/base.h"
-#include "cut.h"
-#include "cut_method.h"
+#include "partition/cut.h"
+#include "partition/cut_method.h"
 
 // A grid of nx × ny tiles, neighbours right, up and right-up as in the sweep's 2 × 2 blocks.
 typedef struct grid {

@@ -14,7 +14,7 @@
 
 #include "bergtow/field.h"
 #include "bergtow/shape.h"
-#include "field_make.h"
+#include "field/field_make.h"
 
 // A basin of 36 m × 10 m with floes of 1 m and a disc of 2.5 m at (5, 0).
 static bt_case basin(void)

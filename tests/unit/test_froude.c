@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The Froude-scaled twin: exponents from dimensions, every key, exceptions, and the way back.
 #include "bergtow/case.h"
-#include "schema.h"
+#include "case/schema.h"
 
 #include <math.h>
 #include <setjmp.h>

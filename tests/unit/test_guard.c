@@ -5,13 +5,13 @@
 
 #include <stdio.h>
 
-#include "bergtow/contacts.h"
-#include "bergtow/impact.h"
-#include "bergtow/observe.h"
+#include "contact/contacts.h"
+#include "loads/impact.h"
+#include "output/observe.h"
 #include "bergtow/setup.h"
-#include "bergtow/tiles.h"
-#include "bergtow/window.h"
-#include "guard.h"
+#include "space/tiles.h"
+#include "step/window.h"
+#include "run/guard.h"
 
 static bt_world *two_floes(void)
 {

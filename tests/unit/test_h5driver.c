@@ -13,8 +13,8 @@
 
 #include <cmocka.h>
 
-#include "h5driver.h"
-#include "h5util.h"
+#include "base/h5driver.h"
+#include "base/h5util.h"
 #include "scene.h"
 
 enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 }; // 160 chunks: an index of three nodes, two of which have been divided

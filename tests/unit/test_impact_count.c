@@ -6,9 +6,9 @@
 // dropped; rows of a file not checked when it is taken up.
 #include "made_up_run.h"
 
-#include "impact_count.h"
-#include "panel_blocks.h"
-#include "snapshot.h"
+#include "loads/impact_count.h"
+#include "loads/panel_blocks.h"
+#include "base/snapshot.h"
 
 enum { PANELS = 3 };
 

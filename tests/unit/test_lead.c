@@ -12,7 +12,7 @@
 #include <cmocka.h>
 
 #include "bergtow/field.h"
-#include "bergtow/lead.h"
+#include "field/lead.h"
 #include "bergtow/shape.h"
 
 /// Convex floes all over 40 × 20 m, given by a seed; thickness differs from floe to floe.

@@ -2,8 +2,8 @@
 // One update of a manifold with bounded impulses against the definition, over random problems; and the windows of a stall.
 #include "scene.h"
 
-#include "bergtow/stall.h"
-#include "limit.h"
+#include "output/stall.h"
+#include "contact/limit.h"
 
 /// A unit between two free bodies with random arms; n points.
 static bt_unit random_unit(uint64_t *rng, int n, const bt_inv inv[2])

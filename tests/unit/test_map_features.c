@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "map_features.h"
+#include "field/map_features.h"
 
 static const char *const texts[] = {
     "{\"type\": \"FeatureCollection\", \"crs\": {\"features\": [1, 2]}, \"features\": [\n"

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "packing.h"
+#include "estimate/packing.h"
 
 /// A body of 4 x 2 m that is towed at 0.5 m/s along x from (10, 0), in a closed domain of 100 x 20 m.
 static bt_case closed(void)

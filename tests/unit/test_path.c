@@ -2,7 +2,7 @@
 // Paths through way-points: lengths, tangents, marks, and what is refused.
 #include "scene.h"
 
-#include "bergtow/path.h"
+#include "geometry/path.h"
 
 static double length_of(const bt_path *p, double way, double step)
 {

@@ -4,7 +4,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
-#include "phases.h"
+#include "space/phases.h"
 #include "scene.h"
 
 /// What a pass has done so far.

@@ -9,7 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "progress.h"
+#include "base/progress.h"
 
 static double now;
 static double test_clock(void) { return now; }

@@ -18,16 +18,16 @@
 #include <math.h>
 
 #include "bergtow/checkpoint.h"
-#include "bergtow/impact.h"
+#include "loads/impact.h"
 #include "bergtow/run.h"
 #include "bergtow/setup.h"
-#include "bergtow/tiles.h"
-#include "bergtow/window.h"
-#include "fileio.h"
-#include "h5read.h"
-#include "seal.h"
-#include "snapshot.h"
-#include "state.h"
+#include "space/tiles.h"
+#include "step/window.h"
+#include "base/fileio.h"
+#include "base/h5read.h"
+#include "base/seal.h"
+#include "base/snapshot.h"
+#include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-state-XXXXXX";
 

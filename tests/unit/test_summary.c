@@ -2,7 +2,7 @@
 // summary.json of made-up runs: its numbers against sums of the test's own, and a warning for each doubt.
 #include "made_up_run.h"
 
-#include "bergtow/window.h"
+#include "step/window.h"
 
 /// The text after "key": up to the end of the line, without a comma.
 static const char *json_value(const char *json, const char *key)

@@ -3,7 +3,7 @@
 // boxes of few tiles around a period, and floes of very different size.
 #include <sys/resource.h>
 
-#include "pairs.h"
+#include "space/pairs.h"
 #include "scene.h"
 
 enum { SIDE = 20 }; // floes along one side of the square fields

@@ -4,9 +4,9 @@
 
 #include <stdio.h>
 
-#include "bergtow/rope.h"
-#include "case_check.h"
-#include "setup_tow.h"
+#include "case/rope.h"
+#include "case/case_check.h"
+#include "run/setup_tow.h"
 
 static bt_case made(void)
 {

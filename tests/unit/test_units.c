@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Units: what is read, what is refused, and that writing keeps every bit.
-#include "units.h"
+#include "base/units.h"
 
 #include "bergtow/base.h"
 

@@ -3,7 +3,7 @@
 #include "scene.h"
 
 #include "bergtow/outline.h"
-#include "bergtow/window.h"
+#include "step/window.h"
 
 enum { LENGTH = 40, AHEAD = 16 }; // zone 8 m, stride 2 m, rear at first body − 24 m
 static const double speed = 0.5;

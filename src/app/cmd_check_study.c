@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: MIT
+// bergtow check of a study: the study, the case of each of its conditions, and what all of it costs.
+//
+// Members of a condition differ by the seed of their field alone, so the first stands for all.
+#include "field/lead.h"
+#include "bergtow/study.h"
+#include "app/cmd_check.h"
+#include "case/cost.h"
+#include "base/fileio.h"
+#include "base/largest.h"
+#include "base/tree.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum {
+    MOST_ROWS = 24,   // conditions that are printed one by one
+    MOST_LISTED = 16, // values of a parameter that are printed
+    CELL = 48,
+};
+
+// Of the first member of a condition.
+typedef struct {
+    double floes, steps, seconds, memory, disk; // number, number, s of one core, B, B
+    bool step_good;
+    int warnings;
+} numbers;
+
+typedef struct {
+    char *text;
+    int64_t first, count; // conditions
+} fault;
+
+typedef struct {
+    fault *list;
+    size_t n;
+} faults;
+
+bool bt_check_is_study(const char *path)
+{
+    struct stat st;
+    char *text = NULL;
+    size_t size;
+    bt_errors unheard = {0};
+    bool found = false;
+    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) && bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
+        bt_node *root = bt_tree_parse(text, size, path, &unheard);
+        found = bt_tree_has(root, "base");
+        bt_tree_free(root);
+    }
+    free(text);
+    bt_errors_free(&unheard);
+    return found;
+}
+
+// --- faults: what is wrong with many conditions is told once ---------------------------------------------------------
+
+static void take_faults(faults *f, int64_t condition, bt_errors *err)
+{
+    for (size_t i = 0; i < err->n; i++) {
+        size_t k = 0;
+        while (k < f->n && strcmp(f->list[k].text, err->text[i])) k++;
+        if (k == f->n) {
+            f->list = bt_realloc(f->list, f->n + 1, sizeof *f->list);
+            f->list[f->n++] = (fault){strdup(err->text[i]), condition, 0};
+        }
+        f->list[k].count++;
+    }
+    bt_errors_free(err);
+}
+
+static void tell_faults(faults *f, const bt_study *s, bt_errors *err)
+{
+    for (size_t k = 0; k < f->n; k++) {
+        char *where = NULL;
+        size_t size;
+        FILE *out = open_memstream(&where, &size);
+        if (!out) abort();
+        bt_member m;
+        bt_study_member(s, f->list[k].first * s->repeats, &m);
+        fprintf(out, "condition %" PRId64, f->list[k].first + 1);
+        for (int p = 0; p < s->n_parameters; p++) fprintf(out, "%s %.40s %.40s", p ? "," : ":", s->parameter[p].name, m.value[p]);
+        if (f->list[k].count > 1) fprintf(out, "; and %" PRId64 " more", f->list[k].count - 1);
+        fclose(out);
+        bt_errors_add(err, "%s (%s)", f->list[k].text, where);
+        bt_member_free(&m);
+        free(where);
+        free(f->list[k].text);
+    }
+    free(f->list);
+}
+
+static bt_status worse(bt_status a, bt_status b) { return a > b ? a : b; }
+
+/// Case and ice of a condition, as `check` has them of a case.
+static bt_status check_condition(const bt_study *s, int64_t condition, numbers *x, bt_errors *err)
+{
+    bt_member m;
+    bt_case c;
+    bt_field f;
+    bt_field_init(&f);
+    bt_study_member(s, condition * s->repeats, &m);
+    const bt_comm ranks = {.mpi = MPI_COMM_NULL, .size = (int)s->ranks, .ranks_here = (int)s->ranks};
+    bt_check_ice n, run;
+    bt_lead_stats lead = {0};
+    bt_status status = bt_member_case(s, &m, &c, err);
+    if (status == BT_OK) status = bt_check_ready(&c, &ranks, &f, &n, &run, &lead, err);
+    if (status == BT_OK) {
+        const bt_check_step step = bt_check_step_of(&c, &n);
+        const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
+        bt_errors warnings = {0};
+        bt_check_warn(&c, &n, &warnings);
+        *x = (numbers){n.count, (double)bt_case_steps(&c), bt_check_seconds(&c, &n), bt_cost_memory(&c, n.count, ranks.size, ranks.size), bt_cost_member(&c, &disk),
+                       step.contact && step.floes, (int)warnings.n};
+        bt_errors_free(&warnings);
+    }
+    bt_field_free(&f);
+    bt_case_free(&c);
+    bt_member_free(&m);
+    return status;
+}
+
+/// x: [n_conditions].
+static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *err)
+{
+    bt_case c;
+    bt_status status = bt_study_base_case(s, &c, err); // what is wrong without any condition
+    bt_case_free(&c);
+    if (status != BT_OK) {
+        bt_errors_add(err, "%s: base: %s with `set` is no valid case, as any condition needs it; mend that first", s->path, s->base_name);
+        return status;
+    }
+    faults f = {0};
+    int64_t k = 0;
+    for (; k < s->n_conditions && f.n < BT_MOST_COMPLAINTS; k++) {
+        bt_errors here = {0};
+        status = worse(status, check_condition(s, k, &x[k], &here));
+        take_faults(&f, k, &here);
+    }
+    tell_faults(&f, s, err);
+    if (status != BT_OK && k < s->n_conditions)
+        bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first", s->path, k + 1, BT_MOST_COMPLAINTS);
+    return status;
+}
+
+// --- printing --------------------------------------------------------------------------------------------------------
+
+static const char *duration(double seconds, char out[CELL])
+{
+    static const struct {
+        double s;
+        const char *name;
+    } unit[] = {{1, "s"}, {60, "min"}, {3600, "h"}, {86400, "days"}};
+    int k = 0;
+    while (k < 3 && seconds / unit[k].s >= 99.5) k++;
+    snprintf(out, CELL, seconds / unit[k].s < 99.5 ? "%.2g %s" : "%.0f %s", seconds / unit[k].s, unit[k].name);
+    return out;
+}
+
+static void print_sets(const char *label, char *const *set, int n)
+{
+    if (n == 0) return;
+    printf("%-20s ", label);
+    for (int i = 0; i < n; i++) printf("%s%s", i ? ", " : "", set[i]);
+    printf("\n");
+}
+
+static void print_parameter(const bt_study *s, const bt_study_parameter *p)
+{
+    printf("%-20s ", p->name);
+    if (p->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+        printf("%.6g to %.6g%s\n", p->from, p->to, p->logarithmic ? ", logarithmic" : "");
+        return;
+    }
+    const int shown = p->n > MOST_LISTED ? MOST_LISTED - 2 : p->n;
+    for (int i = 0; i < shown; i++) printf("%s%s", i ? ", " : "", p->value[i]);
+    if (shown < p->n) printf(", ... %s (%d values)", p->value[p->n - 1], p->n);
+    printf("\n");
+}
+
+static void print_varied(const bt_study *s)
+{
+    for (int i = 0; i < s->n_parameters; i++) print_parameter(s, &s->parameter[i]);
+    char label[CELL + 8];
+    for (int i = 0; i < s->n_variants; i++) {
+        snprintf(label, sizeof label, "  %.46s", s->variant[i].name);
+        print_sets(label, s->variant[i].set, s->variant[i].n_set);
+    }
+    for (int i = 0; i < s->n_with; i++) {
+        snprintf(label, sizeof label, "  with %.42s", s->with[i].name);
+        print_sets(label, s->with[i].set, s->with[i].n_set);
+    }
+}
+
+static const char *verdict(bool good) { return good ? "ok" : "TOO LARGE"; }
+
+/// Texts of a row of the table, the head for condition −1.
+static int row_of(const bt_study *s, const numbers *x, int64_t condition, char cell[][CELL])
+{
+    int n = 0;
+    bt_member m = {0};
+    if (condition >= 0) {
+        bt_study_member(s, condition * s->repeats, &m);
+        snprintf(cell[n++], CELL, "%" PRId64, condition + 1);
+        for (int p = 0; p < s->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", m.value[p]);
+        snprintf(cell[n++], CELL, "%.0f", x[condition].floes);
+        snprintf(cell[n++], CELL, "%.0f", x[condition].steps);
+        duration(x[condition].seconds, cell[n++]);
+        snprintf(cell[n++], CELL, "%s", verdict(x[condition].step_good));
+        bt_member_free(&m);
+        return n;
+    }
+    snprintf(cell[n++], CELL, "condition");
+    for (int p = 0; p < s->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", s->parameter[p].name);
+    for (int k = 0; k < 4; k++) snprintf(cell[n++], CELL, "%s", (const char *const[]){"floes", "steps", "one run", "time step"}[k]);
+    return n;
+}
+
+static void print_table(const bt_study *s, const numbers *x)
+{
+    char cell[BT_MAX_PARAMETERS + 5][CELL];
+    int width[BT_MAX_PARAMETERS + 5] = {0};
+    for (int pass = 0; pass < 2; pass++)
+        for (int64_t k = -1; k < s->n_conditions; k++) {
+            const int n = row_of(s, x, k, cell);
+            for (int i = 0; i < n && pass == 0; i++) width[i] = (int)bt_max(width[i], (double)strlen(cell[i]));
+            for (int i = 0; i < n && pass == 1; i++) printf("%*s%s", width[i], cell[i], i + 1 < n ? "  " : "\n");
+        }
+}
+
+static void print_range(const bt_study *s, const numbers *x)
+{
+    numbers lo = x[0], hi = x[0];
+    int64_t large = 0;
+    for (int64_t k = 0; k < s->n_conditions; k++) {
+        lo.floes = bt_min(lo.floes, x[k].floes), hi.floes = bt_max(hi.floes, x[k].floes);
+        lo.steps = bt_min(lo.steps, x[k].steps), hi.steps = bt_max(hi.steps, x[k].steps);
+        lo.seconds = bt_min(lo.seconds, x[k].seconds), hi.seconds = bt_max(hi.seconds, x[k].seconds);
+        large += !x[k].step_good;
+    }
+    char a[CELL], b[CELL];
+    printf("floes                %.0f to %.0f\n", lo.floes, hi.floes);
+    printf("steps                %.0f to %.0f\n", lo.steps, hi.steps);
+    printf("one run              rough estimate %s to %s on one core\n", duration(lo.seconds, a), duration(hi.seconds, b));
+    if (large) printf("time step            TOO LARGE in %" PRId64 " conditions; `bergtow check` of the base with --set says why\n", large);
+    else printf("time step            ok\n");
+}
+
+static void print_study(const bt_study *s, const numbers *x)
+{
+    double seconds = 0, memory = 0, disk = 0;
+    int64_t warned = 0;
+    for (int64_t k = 0; k < s->n_conditions; k++) {
+        seconds += x[k].seconds * (double)s->repeats;
+        disk += x[k].disk * (double)s->repeats;
+        warned += x[k].warnings > 0;
+        memory = bt_max(memory, x[k].memory);
+    }
+    char verdict_of_all[96] = "valid";
+    if (warned) snprintf(verdict_of_all, sizeof verdict_of_all, "valid, with warnings in %" PRId64 " of %" PRId64 " conditions", warned, s->n_conditions);
+    printf("%s: %s\n", s->path, verdict_of_all);
+    if (s->title) printf("title                %s\n", s->title);
+    printf("base                 %s\n", s->base);
+    print_sets("set", s->set, s->n_set);
+    print_varied(s);
+    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", s->n_conditions, s->repeats, bt_study_n_members(s),
+           s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? ", a Latin hypercube" : "", s->common_fields ? ", the same fields in all conditions" : "");
+    if (s->ranks > 1) printf(", %" PRId64 " ranks each", s->ranks);
+    printf("\n");
+    if (s->n_conditions <= MOST_ROWS) print_table(s, x);
+    else print_range(s, x);
+    char text[CELL];
+    printf("memory               about %.3g MB for one member\n", memory / 1e6);
+    printf("disk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9), disk < 1e9 ? "MB" : "GB");
+    printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
+    if (warned) printf("%s: %s; `bergtow check` of the base with --set says which\n", s->path, verdict_of_all);
+}
+
+bt_status bt_check_study(const char *path, bt_errors *err)
+{
+    bt_study s;
+    bt_status status = bt_study_read(&s, path, err);
+    if (status == BT_OK) {
+        numbers *x = bt_alloc((size_t)s.n_conditions, sizeof *x);
+        status = check_conditions(&s, x, err);
+        if (status == BT_OK) print_study(&s, x);
+        free(x);
+    }
+    bt_study_free(&s);
+    return status;
+}

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+// bergtow ensemble: the members of a study.
+#include "bergtow/ensemble.h"
+#include "app/cmd.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    const char *path;
+    bt_ensemble_options run;
+} options;
+
+enum { KEY_RETRY = 256, KEY_LEAVE };
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case 'o':
+        if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
+        o->run.dir = arg;
+        return 0;
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 'q': o->run.quiet = true; return 0;
+    case KEY_RETRY: o->run.retry = true; return 0;
+    case KEY_LEAVE: o->run.leave = true; return 0;
+    case ARGP_KEY_ARG:
+        if (o->path) argp_error(state, "%s: one study at a time; options with a value are written --option value", arg);
+        o->path = arg;
+        return 0;
+    case ARGP_KEY_END:
+        if (!o->path) argp_error(state, "no study file given; name one, as in cases/studies/basin.yml");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option ensemble_options[] = {
+    {"output", 'o', "DIR", 0, "folder of the ensemble, default out/ and the name of the study without .yml", 0},
+    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node shared by its ranks; results do not depend on it", 0},
+    {"quiet", 'q', NULL, 0, "no line for each member", 0},
+    {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
+    {"no-wait", KEY_LEAVE, NULL, 0, "end when nothing is left to begin, with code 6 if other calls are still at work on members of the folder", 0},
+    {0},
+};
+static const struct argp ensemble_argp = {.options = ensemble_options, .parser = parse, .args_doc = "STUDY.yml",
+                                          .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one ended, however it "
+                                                 "ended. Results that are missing or damaged are run again; the exit code is 0 only when every member is finished and sound. Under mpirun the members are dealt to groups of ranks (`ranks` of the study); several calls may work on one folder."};
+
+int bt_cmd_ensemble(int argc, char **argv)
+{
+    options o = {0};
+    char *command_line = bt_cmd_join(argc, argv);
+    o.run.command_line = command_line;
+    bt_cmd_parse(&ensemble_argp, argc, argv, &o);
+    const bt_comm *comm = bt_comm_world();
+    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.path);
+    if (folder) o.run.dir = folder;
+    bt_study s;
+    bt_errors err = {0};
+    bt_status status = bt_comm_agree(comm, bt_study_read(&s, o.path, &err));
+    if (status == BT_OK) status = bt_ensemble_run(comm, &s, &o.run, &err);
+    bt_study_free(&s);
+    free(folder);
+    free(command_line);
+    return bt_cmd_end(comm, status, &err);
+}

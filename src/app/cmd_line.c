@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MIT
+// What the commands share: option parsing with suggestions, the case argument, the way out.
+#include "app/cmd.h"
+#include "base/suggest.h"
+#include "base/units.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+// Long names of a parser and its children.
+static int collect(const struct argp *argp, const char **names, int n, int cap)
+{
+    for (const struct argp_option *o = argp->options; o && (o->name || o->key || o->doc); o++)
+        if (o->name && n < cap) names[n++] = o->name;
+    for (const struct argp_child *child = argp->children; child && child->argp; child++) n = collect(child->argp, names, n, cap);
+    return n;
+}
+
+// getopt says that an option is unknown and argp adds a usage line; neither says what was meant. So long options are
+// looked up here first. Unambiguous beginnings stay allowed, as getopt has it.
+static void check_options(const struct argp *argp, int argc, char **argv)
+{
+    enum { CAP = 32 };
+    const char *names[CAP + 1] = {"help", "usage", "version"};
+    int n = collect(argp, names, 3, CAP);
+    names[n] = NULL;
+    for (int i = 1; i < argc && strcmp(argv[i], "--"); i++) {
+        if (strncmp(argv[i], "--", 2)) continue;
+        char name[64];
+        size_t length = strcspn(argv[i] + 2, "=");
+        snprintf(name, sizeof name, "%.*s", length < 60 ? (int)length : 60, argv[i] + 2);
+        bool known = false;
+        for (int j = 0; j < n && !known; j++) known = !strncmp(names[j], name, strlen(name));
+        if (known) continue;
+        const char *near = bt_suggest(name, names);
+        if (near) fprintf(stderr, "bergtow %s: --%s: unknown option; did you mean --%s?\n", argv[0], name, near);
+        else fprintf(stderr, "bergtow %s: --%s: unknown option; see bergtow %s --help\n", argv[0], name, argv[0]);
+        exit(BT_ERR_USAGE);
+    }
+}
+
+// All ranks have the same command line, so they find the same errors in it and leave with the same code; one says why.
+static void parse_aloud(const struct argp *argp, int argc, char **argv, void *input)
+{
+    check_options(argp, argc, argv);
+    // argp and getopt begin their messages with argv[0]
+    static char name[32];
+    snprintf(name, sizeof name, "bergtow %.20s", argv[0]);
+    argv[0] = name;
+    argp_parse(argp, argc, argv, 0, NULL, input);
+}
+
+void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
+{
+    if (bt_comm_world()->rank == 0) {
+        parse_aloud(argp, argc, argv, input);
+        return;
+    }
+    // getopt writes to stderr whatever argp is told.
+    int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)}, nowhere = open("/dev/null", O_WRONLY);
+    for (int k = 0; k < 2; k++) dup2(nowhere, STDOUT_FILENO + k);
+    parse_aloud(argp, argc, argv, input);
+    for (int k = 0; k < 2; k++) {
+        dup2(kept[k], STDOUT_FILENO + k);
+        close(kept[k]);
+    }
+    close(nowhere);
+}
+
+static error_t parse_case(int key, char *arg, struct argp_state *state)
+{
+    bt_cmd_case *c = state->input;
+    switch (key) {
+    case 's':
+        c->set = bt_realloc(c->set, (size_t)c->n_set + 1, sizeof *c->set);
+        c->set[c->n_set++] = arg;
+        return 0;
+    case ARGP_KEY_ARG:
+        if (c->path) argp_error(state, "%s: one case at a time; options with a value are written --option value", arg);
+        c->path = arg;
+        return 0;
+    case ARGP_KEY_END:
+        if (!c->path) argp_error(state, "no case file given; name one, as in cases/basin/basin-80.yml");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option case_options[] = {
+    {"set", 's', "KEY=VALUE", 0, "replace a value of the case; may be given several times (see bergtow --list-keys)", 0},
+    {0},
+};
+const struct argp bt_cmd_case_argp = {.options = case_options, .parser = parse_case};
+
+int64_t bt_cmd_number(const struct argp_state *state, const char *option, const char *text, int64_t lo, int64_t hi)
+{
+    char *end;
+    errno = 0;
+    long long v = strtoll(text, &end, 10);
+    if (end == text || *end || errno || v < lo || v > hi)
+        argp_error(state, "%s %s: give a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
+    return v;
+}
+
+double bt_cmd_duration(const struct argp_state *state, const char *option, const char *text)
+{
+    double seconds = 0;
+    char why[BT_WHY] = "";
+    if (!bt_units_parse(text, BT_UNIT_TIME, &seconds, why)) argp_error(state, "%s %s: %s", option, text, why);
+    if (!(seconds > 0)) argp_error(state, "%s %s: give a time of more than 0, as in 2h, 90min or 600", option, text);
+    return seconds;
+}
+
+char *bt_cmd_default_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
+    char *folder = NULL;
+    const int n = yaml ? (int)(dot - name) : (int)strlen(name);
+    const bool dots = (int)strspn(name, ".") >= n; // "...yml" would be the folder above out/
+    if (asprintf(&folder, "out/%.*s", dots ? 4 : n, dots ? "case" : name) < 0) abort();
+    return folder;
+}
+
+char *bt_cmd_join(int argc, char **argv)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) abort();
+    fputs("bergtow", out);
+    for (int i = 0; i < argc; i++) {
+        bool safe = *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") == strlen(argv[i]);
+        fputs(safe ? " " : " '", out);
+        for (const char *s = argv[i]; *s; s++) {
+            if (*s == '\'') fputs("'\\''", out);
+            else fputc(*s, out);
+        }
+        if (!safe) fputc('\'', out);
+    }
+    fclose(out);
+    return text;
+}
+
+int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
+{
+    const bool lost = fflush(stdout) != 0 || ferror(stdout);
+    if (lost) bt_errors_add(err, "standard output: cannot be written; give it a place with space, or use the files of the result");
+    if (lost && status == BT_OK) status = BT_ERR_IO;
+    status = bt_comm_agree(c, status);
+    bt_comm_errors(c, err);
+    bt_errors_print(err);
+    bt_errors_free(err);
+    return status;
+}

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+// bergtow resume: go on with a run from its last checkpoint. bergtow diff: compare two checkpoints.
+#include "bergtow/checkpoint.h"
+#include "bergtow/run.h"
+#include "app/cmd.h"
+#include "base/fileio.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+typedef struct {
+    char *dir;
+    const char *file; ///< a checkpoint instead of a folder
+    bt_run_options run;
+} options;
+
+enum { KEY_STEPS = 256, KEY_WALL };
+
+static bool is_folder(const char *path)
+{
+    struct stat st;
+    return stat(path, &st) == 0 && S_ISDIR(st.st_mode);
+}
+
+// A file is taken as the checkpoint of the folder that it is in.
+static void take_place(options *o, char *arg)
+{
+    struct stat st;
+    if (stat(arg, &st) != 0 || S_ISDIR(st.st_mode)) {
+        o->dir = strdup(arg);
+        return;
+    }
+    const char *slash = strrchr(arg, '/');
+    o->file = arg;
+    o->dir = !slash ? strdup(".") : slash == arg ? strdup("/") : strndup(arg, (size_t)(slash - arg));
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 'q': o->run.quiet = true; return 0;
+    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case ARGP_KEY_ARG:
+        if (o->dir) argp_error(state, "%s: one folder at a time; options with a value are written --option value", arg);
+        take_place(o, arg);
+        return 0;
+    case ARGP_KEY_END:
+        if (!o->dir) argp_error(state, "no folder given; name the result folder of a run, as in out/basin-80");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option resume_options[] = {
+    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or all cores; the result does not depend on it", 0},
+    {"steps", KEY_STEPS, "N", 0, "stop after N more steps", 0},
+    {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600", 0},
+    {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
+    {0},
+};
+static const struct argp resume_argp = {.options = resume_options, .parser = parse, .args_doc = "DIR",
+                                        .doc = "Go on with the run in the result folder DIR from its last checkpoint, on any number of ranks and threads: the result is that of a run that was "
+                                               "never stopped. In place of DIR a checkpoint file in it may be given."};
+
+int bt_cmd_resume(int argc, char **argv)
+{
+    options o = {.run = {.dump_step = -1}};
+    char *command_line = bt_cmd_join(argc, argv);
+    bt_cmd_parse(&resume_argp, argc, argv, &o);
+    const bt_comm *comm = bt_comm_world();
+    o.run.dir = o.dir;
+    o.run.from = o.file;
+    o.run.command_line = command_line;
+    if (comm->rank != 0) o.run.quiet = true;
+    bt_errors err = {0};
+    const bt_status status = bt_run_resume(comm, &o.run, &err);
+    free(o.dir);
+    free(command_line);
+    return bt_cmd_end(comm, status, &err);
+}
+
+// --- diff ------------------------------------------------------------------------------------------------------------
+
+typedef struct {
+    char *path[2];
+    int n;
+} two_files;
+
+static error_t parse_two(int key, char *arg, struct argp_state *state)
+{
+    two_files *f = state->input;
+    switch (key) {
+    case ARGP_KEY_ARG:
+        if (f->n == 2) argp_error(state, "%s: at most two checkpoints are compared", arg);
+        f->path[f->n++] = is_folder(arg) ? bt_file_join(arg, BT_CHECKPOINT_FILE) : strdup(arg);
+        return 0;
+    case ARGP_KEY_END:
+        if (f->n == 0) argp_error(state, "no checkpoint given; name one to print, or two to compare");
+        return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp diff_argp = {.parser = parse_two, .args_doc = "A [B]",
+                                      .doc = "Name the first difference between the states of two checkpoints (files, or the folders they are in); of one, print what it holds. Exit code 0: the same, "
+                                             "1: different."};
+
+int bt_cmd_diff(int argc, char **argv)
+{
+    two_files f = {0};
+    bt_cmd_parse(&diff_argp, argc, argv, &f);
+    bt_errors err = {0};
+    char *difference = NULL;
+    const bt_status status = f.n == 1 ? bt_checkpoint_print(f.path[0], &err) : bt_checkpoint_compare(f.path[0], f.path[1], &difference, &err);
+    if (difference) printf("%s\n", difference);
+    else if (f.n == 2 && status == BT_OK) puts("the states are the same");
+    const bool differs = difference != NULL;
+    free(difference);
+    free(f.path[0]);
+    free(f.path[1]);
+    const int code = bt_cmd_end(bt_comm_world(), status, &err);
+    return code == BT_OK && differs ? 1 : code;
+}

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// bergtow run: a case to a result folder.
+#include "bergtow/checkpoint.h"
+#include "bergtow/run.h"
+#include "app/cmd.h"
+#include "base/fileio.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    bt_cmd_case file;
+    bt_run_options run;
+    bool force;
+} options;
+
+enum { KEY_STEPS = 256, KEY_WALL, KEY_DUMP, KEY_FORCE };
+
+// STEP:FILE.h5
+static void parse_dump(struct argp_state *state, char *arg, bt_run_options *run)
+{
+    char *colon = strchr(arg, ':');
+    if (!colon || !colon[1]) {
+        argp_error(state, "--dump-contacts %s: give STEP:FILE.h5, as in 100:contacts.h5", arg);
+        return;
+    }
+    *colon = 0;
+    run->dump_step = bt_cmd_number(state, "--dump-contacts: step", arg, 0, INT64_MAX);
+    run->dump_path = colon + 1;
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+    options *o = state->input;
+    switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
+    case 'o':
+        if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
+        o->run.dir = arg;
+        return 0;
+    case 't': o->run.threads = (int)bt_cmd_number(state, "--threads", arg, 1, 1024); return 0;
+    case 'q': o->run.quiet = true; return 0;
+    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
+    case KEY_DUMP: parse_dump(state, arg, &o->run); return 0;
+    case KEY_FORCE: o->force = true; return 0;
+    default: return ARGP_ERR_UNKNOWN;
+    }
+}
+
+static const struct argp_option run_options[] = {
+    {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
+    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does not depend on it", 0},
+    {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
+    {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
+    {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
+    {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
+    {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
+    {0},
+};
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
+static const struct argp run_argp = {.options = run_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
+                                     .doc = "Tow the body of a case through its ice and write a result folder."};
+
+// A long run must not take the place of another by a slip of the hand.
+static bt_status check_folder(const char *dir, bool force, bt_errors *err)
+{
+    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_file_there(dir, "result.part.h5") || bt_checkpoint_there(dir);
+    if (force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return BT_OK;
+    if (finished || !begun) bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+    else bt_errors_add(err, "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, or --force to replace it", dir, dir);
+    return BT_ERR_IO;
+}
+
+int bt_cmd_run(int argc, char **argv)
+{
+    options o = {.run = {.dump_step = -1}};
+    char *command_line = bt_cmd_join(argc, argv);
+    o.run.command_line = command_line;
+    bt_cmd_parse(&run_argp, argc, argv, &o);
+    const bt_comm *comm = bt_comm_world();
+    if (comm->rank != 0) o.run.quiet = true;
+    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
+    if (folder) o.run.dir = folder;
+
+    bt_case c;
+    bt_errors err = {0};
+    bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
+    if (status == BT_OK && comm->rank == 0) status = check_folder(o.run.dir, o.force, &err);
+    status = bt_comm_agree(comm, status);
+    if (status == BT_OK) status = bt_run(comm, &c, &o.run, &err);
+    bt_case_free(&c);
+    free(o.file.set);
+    free(folder);
+    free(command_line);
+    return bt_cmd_end(comm, status, &err);
+}

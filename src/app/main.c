@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+// The program bergtow: options that need no command, and the way to the commands.
+#include "bergtow/comm.h"
+#include "app/cmd.h"
+#include "revision.h"
+#include "base/suggest.h"
+
+#include <omp.h>
+#include <sched.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const struct {
+    const char *name, *summary;
+    int (*run)(int argc, char **argv);
+    bool parallel; ///< all ranks take part; otherwise rank 0 alone
+} commands[] = {
+    {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
+    {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false},
+    {"field", "make the ice field of a case only", bt_cmd_field, false},
+    {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble, true},
+    {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
+    {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
+    {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
+};
+enum { N_COMMANDS = sizeof commands / sizeof *commands };
+
+static void print_version(FILE *out, struct argp_state *state)
+{
+    (void)state;
+    fprintf(out, "bergtow %s (%s, %s)\n", BT_VERSION, BT_REVISION, BT_COMPILER);
+}
+
+static void print_help(FILE *out)
+{
+    fputs("Usage: bergtow COMMAND [OPTION...]\n"
+          "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
+    for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-12s %s\n", commands[i].name, commands[i].summary);
+    fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
+          "  --version    version, revision and compiler\n"
+          "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
+          "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
+          "6 stopped on a signal or a limit, with a checkpoint.\n", out);
+}
+
+static int refuse_word(const char *kind, const char *word, const char *const *known)
+{
+    const char *near = bt_suggest(word, known);
+    if (near) fprintf(stderr, "bergtow: %s: unknown %s; did you mean %s?\n", word, kind, near);
+    else fprintf(stderr, "bergtow: %s: unknown %s; see bergtow --help\n", word, kind);
+    return BT_ERR_USAGE;
+}
+
+// With OMP_PROC_BIND libgomp has bound this thread to one place by now, and a program started from here would have that one core for all its
+// threads. Back to all the places it was given.
+static void unbind(void)
+{
+    const int n_places = omp_get_num_places();
+    if (n_places == 0) return;
+    cpu_set_t all;
+    CPU_ZERO(&all);
+    for (int p = 0; p < n_places; p++) {
+        int ids[CPU_SETSIZE];
+        const int n = omp_get_place_num_procs(p);
+        if (n > CPU_SETSIZE) continue;
+        omp_get_place_proc_ids(p, ids);
+        for (int k = 0; k < n; k++) CPU_SET(ids[k], &all);
+    }
+    sched_setaffinity(0, sizeof all, &all);
+}
+
+// Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
+// cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
+// microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where the system gives them,
+// and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C library read their settings
+// before main, hence the second start; the user's own win.
+static void start_with_settings(char **argv)
+{
+    if (getenv("BERGTOW_STARTED")) return;
+    bool set = setenv("BERGTOW_STARTED", "1", 1) == 0;
+    if (!getenv("OMP_WAIT_POLICY")) set = setenv("GOMP_SPINCOUNT", "5000", 0) == 0 && set;
+    set = setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0) == 0 && set;
+    unbind();
+    if (set) execv("/proc/self/exe", argv);
+}
+
+// Exit code of this rank.
+static int bergtow(int argc, char **argv)
+{
+    const bool first = bt_comm_world()->rank == 0;
+    if (argc < 2) {
+        if (first) print_help(stderr);
+        return BT_ERR_USAGE;
+    }
+    const char *word = argv[1];
+    for (int i = 0; i < N_COMMANDS; i++)
+        if (!strcmp(word, commands[i].name)) return first || commands[i].parallel ? commands[i].run(argc - 1, argv + 1) : BT_OK;
+    if (!first) return BT_OK; // what follows concerns the console
+
+    bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
+    if (help) print_help(stdout);
+    else if (version) print_version(stdout, NULL);
+    else if (!strcmp(word, "--list-keys")) {
+        const bool json = argc == 3 && !strcmp(argv[2], "--json");
+        if (argc > 2 && !json) return refuse_word("option", argv[2], (const char *const[]){"--json", NULL});
+        (json ? bt_case_list_keys_json : bt_case_list_keys)(stdout);
+    }
+    if (help || version || !strcmp(word, "--list-keys")) return fflush(stdout) ? BT_ERR_IO : BT_OK;
+
+    if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
+    const char *names[N_COMMANDS + 1] = {NULL};
+    for (int i = 0; i < N_COMMANDS; i++) names[i] = commands[i].name;
+    return refuse_word("command", word, names);
+}
+
+int main(int argc, char **argv)
+{
+    start_with_settings(argv);
+    signal(SIGUSR1, SIG_IGN); // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
+    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
+    bt_comm_start(&argc, &argv);
+    argp_err_exit_status = BT_ERR_USAGE;
+    argp_program_version_hook = print_version;
+    return bt_comm_end(bergtow(argc, argv));
+}

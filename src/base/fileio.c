@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: MIT
+// Text files that are complete or absent, folders, and the wording of input/output errors.
+#include "base/fileio.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <linux/fs.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/largest.h"
+
+const char *bt_file_remedy(int errnum)
+{
+    switch (errnum) {
+    case ENOSPC:
+    case EDQUOT: return "free some space, or write to another disk with -o DIR";
+    case EFBIG: return "raise the limit on file sizes (ulimit -f), or ask for fewer frames (output.frame_interval)";
+    case EACCES:
+    case EPERM: return "change the permissions, or write to a folder of your own with -o DIR";
+    case EROFS: return "the disk is read-only: write to another one with -o DIR";
+    case ENOENT: return "check the name and that its folder exists";
+    case ENOTDIR: return "a part of the path is a file: give another folder with -o DIR";
+    case EISDIR: return "a folder of that name is in the way: remove it, or give another folder with -o DIR";
+    case ENAMETOOLONG: return "give a shorter path";
+    case EMFILE:
+    case ENFILE: return "close other files, or raise the limit on open files (ulimit -n)";
+    case EIO: return "the disk reports errors: write to another one with -o DIR";
+    default: return "check the path, the free space and the permissions";
+    }
+}
+
+bt_status bt_file_fail(const char *path, const char *action, int errnum, bt_errors *err)
+{
+    bt_errors_add(err, "%s: cannot %s: %s; %s", path, action, errnum ? strerror(errnum) : "unknown reason",
+                  bt_file_remedy(errnum));
+    return BT_ERR_IO;
+}
+
+char *bt_file_join(const char *dir, const char *name)
+{
+    const size_t n = strlen(dir), size = n + strlen(name) + 2;
+    char *path = bt_alloc(size, 1);
+    snprintf(path, size, "%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
+    return path;
+}
+
+/// A descriptor that this process was given, as the shell's pipes are: opening it waits for nobody.
+static bool is_own_descriptor(const char *path)
+{
+    return !strcmp(path, "/dev/stdin") || !strncmp(path, "/dev/fd/", 8) || !strncmp(path, "/proc/self/fd/", 14);
+}
+
+/// "a folder", ..., or NULL for a regular file.
+static const char *kind_of(mode_t mode)
+{
+    if (S_ISREG(mode)) return NULL;
+    return S_ISDIR(mode) ? "a folder" : S_ISFIFO(mode) ? "a pipe (FIFO)" : S_ISSOCK(mode) ? "a socket" : "a device";
+}
+
+/// text: as bt_file_read_to and bt_file_read word it; streams: pipes of one's own are let through.
+static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
+{
+    // Looked at before it is opened, since to open some devices does something to them, and after, since the name may
+    // mean another file by then.
+    struct stat st;
+    const char *kind = NULL;
+    const bool taken = streams && is_own_descriptor(path);
+    int fd = -1, reason = stat(path, &st) != 0 ? errno : 0;
+    const bool seen = reason == 0;
+    if (seen && !(kind = kind_of(st.st_mode))) {
+        fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+        if (fd < 0 || fstat(fd, &st) != 0) reason = errno;
+        else kind = kind_of(st.st_mode);
+    } else if (seen && taken && !S_ISDIR(st.st_mode)) {
+        kind = NULL;
+        fd = open(path, O_RDONLY | O_CLOEXEC);
+        if (fd < 0) reason = errno;
+    }
+    if (!reason && !kind) return fd;
+    if (fd >= 0) close(fd);
+    if (reason && !text) bt_file_fail(path, "read the file", reason, err);
+    else if (reason && seen)
+        bt_errors_add(err, "%s: cannot be read: %s; check its permissions", path, strerror(reason));
+    else if (reason) bt_errors_add(err, "%s: cannot be read: %s; give the path of %s", path, strerror(reason), what);
+    else if (S_ISDIR(st.st_mode)) bt_errors_add(err, "%s: is a folder; give the path of %s in it", path, what);
+    else
+        bt_errors_add(err,
+                      "%s: is %s and no regular file, it is not opened; write what it gives into a file, and give the "
+                      "path of that as %s",
+                      path, kind, what);
+    return -1;
+}
+
+int bt_file_open(const char *path, const char *what, bt_errors *err)
+{
+    return open_input(path, what, false, false, err);
+}
+
+static bt_status read_text(const char *path, const char *what, size_t most, bool streams, char **text, size_t *size,
+                           bt_errors *err)
+{
+    *text = NULL;
+    *size = 0;
+    const int fd = open_input(path, what, true, streams, err);
+    FILE *f = fd < 0 ? NULL : fdopen(fd, "rb");
+    if (!f) {
+        if (fd < 0) return BT_ERR_IO;
+        const int reason = errno;
+        close(fd);
+        return bt_file_fail(path, "read the file", reason, err);
+    }
+    // Read to the end rather than st_size bytes: a pipe has no size.
+    size_t cap = 1 << 14, n = 0;
+    *text = bt_alloc(cap, 1);
+    for (size_t got; n <= most && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
+        n += got;
+        if (n == cap - 1) *text = bt_realloc(*text, cap *= 2, 1);
+    }
+    const int broken = ferror(f) ? errno : 0;
+    fclose(f);
+    (*text)[n] = 0;
+    *size = n;
+    if (broken) {
+        bt_errors_add(err, "%s: reading failed: %s; check the disk", path, strerror(broken));
+        return BT_ERR_IO;
+    }
+    if (n > most) {
+        bt_errors_add(err, "%s: larger than %zu MiB, which %s never is; check the name (large fields belong into an HDF5 file that ice.field names)", path, most >> 20, what);
+        return BT_ERR_CASE;
+    }
+    return BT_OK;
+}
+
+bt_status bt_file_read(const char *path, const char *what, char **text, size_t *size, bt_errors *err)
+{
+    return read_text(path, what, BT_MOST_TEXT_BYTES, true, text, size, err);
+}
+
+bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err)
+{
+    return read_text(path, what, most, false, text, size, err);
+}
+
+bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
+{
+    const size_t size = strlen(path) + sizeof ".tmp", n = strlen(text);
+    char *temporary = bt_alloc(size, 1);
+    snprintf(temporary, size, "%s.tmp", path);
+
+    int reason = 0;
+    // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name, which the rename replaces.
+    unlink(temporary);
+    FILE *f = fopen(temporary, "wx");
+    if (!f) {
+        reason = errno;
+    } else {
+        // A full disk shows at the flush or at the close as often as at the write itself.
+        errno = 0;
+        if (fwrite(text, 1, n, f) != n || fflush(f) != 0 || fsync(fileno(f)) != 0) reason = errno ? errno : EIO;
+        if (fclose(f) != 0 && !reason) reason = errno ? errno : EIO;
+        if (!reason && rename(temporary, path) != 0) reason = errno;
+        if (reason) unlink(temporary);
+    }
+    free(temporary);
+    return reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
+}
+
+bt_status bt_file_make_dir(const char *path, bt_errors *err)
+{
+    if (!*path) return bt_file_fail("output folder", "make a folder without a name", ENOENT, err);
+    char *part = strdup(path);
+    int reason = 0;
+    for (char *slash = part; slash && !reason; ) {
+        slash = strchr(slash + 1, '/');
+        if (slash) *slash = '\0';
+        if (mkdir(part, 0777) != 0 && errno != EEXIST) {
+            // On a read-only or foreign parent mkdir may refuse before it sees that the folder is there.
+            const int refused = errno;
+            struct stat st;
+            if (stat(part, &st) != 0 || !S_ISDIR(st.st_mode)) reason = refused;
+        }
+        if (slash) *slash = '/';
+    }
+    free(part);
+    struct stat st;
+    if (!reason && stat(path, &st) != 0) reason = errno;
+    if (!reason && !S_ISDIR(st.st_mode)) reason = ENOTDIR;
+    return reason ? bt_file_fail(path, "make the folder", reason, err) : BT_OK;
+}
+
+bt_status bt_file_remove(const char *path, bt_errors *err)
+{
+    if (unlink(path) == 0 || errno == ENOENT) return BT_OK;
+    return bt_file_fail(path, "replace the file of an earlier run", errno, err);
+}
+
+/// Bytes from one open file to another; errno of a failure, or 0.
+static int copy_bytes(int from, int to)
+{
+    enum { PIECE = 1 << 20 };
+    if (ioctl(to, FICLONE, from) == 0) return 0;
+    char *buffer = bt_alloc(PIECE, 1);
+    int reason = 0;
+    for (ssize_t n; !reason && (n = read(from, buffer, PIECE)) != 0;) {
+        if (n < 0) {
+            reason = errno == EINTR ? 0 : errno;
+            continue;
+        }
+        for (ssize_t done = 0; done < n && !reason;) {
+            const ssize_t m = write(to, buffer + done, (size_t)(n - done));
+            if (m > 0) done += m;
+            else if (m == 0) reason = ENOSPC;
+            else if (errno != EINTR) reason = errno;
+        }
+    }
+    free(buffer);
+    return reason;
+}
+
+bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
+{
+    const int in = open(from, O_RDONLY | O_CLOEXEC);
+    if (in < 0) return bt_file_fail(from, "read the file", errno, err);
+    unlink(to); // a link of that name must not lead the copy elsewhere
+    const int out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    int reason = out < 0 ? errno : copy_bytes(in, out);
+    if (!reason && fsync(out) != 0) reason = errno;
+    if (out >= 0 && close(out) != 0 && !reason) reason = errno;
+    close(in);
+    if (reason && out >= 0) unlink(to);
+    return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
+}
+
+bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
+{
+    if (rename(from, to) != 0) return bt_file_fail(to, "write the file", errno, err);
+    const char *slash = strrchr(to, '/');
+    char *folder = !slash ? strdup(".") : slash == to ? strdup("/") : strndup(to, (size_t)(slash - to));
+    const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    free(folder);
+    if (fd < 0) return BT_OK; // a folder that may be written to but not read: the system will bring the name to the disk in its own time
+    const int reason = fsync(fd) != 0 && errno != EINVAL && errno != EROFS ? errno : 0; // some file systems have no such call
+    close(fd);
+    return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
+}
+
+bool bt_file_there(const char *dir, const char *name)
+{
+    char *path = bt_file_join(dir, name);
+    const bool there = access(path, F_OK) == 0;
+    free(path);
+    return there;
+}

@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: MIT
+// An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
+//
+// When a write fails (full disk, quota, file size limit) HDF5 1.10 cannot close the file any more: H5Fclose frees what
+// the file's identifier still points to, and the library's exit handler then crashes, in MPI_Finalize too. So this driver
+// tells HDF5 that the write was done, keeps errno for the caller, and from then on writes nothing: the library stays
+// sound, the reason is a number instead of a text in an error stack, and the file on disk stays as the last complete
+// flush left it.
+//
+// Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes them in any order, and
+// what a file under way announces may then not be there yet: a reader at that moment, or a kill, found rows of zeros. At the end of a flush
+// come, each run of bytes in one call: the superblock, which must know the length of the file; what is new; old nodes of indices from the
+// lowest address to the highest (a root stays where it was made, and must know the new half of a node before that node gives it up); at last the
+// rest from the highest to the lowest (headers lead to all others). So after each write a dataset has the length of this flush or of
+// the last, and all of its rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those here
+// are of one row (h5util.h).
+//
+// It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX driver does, and that one reads
+// the files.
+#include "base/h5driver.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#define MAX_ADDRESS (((haddr_t)1 << 62) - 1)
+
+typedef struct driver_info { int *errnum; } driver_info;
+
+enum { PAGE = 4096, WORD = 64 };
+
+/// Metadata that wait, of one page of the file: other bytes of it are data, which other ranks may be writing.
+typedef struct page {
+    haddr_t at;                  ///< a multiple of PAGE
+    uint64_t waits[PAGE / WORD], index[PAGE / WORD]; ///< a bit a byte: it waits, and is of an index
+    char byte[PAGE];
+} page;
+
+typedef struct driver_file {
+    H5FD_t pub; ///< first, as HDF5 asks
+    int fd;
+    haddr_t eoa, eof; ///< end of the allocated addresses, end of the file with all that waits
+    page **pages;     ///< [n_pages] by address
+    size_t n_pages, cap_pages;
+    haddr_t super, super_end; ///< the superblock
+    haddr_t flushed;  ///< end of the file at the last flush
+    dev_t device;
+    ino_t inode;
+    int *errnum;
+} driver_file;
+
+static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr_t maxaddr)
+{
+    (void)maxaddr;
+    const driver_info *info = H5Pget_driver_info(access);
+    if (!info) return NULL;
+    const int how = (flags & H5F_ACC_RDWR ? O_RDWR : O_RDONLY) | (flags & H5F_ACC_TRUNC ? O_TRUNC : 0) |
+                    (flags & H5F_ACC_CREAT ? O_CREAT : 0) | (flags & H5F_ACC_EXCL ? O_EXCL : 0) | O_CLOEXEC;
+    const int fd = open(name, how, 0666);
+    struct stat st;
+    if (fd < 0 || fstat(fd, &st) != 0) {
+        *info->errnum = errno;
+        if (fd >= 0) close(fd);
+        return NULL;
+    }
+    driver_file *f = calloc(1, sizeof *f);
+    if (!f) {
+        *info->errnum = ENOMEM;
+        close(fd);
+        return NULL;
+    }
+    f->fd = fd;
+    f->eof = f->flushed = (haddr_t)st.st_size;
+    f->device = st.st_dev;
+    f->inode = st.st_ino;
+    f->errnum = info->errnum;
+    *f->errnum = 0; // HDF5 first tries whether the file is there
+    return &f->pub;
+}
+
+/// Data to the file, unless it has failed before.
+static void put(driver_file *f, haddr_t address, size_t size, const char *p)
+{
+    while (size > 0 && !*f->errnum) {
+        const ssize_t n = pwrite(f->fd, p, size, (off_t)address);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) {
+            *f->errnum = n < 0 ? errno : ENOSPC;
+            break;
+        }
+        size -= (size_t)n;
+        address += (haddr_t)n;
+        p += n;
+    }
+}
+
+static bool waits(const page *g, size_t i) { return g->waits[i / WORD] >> i % WORD & 1; }
+
+/// The first page that ends beyond an address.
+static size_t page_from(const driver_file *f, haddr_t address)
+{
+    size_t low = 0, high = f->n_pages;
+    while (low < high) {
+        const size_t mid = (low + high) / 2;
+        if (f->pages[mid]->at + PAGE <= address) low = mid + 1;
+        else high = mid;
+    }
+    return low;
+}
+
+/// The page at an address, made if it is not there; NULL without memory.
+static page *page_at(driver_file *f, haddr_t address)
+{
+    const size_t k = page_from(f, address);
+    if (k < f->n_pages && f->pages[k]->at <= address) return f->pages[k];
+    if (f->n_pages == f->cap_pages) {
+        const size_t cap = 2 * f->cap_pages + 16;
+        page **more = realloc(f->pages, cap * sizeof *more);
+        if (!more) return NULL;
+        f->pages = more;
+        f->cap_pages = cap;
+    }
+    page *g = calloc(1, sizeof *g);
+    if (!g) return NULL;
+    g->at = address - address % PAGE;
+    memmove(f->pages + k + 1, f->pages + k, (f->n_pages - k) * sizeof *f->pages);
+    f->pages[k] = g;
+    f->n_pages++;
+    return g;
+}
+
+static void keep_waiting(driver_file *f, bool index, haddr_t address, size_t size, const char *p)
+{
+    while (size > 0) {
+        page *g = page_at(f, address);
+        if (!g) {
+            if (!*f->errnum) *f->errnum = ENOMEM;
+            return;
+        }
+        const size_t from = (size_t)(address - g->at), n = size < PAGE - from ? size : PAGE - from;
+        memcpy(g->byte + from, p, n);
+        for (size_t i = from; i < from + n; i++) {
+            const uint64_t bit = (uint64_t)1 << i % WORD;
+            g->waits[i / WORD] |= bit;
+            if (index) g->index[i / WORD] |= bit;
+            else g->index[i / WORD] &= ~bit;
+        }
+        address += n;
+        p += n;
+        size -= n;
+    }
+}
+
+/// What waits from address to end is over: other data have taken its place, or the file ends before it.
+static void forget(driver_file *f, haddr_t address, haddr_t end)
+{
+    for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < end; k++) {
+        page *g = f->pages[k];
+        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < end; i++) g->waits[i / WORD] &= ~((uint64_t)1 << i % WORD);
+    }
+}
+
+/// Bytes that wait, over those that were read from the file.
+static void overlay(const driver_file *f, haddr_t address, size_t size, char *p)
+{
+    for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < address + size; k++) {
+        const page *g = f->pages[k];
+        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < address + size; i++)
+            if (waits(g, i)) p[g->at + i - address] = g->byte[i];
+    }
+}
+
+/// Write what waits from address to end, which all does, at once.
+static void put_run(driver_file *f, haddr_t address, haddr_t end)
+{
+    const size_t size = (size_t)(end - address);
+    char *whole = calloc(size, 1);
+    if (whole) {
+        overlay(f, address, size, whole);
+        put(f, address, size, whole);
+    } else if (!*f->errnum) {
+        *f->errnum = ENOMEM;
+    }
+    free(whole);
+}
+
+/// The superblock says how long the file is: it comes when the file has that length, and before what leads beyond the old one.
+static void put_superblock(driver_file *f)
+{
+    const size_t k = page_from(f, f->super);
+    if (k == f->n_pages || f->pages[k]->at > f->super || !waits(f->pages[k], (size_t)(f->super - f->pages[k]->at))) return;
+    struct stat st;
+    if (!*f->errnum && (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && ftruncate(f->fd, (off_t)f->eoa) != 0))) *f->errnum = errno;
+    put_run(f, f->super, f->super_end);
+    forget(f, f->super, f->super_end);
+}
+
+/// Is byte i of a page of an index that was there at the last flush?
+static bool old_index(const driver_file *f, const page *g, size_t i) { return g->at + i < f->flushed && (g->index[i / WORD] >> i % WORD & 1); }
+
+/// Bytes without a gap, all of an old index or none, all old or all new.
+typedef struct run {
+    haddr_t begin, end;
+    bool index;
+} run;
+
+/// All that waits, by address. NULL without memory, or when nothing waits.
+static run *runs_of(driver_file *f, size_t *n)
+{
+    run *all = NULL;
+    size_t cap = *n = 0;
+    for (size_t k = 0; k < f->n_pages; k++)
+        for (size_t i = 0; i < PAGE; i++) {
+            const page *g = f->pages[k];
+            if (!waits(g, i)) continue;
+            const bool index = old_index(f, g, i);
+            if (*n > 0 && all[*n - 1].end == g->at + i && all[*n - 1].index == index && all[*n - 1].end != f->flushed) {
+                all[*n - 1].end++;
+                continue;
+            }
+            if (*n == cap) {
+                run *more = realloc(all, (cap = 2 * cap + 64) * sizeof *more);
+                if (!more) {
+                    if (!*f->errnum) *f->errnum = ENOMEM;
+                    return all;
+                }
+                all = more;
+            }
+            all[(*n)++] = (run){g->at + i, g->at + i + 1, index};
+        }
+    return all;
+}
+
+/// Write all that waits, in the order that leaves the file whole after each write.
+static void put_waiting(driver_file *f)
+{
+    put_superblock(f);
+    size_t n, first_new = 0;
+    run *all = runs_of(f, &n);
+    while (first_new < n && all[first_new].end <= f->flushed) first_new++;
+    for (size_t k = first_new; k < n; k++) put_run(f, all[k].begin, all[k].end);
+    for (size_t k = 0; k < first_new; k++)
+        if (all[k].index) put_run(f, all[k].begin, all[k].end);
+    for (size_t k = first_new; k-- > 0;)
+        if (!all[k].index) put_run(f, all[k].begin, all[k].end);
+    free(all);
+    while (f->n_pages > 0) free(f->pages[--f->n_pages]);
+    f->flushed = f->eof;
+}
+
+static herr_t driver_flush(H5FD_t *file, hid_t transfer, hbool_t closing)
+{
+    (void)transfer, (void)closing;
+    put_waiting((driver_file *)file);
+    return 0;
+}
+
+static herr_t driver_close(H5FD_t *file)
+{
+    driver_file *f = (driver_file *)file;
+    put_waiting(f);
+    free(f->pages);
+    if (close(f->fd) != 0 && !*f->errnum) *f->errnum = errno;
+    free(f);
+    return 0;
+}
+
+static int driver_cmp(const H5FD_t *a, const H5FD_t *b)
+{
+    const driver_file *f = (const driver_file *)a, *g = (const driver_file *)b;
+    if (f->device != g->device) return f->device < g->device ? -1 : 1;
+    if (f->inode != g->inode) return f->inode < g->inode ? -1 : 1;
+    return 0;
+}
+
+static herr_t driver_query(const H5FD_t *file, unsigned long *flags)
+{
+    (void)file;
+    if (flags)
+        *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
+    return 0;
+}
+
+static haddr_t driver_get_eoa(const H5FD_t *file, H5FD_mem_t type)
+{
+    (void)type;
+    return ((const driver_file *)file)->eoa;
+}
+
+static herr_t driver_set_eoa(H5FD_t *file, H5FD_mem_t type, haddr_t address)
+{
+    (void)type;
+    ((driver_file *)file)->eoa = address;
+    return 0;
+}
+
+static haddr_t driver_get_eof(const H5FD_t *file, H5FD_mem_t type)
+{
+    (void)type;
+    return ((const driver_file *)file)->eof;
+}
+
+static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, void *buffer)
+{
+    (void)type, (void)transfer;
+    driver_file *f = (driver_file *)file;
+    char *p = buffer;
+    size_t done = 0;
+    while (done < size) {
+        const ssize_t n = pread(f->fd, p + done, size - done, (off_t)(address + done));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) {
+            if (!*f->errnum) *f->errnum = errno;
+            return -1;
+        }
+        if (n == 0) break; // beyond the end: zeros, as HDF5 defines it
+        done += (size_t)n;
+    }
+    memset(p + done, 0, size - done);
+    overlay(f, address, size, p);
+    return 0;
+}
+
+static herr_t driver_write(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, const void *buffer)
+{
+    (void)transfer;
+    driver_file *f = (driver_file *)file;
+    if (type == H5FD_MEM_DRAW) {
+        forget(f, address, address + size);
+        put(f, address, size, buffer);
+    } else {
+        if (type == H5FD_MEM_SUPER) f->super = address, f->super_end = address + size;
+        keep_waiting(f, type == H5FD_MEM_BTREE, address, size, buffer);
+    }
+    if (address + size > f->eof) f->eof = address + size;
+    return 0;
+}
+
+static herr_t driver_truncate(H5FD_t *file, hid_t transfer, hbool_t closing)
+{
+    (void)transfer, (void)closing;
+    driver_file *f = (driver_file *)file;
+    if (f->eoa == f->eof) return 0;
+    forget(f, f->eoa, MAX_ADDRESS);
+    if (!*f->errnum && ftruncate(f->fd, (off_t)f->eoa) != 0) *f->errnum = errno;
+    f->eof = f->eoa;
+    return 0;
+}
+
+static const H5FD_class_t driver = {
+#if H5_VERSION_GE(1, 13, 0)
+    .version = H5FD_CLASS_VERSION,
+    .value = (H5FD_class_value_t)600, // of the range for drivers that are not registered with the HDF Group
+#endif
+    .name = "bergtow",
+    .maxaddr = MAX_ADDRESS,
+    .fc_degree = H5F_CLOSE_WEAK,
+    .fapl_size = sizeof(driver_info),
+    .open = driver_open,
+    .close = driver_close,
+    .cmp = driver_cmp,
+    .query = driver_query,
+    .get_eoa = driver_get_eoa,
+    .set_eoa = driver_set_eoa,
+    .get_eof = driver_get_eof,
+    .read = driver_read,
+    .write = driver_write,
+    .flush = driver_flush,
+    .truncate = driver_truncate,
+    .fl_map = H5FD_FLMAP_DICHOTOMY,
+};
+
+herr_t bt_h5driver_select(hid_t access, int *errnum)
+{
+    static hid_t id = -1;
+    if (id < 0 || H5Iis_valid(id) <= 0) id = H5FDregister(&driver);
+    return id < 0 ? -1 : H5Pset_driver(access, id, &(driver_info){errnum});
+}

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+// Reading back what this program wrote: a sealed file, with one way to fail.
+#include "base/h5read.h"
+
+#include "base/seal.h"
+
+typedef struct { const char *path; bt_errors *err; } whole;
+
+/// 0: goes on; 1: refused and told; −1: HDF5 fails.
+static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, void *data)
+{
+    const whole *w = data;
+    if (info->type != H5L_TYPE_HARD) {
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s link, which can lead to any other "
+                      "file and is not followed; store the data itself there",
+                      w->path, name,
+                      info->type == H5L_TYPE_SOFT       ? "a soft"
+                      : info->type == H5L_TYPE_EXTERNAL ? "an external"
+                                                        : "a user-defined");
+        return 1;
+    }
+    const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
+    if (o < 0) return -1;
+    const char *kind = NULL;
+    if (H5Iget_type(o) == H5I_DATASET) {
+        // The space is not asked for: that opens the sources of a virtual dataset.
+        const hid_t plan = H5Dget_create_plist(o);
+        if (plan >= 0 && H5Pget_layout(plan) == H5D_VIRTUAL) kind = "a virtual dataset";
+        else if (plan < 0 || H5Pget_external_count(plan) != 0) kind = "a dataset with external storage";
+        if (plan >= 0) H5Pclose(plan);
+    }
+    H5Oclose(o);
+    if (kind)
+        bt_errors_add(w->err,
+                      "%s: holds what this program does not write: /%.200s is %s, whose numbers lie in another file "
+                      "and are not read; store them in this file",
+                      w->path, name, kind);
+    return kind != NULL;
+}
+
+bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
+{
+    const herr_t found = H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, look_at, &(whole){path, err});
+    if (found < 0)
+        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot go through its objects; write it anew", path);
+    return found == 0 ? BT_OK : BT_ERR_CASE;
+}
+
+static void fail(bt_h5_reader *r, const char *name)
+{
+    if (r->status != BT_OK) return;
+    r->status = BT_ERR_CASE;
+    bt_errors_add(r->err, "%s: %s cannot be read or has another shape than expected; use the program that wrote the file", r->path, name);
+}
+
+bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
+{
+    *r = (bt_h5_reader){.file = -1, .path = path, .err = err};
+    r->status = bt_seal_check(path, kind, NULL, err);
+    if (r->status != BT_OK) return r->status;
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    if (r->file < 0) fail(r, "as HDF5 it");
+    else r->status = bt_h5_whole(r->file, path, err);
+    return r->status;
+}
+
+bt_status bt_h5_end(bt_h5_reader *r)
+{
+    if (r->file >= 0) H5Fclose(r->file);
+    r->file = -1;
+    return r->status;
+}
+
+int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k)
+{
+    if (r->status != BT_OK) return 0;
+    hsize_t size[H5S_MAX_RANK] = {0};
+    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
+    if (space >= 0) H5Sclose(space);
+    if (d >= 0) H5Dclose(d);
+    if (rank < 0) fail(r, name);
+    return k < rank ? (int64_t)size[k] : 0;
+}
+
+void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to)
+{
+    if (r->status != BT_OK || n == 0) return;
+    hsize_t size[H5S_MAX_RANK] = {0}, start[H5S_MAX_RANK] = {0};
+    const hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT), space = d < 0 ? -1 : H5Dget_space(d);
+    const int rank = space < 0 ? -1 : H5Sget_simple_extent_dims(space, size, NULL);
+    bool good = rank >= 1 && first >= 0 && n > 0 && (hsize_t)first <= size[0] && (hsize_t)n <= size[0] - (hsize_t)first;
+    // By division: the product of what a file claims may not fit.
+    hsize_t left = (hsize_t)width;
+    bool empty = false;
+    for (int k = 1; k < rank; k++) {
+        empty = empty || size[k] == 0;
+        good = good && (size[k] == 0 || left % size[k] == 0);
+        if (good && size[k] > 0) left /= size[k];
+    }
+    good = good && empty == (width == 0) && (empty || left == 1);
+    if (good) {
+        start[0] = (hsize_t)first;
+        size[0] = (hsize_t)n;
+        const hid_t here = H5Screate_simple(rank, size, NULL);
+        const bool filled = H5Sget_simple_extent_npoints(here) > 0;
+        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 && (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
+        H5Sclose(here);
+    }
+    if (space >= 0) H5Sclose(space);
+    if (d >= 0) H5Dclose(d);
+    if (!good) fail(r, name);
+}

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+// A dataset whose rows are written by all ranks, each its own.
+//
+// On one rank rows go through HDF5, in chunks of at most 1 MB that are shuffled and deflated. On several, HDF5 has the file
+// open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill values), says where the rows
+// lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
+//
+// Rejected: HDF5's own parallel driver. It must keep one copy of all metadata a rank, and each change of it is collective. A write that fails on
+// one rank (full disk, quota) leaves the others waiting inside the library or inside MPI-IO, and a file that cannot
+// be closed crashes in MPI_Finalize; the reason, a number from the system, is lost on the way. Here errors are plain errno values
+// on the rank that met them. What deflate gains on poses and vertices, a quarter to a third, is the price.
+#include "base/h5slab.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#define SMALL 8192 // bytes; the index of a chunked dataset takes 2 kB
+
+static bt_slab describe(bt_h5 *h, hid_t type, int64_t n, int width)
+{
+    const size_t row = H5Tget_size(type) * (size_t)(width ? width : 1);
+    // Pieces of equal length, as the last one is stored whole too.
+    const int64_t most = (int64_t)(BT_SLAB_BYTES / row), pieces = n > 0 ? (n + most - 1) / most : 1;
+    return (bt_slab){.h = h, .dataset = -1, .type = type, .n = n, .width = width, .row_bytes = row, .piece = n > 0 ? (n + pieces - 1) / pieces : 1};
+}
+
+bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int width, bool packed)
+{
+    bt_slab s = describe(h, type, n, width);
+    packed = packed && !bt_h5_shared(h) && (size_t)n * s.row_bytes > SMALL;
+    if (!packed && n > 0) s.piece = n;
+    s.dataset = bt_h5_dataset(h, name, type, width ? 2 : 1, (hsize_t[]){(hsize_t)n, (hsize_t)width}, packed ? (hsize_t)s.piece : 0);
+    return s;
+}
+
+bt_slab bt_slab_growing(bt_h5 *h, const char *name, hid_t type, int64_t n, int width)
+{
+    bt_slab s = describe(h, type, n, width);
+    s.growing = true;
+    s.dataset = bt_h5_growing(h, name, type, width ? 3 : 2, (hsize_t[]){(hsize_t)n, (hsize_t)width}, (hsize_t[]){1, (hsize_t)s.piece}, !bt_h5_shared(h));
+    return s;
+}
+
+void bt_slab_grow(bt_slab *s, int64_t frame)
+{
+    s->frame = frame;
+    bt_h5_extend(s->h, s->dataset, (hsize_t)frame + 1);
+}
+
+static int64_t pieces_of(const bt_slab *s) { return (s->n + s->piece - 1) / s->piece; }
+
+bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k)
+{
+    if (c->size == 1) return s[0]->h->status;
+    size_t n = 1;
+    for (int i = 0; i < k; i++) n += (size_t)pieces_of(s[i]);
+    uint64_t *words = bt_alloc(n, sizeof *words), *p = words + 1;
+    if (c->rank == 0)
+        for (int i = 0; i < k; i++) {
+            const int64_t pieces = pieces_of(s[i]);
+            for (int64_t j = 0; j < pieces; j++) p[j] = bt_h5_address(s[i]->h, s[i]->dataset, s[i]->growing, (hsize_t)s[i]->frame, (hsize_t)(j * s[i]->piece));
+            p += pieces;
+        }
+    words[0] = (uint64_t)s[0]->h->status;
+    bt_comm_bcast(c, words, n * sizeof *words);
+    const bt_status status = (bt_status)words[0];
+    p = words + 1;
+    for (int i = 0; i < k; i++) {
+        const size_t pieces = (size_t)pieces_of(s[i]);
+        s[i]->address = bt_realloc(s[i]->address, pieces, sizeof *s[i]->address);
+        memcpy(s[i]->address, p, pieces * sizeof *p);
+        p += pieces;
+    }
+    free(words);
+    return status;
+}
+
+void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows)
+{
+    if (!bt_h5_shared(s->h)) {
+        bt_h5_write_rows(s->h, s->dataset, s->type, s->growing, (hsize_t)s->frame, (hsize_t)first, (hsize_t)n, rows);
+        return;
+    }
+    const char *p = rows;
+    while (n > 0 && s->h->status == BT_OK) {
+        const int64_t piece = first / s->piece, left = (piece + 1) * s->piece - first, now = n < left ? n : left;
+        const size_t bytes = (size_t)now * s->row_bytes;
+        bt_h5_write_raw(s->h, s->address[piece] + (uint64_t)(first - piece * s->piece) * s->row_bytes, bytes, p);
+        p += bytes;
+        first += now;
+        n -= now;
+    }
+}
+
+void bt_slab_close(bt_slab *s)
+{
+    if (s->dataset >= 0) H5Dclose(s->dataset);
+    free(s->address);
+    s->dataset = -1;
+    s->address = NULL;
+}
+
+// Writes end where pieces do: so each chunk is deflated once.
+static int64_t room_from(const bt_slab *s, int64_t at)
+{
+    const int64_t buffer = (int64_t)(BT_SLAB_BYTES / s->row_bytes), left = s->piece - at % s->piece;
+    return left < buffer ? left : buffer;
+}
+
+bt_rows bt_rows_from(bt_slab *s, int64_t first, void *buffer)
+{
+    return (bt_rows){.s = s, .buffer = buffer, .at = first, .room = room_from(s, first)};
+}
+
+void bt_rows_end(bt_rows *r)
+{
+    if (r->n > 0) bt_slab_write(r->s, r->at, r->n, r->buffer);
+    r->at += r->n;
+    r->n = 0;
+    r->room = room_from(r->s, r->at);
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// The limits of size as a list for people.
+#include "base/largest.h"
+
+#include "bergtow/shape.h"
+#include "bergtow/study.h"
+
+void bt_largest_print(FILE *out)
+{
+    const struct {
+        const char *what;
+        double most;
+        const char *unit;
+    } rows[] = {
+        {"case or study file", BT_MOST_TEXT_BYTES, "bytes"},
+        {"its nesting", BT_TREE_DEPTH, "levels"},
+        {"its values", BT_TREE_NODES, "in all"},
+        {"keys of one section", BT_TREE_MAP, ""},
+        {"a text", BT_MAX_TEXT, "bytes"},
+        {"floes by hand", BT_MAX_FLOES_BY_HAND, "floes"},
+        {"tow.programme, tow.waypoints", BT_MOST_POINTS, "points each"},
+        {"corners of a polygon", BT_MAX_VERTICES, "vertices"},
+        {"floes, made or read", BT_MOST_FLOES, "floes"},
+        {"steps", BT_MOST_STEPS, "steps"},
+        {"frames", BT_MOST_FRAMES, "frames"},
+        {"series and frames of a run", BT_MOST_RESULT_BYTES, "bytes, estimated"},
+        {"work of a run", BT_MOST_CORE_SECONDS, "s of one core, estimated"},
+        {"CSV table", BT_MOST_TABLE_BYTES, "bytes"},
+        {"its rows", BT_MOST_ROWS, "rows"},
+        {"GeoJSON file", BT_MOST_OUTLINE_BYTES, "bytes"},
+        {"its lists (vertices)", BT_MOST_LISTS, "lists"},
+        {"an outline before ice.nonconvex: hull", BT_MOST_RING, "vertices"},
+        {"parameters of a study", BT_MAX_PARAMETERS, ""},
+        {"values of one parameter", BT_MOST_VALUES, ""},
+        {"members of a study", BT_MAX_MEMBERS, "members"},
+        {"errors of one case that are told", BT_MOST_COMPLAINTS, "errors"},
+    };
+    const struct {
+        const char *what;
+        double least;
+        const char *unit;
+    } floors[] = {
+        {"concentration, unless 0", BT_LEAST_CONCENTRATION, ""},
+        {"mean size of the floes", BT_LEAST_SIZE, "m"},
+        {"thickness of a floe", BT_LEAST_THICKNESS, "m"},
+    };
+    fputs("\nWhat is refused as too large, with the remedy. Beyond these, a run that needs more memory than the machine has is refused before it begins.\n\n", out);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) fprintf(out, "%-40s %12.10g %s\n", rows[i].what, rows[i].most, rows[i].unit);
+    fputs("\nWhat is refused as too small to be ice.\n\n", out);
+    for (size_t i = 0; i < sizeof floors / sizeof *floors; i++)
+        fprintf(out, "%-40s %12.10g %s\n", floors[i].what, floors[i].least, floors[i].unit);
+}

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+// A set of named arrays: adding, taking, sharing, comparing.
+#include "base/snapshot.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+size_t bt_item_size(bt_item_type type)
+{
+    static const size_t size[BT_ITEM_TYPES] = {[BT_ITEM_F64] = 8, [BT_ITEM_I64] = 8, [BT_ITEM_I32] = 4, [BT_ITEM_U32] = 4, [BT_ITEM_U16] = 2, [BT_ITEM_U8] = 1, [BT_ITEM_TEXT] = 1};
+    return size[type];
+}
+
+static size_t bytes_of(const bt_item *i) { return (size_t)i->n * (size_t)i->width * bt_item_size(i->type); }
+
+// --- adding ----------------------------------------------------------------------------------------------------------
+
+void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data)
+{
+    if (s->n == s->cap) s->item = bt_realloc(s->item, (size_t)(s->cap = s->cap ? 2 * s->cap : 64), sizeof *s->item);
+    bt_item *i = &s->item[s->n++];
+    *i = (bt_item){.name = strdup(name), .type = type, .n = n, .width = width};
+    const size_t bytes = bytes_of(i);
+    i->data = bt_alloc(bytes, 1);
+    if (data && bytes) memcpy(i->data, data, bytes);
+    return i->data;
+}
+
+void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text) { bt_snapshot_add(s, name, BT_ITEM_TEXT, (int64_t)strlen(text) + 1, 1, text); }
+void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value) { bt_snapshot_add(s, name, BT_ITEM_I64, 1, 1, &value); }
+void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value) { bt_snapshot_add(s, name, BT_ITEM_F64, 1, 1, &value); }
+
+void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base)
+{
+    for (int k = 0; k < n_rows; k++) {
+        char name[128];
+        snprintf(name, sizeof name, "%s/%s", group, row[k].name);
+        bt_snapshot_add(s, name, row[k].type, 1, row[k].width, (const char *)base + row[k].offset);
+    }
+}
+
+void bt_snapshot_free(bt_snapshot *s)
+{
+    for (int k = 0; k < s->n; k++) {
+        free(s->item[k].name);
+        free(s->item[k].data);
+    }
+    free(s->item);
+    *s = (bt_snapshot){0};
+}
+
+// --- taking ----------------------------------------------------------------------------------------------------------
+
+const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name)
+{
+    for (int k = 0; k < s->n; k++)
+        if (!strcmp(s->item[k].name, name)) return &s->item[k];
+    return NULL;
+}
+
+static void complain(bt_snapshot *s, const char *name, const char *what)
+{
+    if (!s->faulty && s->err)
+        bt_errors_add(s->err, "%s: /%s %s; it was written by another version of the program: go on with that one, or start the run anew", s->path ? s->path : "checkpoint", name, what);
+    s->faulty = true;
+}
+
+void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what)
+{
+    if (good) return;
+    char where[32] = "";
+    if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
+    if (!s->faulty && s->err)
+        bt_errors_add(s->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew", s->path ? s->path : "checkpoint", name, where, what);
+    s->faulty = true;
+}
+
+static bool yes_and_no(const bt_item *i)
+{
+    for (int64_t k = 0; k < i->n * i->width; k++)
+        if (((const uint8_t *)i->data)[k] > 1) return false;
+    return true;
+}
+
+static const bt_item *demand(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width)
+{
+    const bt_item *i = bt_snapshot_find(s, name);
+    if (!i) complain(s, name, "is missing");
+    else if (i->type != type || i->width != width || (n >= 0 && i->n != n)) complain(s, name, "has another shape than expected");
+    else if (type == BT_ITEM_U8 && !yes_and_no(i)) bt_snapshot_want(s, false, name, -1, "holds more than 0 and 1");
+    else return i;
+    return NULL;
+}
+
+int64_t bt_snapshot_rows(bt_snapshot *s, const char *name)
+{
+    const bt_item *i = bt_snapshot_find(s, name);
+    if (!i) complain(s, name, "is missing");
+    return i ? i->n : 0;
+}
+
+void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to)
+{
+    const bt_item *i = demand(s, name, type, n, width);
+    if (i && bytes_of(i)) memcpy(to, i->data, bytes_of(i));
+}
+
+const char *bt_snapshot_text(bt_snapshot *s, const char *name)
+{
+    const bt_item *i = demand(s, name, BT_ITEM_TEXT, -1, 1);
+    return i ? i->data : "";
+}
+
+int64_t bt_snapshot_int(bt_snapshot *s, const char *name)
+{
+    int64_t x = 0;
+    bt_snapshot_take(s, name, BT_ITEM_I64, 1, 1, &x);
+    return x;
+}
+
+double bt_snapshot_real(bt_snapshot *s, const char *name)
+{
+    double x = NAN;
+    bt_snapshot_take(s, name, BT_ITEM_F64, 1, 1, &x);
+    return x;
+}
+
+void bt_snapshot_take_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, void *base)
+{
+    for (int k = 0; k < n_rows; k++) {
+        char name[128];
+        snprintf(name, sizeof name, "%s/%s", group, row[k].name);
+        bt_snapshot_take(s, name, row[k].type, 1, row[k].width, (char *)base + row[k].offset);
+    }
+}
+
+void *bt_snapshot_copy(bt_snapshot *s, const char *name, bt_item_type type, int width, int64_t *n)
+{
+    const bt_item *i = demand(s, name, type, -1, width);
+    *n = i ? i->n : 0;
+    void *copy = bt_alloc(i ? bytes_of(i) : 0, 1);
+    if (i && bytes_of(i)) memcpy(copy, i->data, bytes_of(i));
+    return copy;
+}
+
+// --- sharing ---------------------------------------------------------------------------------------------------------
+
+void bt_snapshot_share(const bt_comm *c, bt_snapshot *s)
+{
+    if (c->size == 1) return;
+    int64_t n = s->n;
+    bt_comm_bcast(c, &n, sizeof n);
+    for (int64_t k = 0; k < n; k++) {
+        int64_t head[4] = {0}; // name, type, rows, width
+        if (c->rank == 0) {
+            const bt_item *i = &s->item[k];
+            head[0] = (int64_t)strlen(i->name) + 1, head[1] = i->type, head[2] = i->n, head[3] = i->width;
+        }
+        bt_comm_bcast(c, head, sizeof head);
+        char name[160] = "";
+        if (c->rank == 0) snprintf(name, sizeof name, "%s", s->item[k].name);
+        bt_comm_bcast(c, name, sizeof name);
+        if (c->rank != 0) bt_snapshot_add(s, name, (bt_item_type)head[1], head[2], (int)head[3], NULL);
+        bt_comm_bcast(c, s->item[k].data, bytes_of(&s->item[k]));
+    }
+}
+
+// --- comparing -------------------------------------------------------------------------------------------------------
+
+const char *bt_item_number(const bt_item *i, int64_t at, char out[40])
+{
+    const void *d = i->data;
+    switch (i->type) {
+    case BT_ITEM_F64: snprintf(out, 40, "%.17g", ((const double *)d)[at]); break;
+    case BT_ITEM_I64: snprintf(out, 40, "%" PRId64, ((const int64_t *)d)[at]); break;
+    case BT_ITEM_I32: snprintf(out, 40, "%" PRId32, ((const int32_t *)d)[at]); break;
+    case BT_ITEM_U32: snprintf(out, 40, "%" PRIu32, ((const uint32_t *)d)[at]); break;
+    case BT_ITEM_U16: snprintf(out, 40, "%d", (int)((const uint16_t *)d)[at]); break;
+    default: snprintf(out, 40, "%d", (int)((const uint8_t *)d)[at]); break;
+    }
+    return out;
+}
+
+/// The same bits, or two zeros: −0 and +0 are one state, as in bt_world_hash.
+static bool same_number(const bt_item *a, const bt_item *b, int64_t at)
+{
+    if (a->type == BT_ITEM_F64) {
+        const double x = ((const double *)a->data)[at], y = ((const double *)b->data)[at];
+        if (x == y) return true;
+    }
+    const size_t size = bt_item_size(a->type);
+    return !memcmp((const char *)a->data + (size_t)at * size, (const char *)b->data + (size_t)at * size, size);
+}
+
+static bool differ(const bt_item *a, const bt_item *b, char out[400])
+{
+    if (a->type == BT_ITEM_TEXT && b->type == BT_ITEM_TEXT) {
+        if (!strcmp(a->data, b->data)) return false;
+        int64_t line = 1;
+        for (const char *p = a->data, *q = b->data; *p && *p == *q; p++, q++) line += *p == '\n';
+        snprintf(out, 400, "/%s: the texts differ from line %" PRId64 " on", a->name, line);
+        return true;
+    }
+    if (a->type != b->type || a->width != b->width || a->n != b->n) {
+        snprintf(out, 400, "/%s: %" PRId64 " rows of %d in one, %" PRId64 " of %d in the other", a->name, a->n, a->width, b->n, b->width);
+        return true;
+    }
+    int64_t first = -1, many = 0;
+    for (int64_t k = 0; k < a->n * a->width; k++) {
+        if (same_number(a, b, k)) continue;
+        if (first < 0) first = k;
+        many++;
+    }
+    if (first < 0) return false;
+    char x[40], y[40];
+    bt_item_number(a, first, x);
+    bt_item_number(b, first, y);
+    snprintf(out, 400, "/%s: row %" PRId64 ", column %d: %s and %s (%" PRId64 " of %" PRId64 " numbers differ)", a->name, first / a->width, (int)(first % a->width), x, y, many,
+             a->n * a->width);
+    return true;
+}
+
+static bool compared(const bt_item *i) { return strncmp(i->name, "about/", 6) && strncmp(i->name, "clock/", 6); }
+
+bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400])
+{
+    for (int k = 0; k < a->n; k++) {
+        if (!compared(&a->item[k])) continue;
+        const bt_item *other = bt_snapshot_find(b, a->item[k].name);
+        if (!other) {
+            snprintf(out, 400, "/%s: only in the first", a->item[k].name);
+            return true;
+        }
+        if (differ(&a->item[k], other, out)) return true;
+    }
+    for (int k = 0; k < b->n; k++)
+        if (compared(&b->item[k]) && !bt_snapshot_find(a, b->item[k].name)) {
+            snprintf(out, 400, "/%s: only in the second", b->item[k].name);
+            return true;
+        }
+    return false;
+}

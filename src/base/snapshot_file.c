@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// A snapshot as an HDF5 file: a dataset for each array, /group/name.
+//
+// Written to the name it is given, not to a temporary one: that is the caller's part (bergtow/checkpoint.h).
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/h5read.h"
+#include "base/h5util.h"
+#include "base/seal.h"
+#include "base/snapshot.h"
+
+static hid_t memory_type(bt_item_type type)
+{
+    switch (type) {
+    case BT_ITEM_F64: return H5T_NATIVE_DOUBLE;
+    case BT_ITEM_I64: return H5T_NATIVE_INT64;
+    case BT_ITEM_I32: return H5T_NATIVE_INT32;
+    case BT_ITEM_U32: return H5T_NATIVE_UINT32;
+    case BT_ITEM_U16: return H5T_NATIVE_UINT16;
+    default: return H5T_NATIVE_UINT8;
+    }
+}
+
+/// Make the group of item k where it is the first of it.
+static void enter(bt_h5 *h, const bt_snapshot *s, int k)
+{
+    const size_t length = strcspn(s->item[k].name, "/") + 1;
+    for (int j = 0; j < k; j++)
+        if (!strncmp(s->item[j].name, s->item[k].name, length)) return;
+    char group[64];
+    snprintf(group, sizeof group, "/%.*s", (int)length - 1, s->item[k].name);
+    bt_h5_group(h, group);
+}
+
+bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err)
+{
+    bt_h5 h;
+    bt_status status = bt_h5_create_with_room(&h, path, err);
+    if (status != BT_OK) return status;
+    char name[160];
+    for (int k = 0; k < s->n; k++) {
+        const bt_item *i = &s->item[k];
+        enter(&h, s, k);
+        snprintf(name, sizeof name, "/%s", i->name);
+        if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&h, name, i->data);
+        else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
+    }
+    status = bt_h5_close(&h);
+    return status == BT_OK ? bt_seal_write(path, BT_SEAL_CHECKPOINT, err) : status;
+}
+
+enum { MOST_COLUMNS = 1000 };
+
+/// Type and shape of a dataset; false for what this program does not write.
+static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
+{
+    hsize_t size[2] = {1, 1};
+    const hid_t t = H5Dget_type(d), space = H5Dget_space(d);
+    const int rank = H5Sget_simple_extent_ndims(space);
+    bool good = rank >= 0 && rank <= 2 && H5Sget_simple_extent_dims(space, size, NULL) == rank;
+    *n = (int64_t)size[0];
+    *width = (int)size[1];
+    const size_t bytes = H5Tget_size(t);
+    // What it claims to be must be there: nothing this program writes is stored in another way than whole.
+    const hsize_t stored = H5Dget_storage_size(d), numbers = bytes > 0 ? stored / bytes : 0;
+    good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS && (size[0] == 0 ? stored == 0 : stored == numbers * bytes && numbers % size[1] == 0 && numbers / size[1] == size[0]);
+    switch (H5Tget_class(t)) {
+    case H5T_FLOAT: *type = BT_ITEM_F64, good = good && bytes == 8; break;
+    case H5T_INTEGER: {
+        const bool sign = H5Tget_sign(t) == H5T_SGN_2;
+        *type = sign ? bytes == 8 ? BT_ITEM_I64 : BT_ITEM_I32 : bytes == 4 ? BT_ITEM_U32 : bytes == 2 ? BT_ITEM_U16 : BT_ITEM_U8;
+        good = good && bytes == bt_item_size(*type);
+        break;
+    }
+    case H5T_STRING: *type = BT_ITEM_TEXT, *n = (int64_t)bytes, *width = 1, good = good && rank == 0 && !H5Tis_variable_str(t); break;
+    default: good = false;
+    }
+    H5Tclose(t);
+    H5Sclose(space);
+    return good;
+}
+
+/// A text that ends where its array does, and nowhere before.
+static bool is_text(const char *text, int64_t n) { return memchr(text, 0, (size_t)n) == text + n - 1; }
+
+/// Names stand in messages: only what this program writes.
+static bool is_name(const char *name) { return name[strspn(name, "abcdefghijklmnopqrstuvwxyz0123456789_/")] == 0; }
+
+static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *data)
+{
+    bt_snapshot *s = data;
+    (void)info; // links have been refused: bt_h5_open
+    const hid_t o = H5Oopen(group, name, H5P_DEFAULT);
+    herr_t result = o < 0 ? -1 : 0;
+    if (o >= 0 && H5Iget_type(o) == H5I_DATASET) {
+        bt_item_type type = BT_ITEM_F64;
+        int64_t n;
+        int width;
+        char full[160];
+        const ssize_t length = H5Iget_name(o, full, sizeof full);
+        if (length < 2 || length >= (ssize_t)sizeof full || !is_name(full) || !describe(o, &type, &n, &width)) {
+            result = -1;
+        } else {
+            void *to = bt_snapshot_add(s, full + 1, type, n, width, NULL);
+            const hid_t stored = H5Dget_type(o);
+            if (n * width > 0 && H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0) result = -1;
+            if (type == BT_ITEM_TEXT && !is_text(to, n)) result = -1;
+            H5Tclose(stored);
+        }
+    }
+    if (o >= 0) H5Oclose(o);
+    return result;
+}
+
+static herr_t take_group(hid_t file, const char *name, const H5L_info_t *info, void *data)
+{
+    (void)info;
+    return H5Literate_by_name(file, name, H5_INDEX_NAME, H5_ITER_INC, NULL, take, data, H5P_DEFAULT);
+}
+
+bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err)
+{
+    *s = (bt_snapshot){.path = path, .err = err};
+    bt_h5_reader r;
+    if (bt_h5_open(&r, path, BT_SEAL_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
+    if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0) {
+        bt_errors_add(err, "%s: holds what this program does not write; use the program that wrote it", path);
+        r.status = BT_ERR_CASE;
+    }
+    const bt_status status = bt_h5_end(&r);
+    if (status != BT_OK) bt_snapshot_free(s);
+    return status;
+}

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+// Tables of a velocity in time: strict reading of CSV, and linear interpolation.
+#include "base/table.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fileio.h"
+#include "base/largest.h"
+#include "base/units.h"
+
+enum { LONGEST_LINE = 255, MOST_COMPLAINTS = 10 };
+static const double largest_speed = 100; // m/s, as for the keys of a constant current or wind
+
+void bt_table_free(bt_table *t)
+{
+    free(t->row);
+    *t = (bt_table){0};
+}
+
+/// Cut off the end of the line and blanks around the text.
+static char *trimmed(char *s)
+{
+    s += strspn(s, " \t");
+    for (size_t n = strlen(s); n && strchr(" \t\r\n", s[n - 1]); n--) s[n - 1] = 0;
+    return s;
+}
+
+static bool is_header(char *line)
+{
+    static const char *const names[] = {"t", "u", "v"};
+    for (int i = 0; i < 3; i++) {
+        char *comma = strchr(line, ',');
+        if ((comma == NULL) != (i == 2)) return false;
+        if (comma) *comma = 0;
+        if (strcmp(trimmed(line), names[i])) return false;
+        if (comma) line = comma + 1;
+    }
+    return true;
+}
+
+/// One row of numbers; says what is wrong with it, or NULL.
+static const char *read_row(char *line, double row[3], char why[BT_WHY])
+{
+    for (int i = 0; i < 3; i++) {
+        char *comma = strchr(line, ',');
+        if ((comma == NULL) != (i == 2)) return "has not three columns; write t,u,v";
+        if (comma) *comma = 0;
+        if (!bt_units_parse(line, i == 0 ? BT_UNIT_TIME : BT_UNIT_SPEED, &row[i], why)) return why;
+        if (i > 0 && fabs(row[i]) > largest_speed) return "a speed is out of range; give a value in [-100, 100] m/s";
+        if (comma) line = comma + 1;
+    }
+    return NULL;
+}
+
+/// The line at *rest, which then stands behind it, terminated; its length, or NULL after the last.
+static char *next_line(char **rest, const char *end, size_t *n)
+{
+    char *line = *rest;
+    if (line >= end) return NULL;
+    char *stop = memchr(line, '\n', (size_t)(end - line));
+    *n = stop ? (size_t)(stop - line) : (size_t)(end - line);
+    *rest = line + *n + 1;
+    line[*n] = 0;
+    return line;
+}
+
+static void read_lines(bt_table *t, char *rest, const char *end, const char *path, bt_errors *err)
+{
+    char *line, why[BT_WHY];
+    size_t length;
+    const size_t before = err->n;
+    int64_t cap = 0;
+    bool header = false;
+    for (int number = 1; err->n - before < MOST_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
+        if (length > LONGEST_LINE || strlen(line) != length) {
+            bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number, length > LONGEST_LINE ? "is longer than a row of a table can be" : "holds a NUL character");
+            return;
+        }
+        char *text = trimmed(line);
+        if (!*text || *text == '#') continue;
+        if (!header) {
+            header = true;
+            if (is_header(text)) continue;
+            bt_errors_add(err, "%s:%d: is not the header; begin the table with the line t,u,v (s, m/s, m/s)", path, number);
+            return;
+        }
+        double row[3];
+        const char *fault = read_row(text, row, why);
+        if (!fault && t->n && !(row[0] > t->row[3 * (t->n - 1)])) fault = "its time is not after that of the row before; sort the rows and remove doubles";
+        if (fault) {
+            bt_errors_add(err, "%s:%d: %s", path, number, fault);
+            continue;
+        }
+        if (t->n == BT_MOST_ROWS) {
+            bt_errors_add(err, "%s:%d: more than %d rows; take longer steps between them", path, number, BT_MOST_ROWS);
+            return;
+        }
+        if (t->n == cap) t->row = bt_realloc(t->row, (size_t)(cap = cap ? 2 * cap : 256), 3 * sizeof *t->row);
+        memcpy(t->row + 3 * t->n++, row, sizeof row);
+    }
+    if (err->n == before && t->n == 0) bt_errors_add(err, "%s: holds no row; write the header t,u,v and below it a row for each time", path);
+}
+
+bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
+{
+    bt_table_free(t);
+    const size_t before = err->n;
+    char *text;
+    size_t size;
+    bt_status status = bt_file_read_to(path, "a CSV table", BT_MOST_TABLE_BYTES, &text, &size, err);
+    if (status == BT_OK) read_lines(t, text, text + size, path, err);
+    free(text);
+    if (status == BT_OK && err->n > before) status = BT_ERR_CASE;
+    if (status != BT_OK) bt_table_free(t);
+    return status;
+}
+
+bool bt_table_row_sound(const bt_table *t, int64_t i)
+{
+    const double *row = t->row + 3 * i;
+    return isfinite(row[0]) && (i == 0 || row[0] > row[-3]) && fabs(row[1]) <= largest_speed && fabs(row[2]) <= largest_speed;
+}
+
+void bt_table_at(const bt_table *t, double time, double v[2])
+{
+    const double *row = t->row;
+    int64_t low = 0, high = t->n - 1; // row[low] <= time < row[high], once the ends are done with
+    const int64_t end = !(time > row[0]) ? 0 : time >= row[3 * high] ? high : -1;
+    if (end >= 0) {
+        memcpy(v, row + 3 * end + 1, 2 * sizeof *v);
+        return;
+    }
+    while (high - low > 1) {
+        const int64_t mid = low + (high - low) / 2;
+        *(time < row[3 * mid] ? &high : &low) = mid;
+    }
+    const double *p = row + 3 * low, *q = row + 3 * high, s = (time - p[0]) / (q[0] - p[0]);
+    for (int k = 0; k < 2; k++) v[k] = p[k + 1] == q[k + 1] ? p[k + 1] : (1 - s) * p[k + 1] + s * q[k + 1];
+}
+
+double bt_table_fastest(const bt_table *t)
+{
+    double most = 0;
+    for (int64_t i = 0; i < t->n; i++) most = bt_max(most, hypot(t->row[3 * i + 1], t->row[3 * i + 2]));
+    return most;
+}

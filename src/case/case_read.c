@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: MIT
+// Reading of a case: file and --set overrides onto the schema, with every error of the case in one go.
+#include "case/case_check.h"
+
+#include "bergtow/shape.h"
+#include "base/fileio.h"
+#include "base/largest.h"
+#include "case/schema.h"
+#include "base/table.h"
+#include "base/tree.h"
+#include "case/value.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    bt_case *c;
+    bt_errors *err;
+    bt_origin *from;          // [bt_n_case_keys]
+    const bt_node **given;    // [bt_n_case_keys] the value of each key, or NULL
+    const bt_node *floes;
+} reader;
+
+void bt_case_defaults(bt_case *c)
+{
+    *c = (bt_case){0};
+    bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
+}
+
+static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
+{
+    char buffer[64];
+    const char *near = bt_schema_suggest(keys, n, name, buffer);
+    if (near) bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->c->path, line, where, name, near);
+    else bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", r->c->path, line, where, name);
+}
+
+static bool is_nothing(const bt_node *node)
+{
+    return node->kind == BT_NODE_SCALAR && node->plain && (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
+}
+
+// Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed: 1).
+static void walk(reader *r, const bt_node *map, const char *prefix)
+{
+    for (int i = 0; i < map->n; i++) {
+        char name[160];
+        int line = map->key_line[i];
+        const bt_node *value = map->item[i];
+        snprintf(name, sizeof name, "%s%s%.90s", prefix, *prefix ? "." : "", map->key[i]);
+        int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
+        if (k >= 0) {
+            if (r->given[k])
+                bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", r->c->path, line, name, r->from[k].line);
+            else {
+                r->given[k] = value;
+                r->from[k].line = line;
+            }
+        } else if (!strcmp(name, "floes")) {
+            r->floes = value;
+        } else if (!bt_schema_is_section(name)) {
+            unknown_key(r, bt_case_keys, bt_n_case_keys, line, "", name);
+        } else if (value->kind == BT_NODE_MAP) {
+            walk(r, value, name);
+        } else if (!is_nothing(value)) {
+            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->c->path, line, name);
+        }
+    }
+}
+
+// A list of points [[x, y], ...] into base. where: start of the message.
+static bool read_points(const bt_key *k, void *base, const bt_node *list, const char *where, bt_errors *err)
+{
+    if (list->kind == BT_NODE_SCALAR && list->plain && !strcmp(list->text, "none")) return true;
+    if (list->kind != BT_NODE_LIST) {
+        bt_errors_add(err, "%s: needs a list of points; give it as [[x, y], [x, y], ...]", where);
+        return false;
+    }
+    const int least = k->least > 0 ? k->least : 3, most = k->most > 0 ? k->most : BT_MAX_VERTICES;
+    if (list->n < least || list->n > most) {
+        bt_errors_add(err, "%s: has %d points; a %s has %d to %d", where, list->n, k->most > 0 ? "list here" : "polygon", least, most);
+        return false;
+    }
+    double *p = bt_alloc((size_t)list->n, 2 * sizeof *p);
+    bool good = true;
+    for (int i = 0; i < list->n && good; i++) {
+        const bt_node *point = list->item[i];
+        good = point->kind == BT_NODE_LIST && point->n == 2 && point->item[0]->kind == BT_NODE_SCALAR && point->item[1]->kind == BT_NODE_SCALAR;
+        if (!good) bt_errors_add(err, "%s: point %d is not a pair; give it as [x, y]", where, i + 1);
+        for (int j = 0; j < 2 && good; j++) {
+            char why[BT_WHY];
+            const bt_key column = bt_schema_column(k, j);
+            good = bt_value_read_coordinate(&column, point->item[j]->text, &p[2 * i + j], why);
+            if (!good) bt_errors_add(err, "%s: point %d: %s", where, i + 1, why);
+        }
+    }
+    if (!good) {
+        free(p);
+        return false;
+    }
+    memcpy((char *)base + k->offset, &p, sizeof p);
+    memcpy((char *)base + k->offset_count, &list->n, sizeof(int));
+    return true;
+}
+
+static bool read_value(const bt_key *k, void *base, const bt_node *value, const char *where, bt_errors *err)
+{
+    if (k->type == BT_KEY_POINTS) return read_points(k, base, value, where, err);
+    if (value->kind != BT_NODE_SCALAR) {
+        bt_errors_add(err, "%s: is a %s and needs a single value; write key: value", where, value->kind == BT_NODE_MAP ? "section" : "list");
+        return false;
+    }
+    char why[BT_WHY];
+    if (bt_value_read(k, base, value->text, value->plain, why)) return true;
+    bt_errors_add(err, "%s: %s", where, why);
+    return false;
+}
+
+static void read_given(reader *r)
+{
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const bt_key *key = &bt_case_keys[k];
+        if (r->from[k].faulty || r->from[k].set) continue;
+        if (!r->given[k]) {
+            if (key->preset) continue;
+            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->c->path, key->name, key->doc);
+            r->from[k].faulty = true;
+            continue;
+        }
+        char where[256];
+        bt_case_locate(r->c, &r->from[k], key->name, where);
+        r->from[k].faulty = !read_value(key, r->c, r->given[k], where, r->err);
+    }
+}
+
+static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
+{
+    char where[256], item[32];
+    snprintf(item, sizeof item, "floes[%d].", index);
+    if (map->kind != BT_NODE_MAP) {
+        bt_errors_add(r->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}", r->c->path, map->line, index);
+        return false;
+    }
+    size_t before = r->err->n;
+    for (int i = 0; i < map->n; i++) {
+        int k = bt_schema_find(bt_floe_keys, bt_n_floe_keys, map->key[i]);
+        if (k < 0) {
+            unknown_key(r, bt_floe_keys, bt_n_floe_keys, map->key_line[i], item, map->key[i]);
+            continue;
+        }
+        snprintf(where, sizeof where, "%.180s:%d: %s%s", r->c->path, map->key_line[i], item, bt_floe_keys[k].name);
+        read_value(&bt_floe_keys[k], f, map->item[i], where, r->err);
+    }
+    for (int k = 0; k < bt_n_floe_keys; k++) {
+        const bool found = bt_floe_keys[k].preset || bt_tree_has(map, bt_floe_keys[k].name);
+        if (!found) bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->c->path, map->line, item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
+    }
+    return r->err->n == before;
+}
+
+static void read_floes(reader *r)
+{
+    const bt_node *list = r->floes;
+    if (!list || is_nothing(list)) return;
+    if (list->kind != BT_NODE_LIST) {
+        bt_errors_add(r->err, "%s:%d: floes: is not a list; begin each floe with - below it", r->c->path, list->line);
+        return;
+    }
+    if (list->n > BT_MAX_FLOES_BY_HAND) {
+        bt_errors_add(r->err, "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name it in ice.field",
+                      r->c->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
+        return;
+    }
+    r->c->floes = bt_alloc((size_t)list->n, sizeof *r->c->floes);
+    const size_t before = r->err->n;
+    for (int i = 0; i < list->n; i++) {
+        if (r->err->n - before >= BT_MOST_COMPLAINTS) {
+            bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first", r->c->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+            return;
+        }
+        bt_floe_def f = {.line = list->item[i]->line};
+        bt_schema_preset(bt_floe_keys, bt_n_floe_keys, &f);
+        // A refused floe is left out so that the checks across keys do not complain about it a second time.
+        if (read_floe(r, list->item[i], i, &f)) r->c->floes[r->c->n_floes++] = f;
+        else bt_schema_release(bt_floe_keys, bt_n_floe_keys, &f);
+    }
+}
+
+static void read_override(reader *r, const char *set, const char *place)
+{
+    const char *equals = strchr(set, '=');
+    if (!equals || equals == set) {
+        bt_errors_add(r->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ", set, place ? "" : "--set ");
+        return;
+    }
+    char name[96], where[256], why[BT_WHY], buffer[64];
+    size_t n = (size_t)(equals - set);
+    while (n && set[n - 1] == ' ') n--;
+    snprintf(name, sizeof name, "%.*s", n < 90 ? (int)n : 90, set);
+    const char *value = equals + 1 + strspn(equals + 1, " ");
+    bt_case_locate(r->c, &(bt_origin){.set = set, .place = place}, name, where);
+    int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
+    if (k < 0) {
+        const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
+        if (!strcmp(name, "floes")) bt_errors_add(r->err, "%s: the list of floes cannot be set here; edit the case file", where);
+        else if (bt_schema_is_section(name)) bt_errors_add(r->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
+        else if (near) bt_errors_add(r->err, "%s: unknown key; did you mean %s?", where, near);
+        else bt_errors_add(r->err, "%s: unknown key; see bergtow --list-keys", where);
+        return;
+    }
+    r->from[k].set = set;
+    r->from[k].place = place;
+    r->from[k].line = 0;
+    if (bt_case_keys[k].type != BT_KEY_POINTS) {
+        r->from[k].faulty = !bt_value_read(&bt_case_keys[k], r->c, value, true, why);
+        if (r->from[k].faulty) bt_errors_add(r->err, "%s: %s", where, why);
+        return;
+    }
+    bt_schema_release(&bt_case_keys[k], 1, r->c); // an earlier override of the same key
+    memset((char *)r->c + bt_case_keys[k].offset_count, 0, sizeof(int));
+    bt_node *points = bt_tree_parse(value, strlen(value), where, r->err);
+    r->from[k].faulty = !points || !read_points(&bt_case_keys[k], r->c, points, where, r->err);
+    bt_tree_free(points);
+}
+
+/// Defaults, and the file name for messages.
+static void begin_case(bt_case *c, const char *path)
+{
+    bt_case_defaults(c);
+    c->path = strdup(path);
+}
+
+/// The text of c into its values.
+static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n, bt_errors *err)
+{
+    const size_t before = err->n;
+    const char *path = c->path;
+    bt_node *root = bt_tree_parse(c->text, size, path, err);
+    const char *kind = root && root->kind == BT_NODE_LIST ? "list" : "single text";
+    const bool is_map = root && root->kind == BT_NODE_MAP, study = bt_tree_has(root, "base");
+    if (root && !is_map) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/", path, kind);
+    else if (study) bt_errors_add(err, "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with `bergtow check`", path);
+    else if (is_map && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
+    if (!is_map || study || !root->n) {
+        bt_tree_free(root);
+        return BT_ERR_CASE;
+    }
+    reader r = {.c = c, .err = err, .from = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_origin)),
+                .given = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_node *))};
+    walk(&r, root, "");
+    for (int i = 0; i < n; i++) read_override(&r, overrides[i], place ? place[i] : NULL);
+    read_given(&r);
+    read_floes(&r);
+    size_t in_file = err->n;
+    bt_status status = bt_case_check(c, r.from, err);
+    if (in_file > before) status = BT_ERR_CASE;
+    free(r.from);
+    free(r.given);
+    bt_tree_free(root);
+    return status;
+}
+
+bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err)
+{
+    return bt_case_read_placed(c, path, overrides, NULL, n, err);
+}
+
+bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place, int n, bt_errors *err)
+{
+    size_t size;
+    begin_case(c, path);
+    const bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
+    return status == BT_OK ? read_text(c, size, overrides, place, n, err) : status;
+}
+
+static void keep_table(bt_table *t, const bt_table *from)
+{
+    if (from->n == 0) return;
+    t->n = from->n;
+    t->row = bt_alloc((size_t)t->n, 3 * sizeof *t->row);
+    memcpy(t->row, from->row, (size_t)t->n * 3 * sizeof *t->row);
+}
+
+bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err)
+{
+    begin_case(c, path);
+    c->text = strdup(text);
+    keep_table(&c->water.table, current);
+    keep_table(&c->air.table, wind);
+    return read_text(c, strlen(text), NULL, NULL, 0, err);
+}
+
+void bt_case_free(bt_case *c)
+{
+    bt_schema_release(bt_case_keys, bt_n_case_keys, c);
+    for (bt_idx i = 0; i < c->n_floes; i++) bt_schema_release(bt_floe_keys, bt_n_floe_keys, &c->floes[i]);
+    bt_table_free(&c->water.table);
+    bt_table_free(&c->air.table);
+    free(c->floes);
+    free(c->path);
+    free(c->text);
+    *c = (bt_case){0};
+}

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and what it cannot follow or take along.
+#include <math.h>
+#include <stdio.h>
+
+#include "case/case_check.h"
+#include "case/schema.h"
+
+static const double share_ahead = 0.6; // of the window, assumed
+static const double room = 4;          // floe sizes of ice ahead and behind, at least
+
+double bt_case_window_ahead(const bt_case *c)
+{
+    return bt_case_tow_sign(c) > 0 ? c->domain.x0 + c->domain.length - c->body.x : c->body.x - c->domain.x0;
+}
+
+void bt_case_window_follow(bt_case *c)
+{
+    const double sign = bt_case_tow_sign(c), length = c->domain.length;
+    const double ahead = isnan(c->domain.ahead) ? share_ahead * length : c->domain.ahead;
+    if (c->domain.frame == BT_FRAME_GEOGRAPHIC && isnan(c->body.x)) c->body.x = 0;
+    if (isnan(c->domain.x0)) c->domain.x0 = c->domain.frame == BT_FRAME_BASIN ? 0 : sign > 0 ? c->body.x + ahead - length : c->body.x - ahead;
+    if (isnan(c->body.x)) c->body.x = sign > 0 ? c->domain.x0 + length - ahead : c->domain.x0 + ahead;
+}
+
+/// First fault: its key, and why with remedy; NULL = none. The body reaches from x_min to x_max about its centroid.
+static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, double x_max, char why[256])
+{
+    const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length, floe = c->ice.size;
+    if (c->domain.ends != BT_BOUND_MOVING) {
+        if (!ahead_given || fabs(ahead - bt_case_window_ahead(c)) <= 1e-9 * length) return NULL; // the resolved file has every key
+        snprintf(why, 256, "%g m has no effect without domain.ends: moving; set it or remove the key", ahead);
+        return "domain.ahead";
+    }
+    if (c->body.shape == BT_BODY_ABSENT || c->tow.mode == BT_TOW_NONE) {
+        snprintf(why, 256, "moving follows a body that is towed, and here is none (body.shape, tow.mode); "
+                           "set domain.ends: periodic or open, or tow a body");
+        return "domain.ends";
+    }
+    if (fabs(cos(c->tow.direction)) < 0.5) {
+        snprintf(why, 256, "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
+                 c->tow.direction * 180 / BT_PI);
+        return "tow.direction";
+    }
+    if (sign * c->water.current_x > 0 && sign * c->water.current_x >= c->tow.speed * fabs(cos(c->tow.direction))) {
+        snprintf(why, 256, "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
+                           "set domain.ends: periodic or open", c->water.current_x);
+        return "water.current_x";
+    }
+    const double front = sign > 0 ? x_max : -x_min, stern = sign > 0 ? -x_min : x_max;
+    if (ahead < front + room * floe || length - ahead < stern + room * floe) {
+        snprintf(why, 256, "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; "
+                           "move the body or take a longer domain",
+                 ahead, length, room, room * floe);
+        return "domain.ahead";
+    }
+    if (c->domain.sides_closing != 0) {
+        snprintf(why, 256, "%g m/s: closing walls leave no room for the ice that enters a moving window; remove the key, or set "
+                           "domain.ends: periodic", c->domain.sides_closing);
+        return "domain.sides_closing";
+    }
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        if (!c->floes[i].fixed) continue;
+        snprintf(why, 256, "moving cannot take floes[%d] along, which is fixed; remove it, or set domain.ends: periodic or open", (int)i);
+        return "domain.ends";
+    }
+    return NULL;
+}
+
+static const bt_origin *origin(const bt_origin *from, const char *key)
+{
+    return from ? &from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
+}
+
+void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err)
+{
+    static const char *const used[] = {"domain.ends", "domain.length", "domain.x0", "domain.ahead", "domain.sides_closing", "tow.mode",
+                                       "tow.direction", "tow.speed", "water.current_x", "body.x", "body.yaw", "body.shape", "ice.size"};
+    for (size_t k = 0; from && k < sizeof used / sizeof *used; k++)
+        if (origin(from, used[k])->faulty) return;
+    if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
+    double x_min = 0, x_max = 0;
+    for (int k = 0; k < n; k++) {
+        const double x = cos(c->body.yaw) * v[2 * k] - sin(c->body.yaw) * v[2 * k + 1];
+        x_min = bt_min(x_min, x);
+        x_max = bt_max(x_max, x);
+    }
+    const bt_origin *ahead = origin(from, "domain.ahead");
+    char why[256], where[256];
+    const char *key = find_fault(c, ahead && (ahead->line > 0 || ahead->set), x_min, x_max, why);
+    if (!key) return;
+    bt_case_locate(c, origin(from, key), key, where);
+    bt_errors_add(err, "%s: %s", where, why);
+}

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+// Writing of a case: the resolved file, and the table of keys for --list-keys.
+#include "base/json.h"
+#include "base/largest.h"
+#include "case/schema.h"
+#include "case/value.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// Open the sections of a dotted name that the previous name was not in; returns the name's last part.
+static const char *open_sections(FILE *out, const char *previous, const char *name, int *depth)
+{
+    *depth = 0;
+    bool same = true;
+    for (const char *dot; (dot = strchr(name, '.')); name = dot + 1, ++*depth) {
+        size_t n = (size_t)(dot - name) + 1;
+        same = same && !strncmp(previous, name, n);
+        if (same) previous += n;
+        else fprintf(out, "%s%*s%.*s:\n", *depth ? "" : "\n", 2 * *depth, "", (int)n - 1, name);
+    }
+    return name;
+}
+
+static void write_floes(const bt_case *c, FILE *out)
+{
+    if (!c->n_floes) return;
+    fputs("\nfloes:\n", out);
+    for (bt_idx i = 0; i < c->n_floes; i++)
+        for (int k = 0; k < bt_n_floe_keys; k++) {
+            fprintf(out, "%s%s: ", k ? "    " : "  - ", bt_floe_keys[k].name);
+            bt_value_write(&bt_floe_keys[k], &c->floes[i], out);
+            fputc('\n', out);
+        }
+}
+
+char *bt_case_resolved(const bt_case *c)
+{
+    return bt_case_text(c, "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n");
+}
+
+char *bt_case_text(const bt_case *c, const char *head)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) return NULL;
+    fputs(head, out);
+    const char *previous = "";
+    for (int k = 0; k < bt_n_case_keys; k++) {
+        const bt_key *key = &bt_case_keys[k];
+        int depth;
+        const char *name = open_sections(out, previous, key->name, &depth);
+        fprintf(out, "%*s%s: ", 2 * depth, "", name);
+        bt_value_write(key, c, out);
+        fprintf(out, "  # %s\n", key->doc);
+        previous = key->name;
+    }
+    write_floes(c, out);
+    fclose(out);
+    return text;
+}
+
+static void list_keys(FILE *out, const bt_key *keys, int n)
+{
+    char options[128];
+    for (int i = 0; i < n; i++) {
+        const bt_key *k = &keys[i];
+        const char *unit = bt_units_bare(k->unit), *range = k->range ? k->range : "-";
+        if (k->type == BT_KEY_INT) unit = "integer";
+        if (k->type == BT_KEY_TEXT) unit = "text";
+        if (k->type == BT_KEY_BOOL) unit = "bool", range = "true | false";
+        if (k->type == BT_KEY_CHOICE) {
+            unit = "choice";
+            *options = 0;
+            for (int j = 0; k->choices[j]; j++)
+                snprintf(options + strlen(options), sizeof options - strlen(options), "%s%s", j ? " | " : "", k->choices[j]);
+            range = options;
+        }
+        const char *preset = k->preset ? k->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
+        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc, rule ? "; default: " : "", rule ? rule + 2 : "");
+    }
+}
+
+void bt_case_list_keys(void *stream)
+{
+    FILE *out = stream;
+    fprintf(out, "%-24s %-8s %-10s %-36s %s\n", "key", "unit", "default", "range", "meaning");
+    list_keys(out, bt_case_keys, bt_n_case_keys);
+    fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the meaning.\n"
+          "floes: is a list of floes given by hand, each a map with the keys\n\n", out);
+    list_keys(out, bt_floe_keys, bt_n_floe_keys);
+    bt_largest_print(out);
+}
+
+/// Least and most value in the unit of a number without one, and whether the value itself is left out.
+static void json_range(bt_json *j, const bt_key *k)
+{
+    bt_key bare = *k;
+    bare.unit = BT_UNIT_NONE;
+    bt_range r;
+    if (!k->range || !bt_value_range(&bare, &r)) return;
+    bt_json_number(j, "least", r.lo);
+    bt_json_bool(j, "above_least", r.lo_open);
+    bt_json_number(j, "most", r.hi);
+    bt_json_bool(j, "below_most", r.hi_open);
+}
+
+static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
+{
+    static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer", [BT_KEY_BOOL] = "bool", [BT_KEY_TEXT] = "text",
+                                        [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points"};
+    bt_json_open(j, name, '[');
+    for (int i = 0; i < n; i++) {
+        const bt_key *k = &keys[i];
+        const bool number = k->type == BT_KEY_REAL || k->type == BT_KEY_INT || k->type == BT_KEY_POINTS, rule = k->preset && k->preset[0] == '=';
+        bt_json_open(j, NULL, '{');
+        bt_json_string(j, "name", k->name);
+        bt_json_string(j, "type", types[k->type]);
+        bt_json_bool(j, "required", !k->preset);
+        bt_json_string(j, "default", rule ? NULL : k->preset);
+        bt_json_string(j, "follows", rule ? k->preset + 2 : NULL);
+        if (number) bt_json_string(j, "unit", k->type == BT_KEY_INT ? "" : bt_units_bare(k->unit));
+        if (number) json_range(j, k);
+        if (k->type == BT_KEY_CHOICE) {
+            bt_json_open(j, "choices", '[');
+            for (int c = 0; k->choices[c]; c++) bt_json_string(j, NULL, k->choices[c]);
+            bt_json_close(j, ']');
+        }
+        bt_json_string(j, "doc", k->doc);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, ']');
+}
+
+void bt_case_list_keys_json(void *stream)
+{
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    json_keys(&j, "keys", bt_case_keys, bt_n_case_keys);
+    json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
+    bt_json_close(&j, '}');
+    fputs(j.text, stream);
+    bt_json_free(&j);
+}

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+// The Froude-scaled twin of a case.
+//
+// With gravity and all densities kept, every equation of the model stays the same when lengths grow by L, times and speeds by √L, masses and
+// forces by L³ and pressures by L: the Froude number V/√(g l) is that of the original. The kind of unit in the schema gives the exponent
+// of a key (bt_units_froude). What the table below lists does not follow its unit.
+#include "bergtow/case.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "case/schema.h"
+#include "case/value.h"
+
+static const struct {
+    const char *key;
+    double exponent;
+} exceptions[] = {
+    {"output.progress", 0},        // wall time
+    {"output.checkpoint_wall", 0},
+    {"estimate.p_star", 0},        // at full scale; the length scale brings them to that of the case
+    {"estimate.p_s", 0},
+    {"estimate.length_scale", -1}, // full scale / case
+};
+
+// Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well.
+static const char *const plain_texts[] = {"run.title", "reference.source"};
+
+// L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with other exponents.
+static double power(double ratio, double e)
+{
+    const double whole = floor(e);
+    double f = e == whole ? 1 : sqrt(ratio);
+    for (int i = 0; i < (int)fabs(whole); i++) f = whole > 0 ? f * ratio : f / ratio;
+    return f;
+}
+
+static double factor(const bt_key *k, double ratio)
+{
+    for (size_t i = 0; i < sizeof exceptions / sizeof *exceptions; i++)
+        if (!strcmp(k->name, exceptions[i].key)) return power(ratio, exceptions[i].exponent);
+    return power(ratio, bt_units_froude(k->unit));
+}
+
+static void refuse_range(const bt_case *c, const bt_key *k, double value, double ratio, bt_errors *err)
+{
+    char text[64];
+    bt_units_format(value, k->unit, text, sizeof text);
+    bt_errors_add(err, "%s: %s: becomes %s in the twin of scale %g, out of its range %s; take a scale nearer to 1",
+                  c->path ? c->path : "case", k->name, text, ratio, k->range);
+}
+
+static void scale_real(const bt_case *c, const bt_key *k, double *v, double ratio, bt_errors *err)
+{
+    // A negative start of the window means that it is looked for.
+    if (isnan(*v) || (!strcmp(k->name, "output.window_start") && *v < 0)) return;
+    *v *= factor(k, ratio);
+    bt_range r;
+    bt_value_range(k, &r);
+    if ((r.lo_open ? *v > r.lo : *v >= r.lo) && (r.hi_open ? *v < r.hi : *v <= r.hi)) return;
+    refuse_range(c, k, *v, ratio, err);
+}
+
+static bool is_plain(const char *name)
+{
+    for (size_t i = 0; i < sizeof plain_texts / sizeof *plain_texts; i++)
+        if (!strcmp(name, plain_texts[i])) return true;
+    return false;
+}
+
+static void scale_members(const bt_case *c, const bt_key *keys, int n, void *base, double ratio, bt_errors *err)
+{
+    for (int i = 0; i < n; i++) {
+        const bt_key *k = &keys[i];
+        char *member = (char *)base + k->offset;
+        switch (k->type) {
+        case BT_KEY_REAL: {
+            double v;
+            memcpy(&v, member, sizeof v);
+            scale_real(c, k, &v, ratio, err);
+            memcpy(member, &v, sizeof v);
+            break;
+        }
+        case BT_KEY_POINTS: {
+            double *p;
+            int count;
+            memcpy(&p, member, sizeof p);
+            memcpy(&count, (char *)base + k->offset_count, sizeof count);
+            const bt_key column[2] = {bt_schema_column(k, 0), bt_schema_column(k, 1)};
+            for (int j = 0; j < 2 * count; j++) scale_real(c, &column[j % 2], &p[j], ratio, err);
+            break;
+        }
+        case BT_KEY_TEXT: {
+            const char *text;
+            memcpy(&text, member, sizeof text);
+            if (text && !is_plain(k->name))
+                bt_errors_add(err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
+                              c->path ? c->path : "case", k->name, text);
+            break;
+        }
+        case BT_KEY_INT:
+        case BT_KEY_BOOL:
+        case BT_KEY_CHOICE: break;
+        }
+    }
+}
+
+bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
+{
+    const size_t before = err->n;
+    scale_members(c, bt_case_keys, bt_n_case_keys, c, ratio, err);
+    for (bt_idx i = 0; i < c->n_floes; i++) scale_members(c, bt_floe_keys, bt_n_floe_keys, &c->floes[i], ratio, err);
+    if (err->n > before) return BT_ERR_CASE;
+    // EA and strength of a rope grow with d², those of the twin with L³: it has the numbers, and no name.
+    c->tow.line.type = BT_ROPE_NUMBERS;
+    c->tow.line.diameter = 0;
+    return bt_case_finish(c, err);
+}
+
+char *bt_case_scaled_text(const bt_case *twin, double ratio)
+{
+    char *head = NULL;
+    const char *path = twin->path ? twin->path : "a case";
+    const char *coriolis = twin->water.latitude == 0 ? "" :
+        "#   - The earth turns as it does (water.latitude is kept): Coriolis force / inertia is sqrt(L) times that of the original.\n";
+    if (asprintf(&head,
+                 "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn 1/sqrt(L); masses,\n"
+                 "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles and ratios as they were.\n"
+                 "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full scale:\n"
+                 "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that of the original.\n"
+                 "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are those of full scale, and\n"
+                 "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
+                 "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the stiffness.\n"
+                 "%s"
+                 "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. Otherwise rounding changes the shaken\n"
+                 "# field into another of the same statistics (not so with ice.shake: 0).\n"
+                 "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n", path, ratio, coriolis) < 0)
+        return NULL;
+    char *text = bt_case_text(twin, head);
+    free(head);
+    return text;
+}

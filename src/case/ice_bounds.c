@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// What ice may be: bounds of one floe, and of a field, from the ranges in the table of keys.
+//
+// A number that passes here can be multiplied as the mechanics do it, mass × radius², force × time, without leaving the
+// range of a double, so that no input makes an infinity or a NaN out of finite numbers. Rejected: bounds of their own
+// in each reader, which had let an HDF5 file have floes of 800 m where a case file may have 100 m.
+#include "case/ice_bounds.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "bergtow/shape.h"
+#include "base/largest.h"
+#include "case/schema.h"
+#include "case/value.h"
+
+static const double LEAST = 0.99; // a field that was made for the least concentration meets it but nearly
+
+/// The ranges that are asked for each floe, read from their texts once.
+typedef struct limits { bt_range thickness, size, corner, length; } limits;
+
+static bt_range range_of(const char *name)
+{
+    bt_range r;
+    bt_value_range(&bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)], &r);
+    return r;
+}
+
+static const limits *known(void)
+{
+    static limits l;
+    static bool read = false;
+    if (!read) {
+        l = (limits){range_of("ice.thickness"), range_of("ice.size"), range_of("domain.x0"), range_of("domain.length")};
+        read = true;
+    }
+    return &l;
+}
+
+void bt_ice_thickness_range(double *least, double *most)
+{
+    *least = BT_LEAST_THICKNESS;
+    *most = known()->thickness.hi;
+}
+
+const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice_part *part)
+{
+    bt_ice_part unasked;
+    if (!part) part = &unasked;
+    const limits *l = known();
+    *part = BT_ICE_THICKNESS;
+    if (!(f->thickness >= BT_LEAST_THICKNESS) || !(f->thickness <= l->thickness.hi)) {
+        snprintf(why, BT_ICE_WHY, "thickness %g m is refused: give %g to %g, in metres and without a unit",
+                 f->thickness, BT_LEAST_THICKNESS, l->thickness.hi);
+        return why;
+    }
+    *part = BT_ICE_POSE;
+    const double low = l->corner.lo, high = l->corner.hi + l->length.hi; // wherever a domain can be
+    if (!isfinite(f->x) || !isfinite(f->y) || !isfinite(f->yaw)) return "its pose is not finite";
+    if (!(f->x >= low && f->x <= high) || !(f->y >= low && f->y <= high)) {
+        snprintf(why, BT_ICE_WHY, "its place, (%g, %g) m, is not within %g to %g m, where a domain can be; move it",
+                 f->x, f->y, low, high);
+        return why;
+    }
+    *part = BT_ICE_OUTLINE;
+    const bt_moments m = bt_shape_extent(f->n, f->v);
+    // Only the mean has the range of ice.size: a single floe of a law, or a piece, is larger or smaller.
+    if (!(m.area > 0) || !(2 * m.radius <= l->length.hi)) {
+        snprintf(why, BT_ICE_WHY,
+                 "its size, %g m across and %g m2, is beyond 0 to %g m; check the unit of its vertices", 2 * m.radius,
+                 m.area, l->length.hi);
+        return why;
+    }
+    if (!(hypot(m.cx, m.cy) <= 1e-6 * m.radius)) {
+        snprintf(why, BT_ICE_WHY,
+                 "the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
+                 "add it to the pose",
+                 m.cx, m.cy);
+        return why;
+    }
+    *part = BT_ICE_AREA;
+    if (!isnan(f->area) && !(fabs(f->area - m.area) <= f->exact * m.area)) {
+        snprintf(why, BT_ICE_WHY, "area %g m2 is not that of its outline, %g m2; correct it or leave it out", f->area,
+                 m.area);
+        return why;
+    }
+    return NULL;
+}
+
+const char *bt_ice_field_fault(bool kept, int64_t n, double sum_size, double sum_area, double ice_area,
+                               char why[BT_ICE_WHY])
+{
+    const limits *l = known();
+    const double most = l->length.hi * l->length.hi, mean = n > 0 ? sum_size / (double)n : 0;
+    const double concentration = sum_area / ice_area;
+    if (!(ice_area > 0) || !(ice_area <= most))
+        snprintf(why, BT_ICE_WHY, "the area that the concentration refers to, %g m2, is beyond 0 to %g m2", ice_area,
+                 most);
+    else if (n == 0) return NULL;
+    else if (!kept && !(mean >= BT_LEAST_SIZE && mean <= l->size.hi))
+        snprintf(why, BT_ICE_WHY,
+                 "the mean size of the floes, %.3g m, is not within %g to %g m; check the unit of the coordinates",
+                 mean, BT_LEAST_SIZE, l->size.hi);
+    else if (!kept && !(concentration >= LEAST * BT_LEAST_CONCENTRATION))
+        snprintf(why, BT_ICE_WHY,
+                 "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, below %g; check the unit "
+                 "of the coordinates, or make the ice region smaller",
+                 sum_area, ice_area, concentration, BT_LEAST_CONCENTRATION);
+    else if (!(concentration <= 1 + 1e-9))
+        snprintf(why, BT_ICE_WHY,
+                 "the concentration, %.3g m2 of floes / %.3g m2 of the ice region, is %.3g, above 1: make the ice "
+                 "region (ice.x_min and so on) as large as the ice",
+                 sum_area, ice_area, concentration);
+    else return NULL;
+    return why;
+}
+
+const char *bt_ice_domain_fault(const bt_case *c, const bt_field *f, char why[BT_ICE_WHY])
+{
+    double size = 0, area = 0;
+    for (bt_idx i = 0; i < f->n; i++) size += sqrt(4 * f->area[i] / BT_PI), area += f->area[i];
+    const double mean = f->n > 0 ? size / f->n : 0, whole = c->domain.length * c->domain.width;
+    if (mean > bt_min(c->domain.length, c->domain.width)) {
+        snprintf(why, BT_ICE_WHY,
+                 "the mean size of the floes, %.3g m, is above that of the domain, %g x %g m; check the unit of the "
+                 "coordinates, or enlarge the domain",
+                 mean, c->domain.length, c->domain.width);
+        return why;
+    }
+    if (f->ice_area > whole * (1 + 1e-6)) {
+        snprintf(why, BT_ICE_WHY,
+                 "the area that the concentration refers to, %.6g m2, is above that of the domain, %.6g m2; give the "
+                 "domain that the field was made for",
+                 f->ice_area, whole);
+        return why;
+    }
+    return bt_ice_field_fault(false, f->n, size, area, f->ice_area, why);
+}

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// The keys of a case file: one table that drives reading, --set, --list-keys, the resolved file and its documentation.
+#ifndef BERGTOW_SCHEMA_H
+#define BERGTOW_SCHEMA_H
+
+#include "bergtow/case.h"
+#include "base/units.h"
+
+typedef enum {
+    BT_KEY_REAL,   ///< double
+    BT_KEY_INT,    ///< int64_t
+    BT_KEY_BOOL,   ///< bool
+    BT_KEY_TEXT,   ///< char *, owned; NULL = none
+    BT_KEY_CHOICE, ///< an enum, index into choices
+    BT_KEY_POINTS, ///< double *, owned, [count][2]; count is an int
+} bt_key_type;
+
+typedef struct bt_key {
+    const char *name;    ///< dotted, sections in the order of the table
+    bt_key_type type;
+    bt_unit unit;        ///< of a real or of points
+    const char *preset;  ///< default as it would be written; "none"; "= ..." follows from other keys; NULL = required
+    const char *range;   ///< "[lo, hi]" or "(lo, hi)" in the unit of a bare number, of a real, integer or point
+    const char *const *choices; ///< NULL-terminated names of a choice
+    size_t offset;       ///< of the member in bt_case (bt_floe_def for bt_floe_keys)
+    size_t offset_count; ///< of the number of points
+    int least, most;     ///< number of points; 0 = 3 and BT_MAX_VERTICES, a polygon
+    bt_unit unit_first;  ///< of the first of each pair where range_first says that it differs
+    const char *range_first;
+    const char *doc;     ///< one sentence with its source
+} bt_key;
+
+extern const bt_key bt_case_keys[];  ///< the keys of bt_case
+extern const int bt_n_case_keys;
+extern const bt_key bt_floe_keys[];  ///< the keys of one entry of the list `floes:`
+extern const int bt_n_floe_keys;
+
+/// Index of a key by its dotted name, or −1.
+int bt_schema_find(const bt_key *keys, int n, const char *name);
+
+/// True when name is a section: a dotted prefix of some key of bt_case_keys ("ice", "ice.drag").
+bool bt_schema_is_section(const char *name);
+
+/// The key, section or last part of a key closest to a mistyped dotted name, or NULL. The text is static or lies in buffer.
+const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64]);
+
+/// A key of points as that of one column, 0 or 1, with its unit and range.
+bt_key bt_schema_column(const bt_key *k, int column);
+
+/// Set the members of all keys to their defaults; NaN for those that follow from other keys.
+void bt_schema_preset(const bt_key *keys, int n, void *base);
+
+/// Release the texts and lists the keys own.
+void bt_schema_release(const bt_key *keys, int n, void *base);
+
+#endif

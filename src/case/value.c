@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+// Values of keys: strict reading of scalars with unit and range, and writing that keeps every bit.
+#include "case/value.h"
+
+#include "base/largest.h"
+#include "base/suggest.h"
+
+#include <ctype.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void *member_of(const bt_key *k, void *base) { return (char *)base + k->offset; }
+
+bool bt_value_range(const bt_key *k, bt_range *r)
+{
+    *r = (bt_range){.lo = -INFINITY, .hi = INFINITY};
+    if (!k->range) return true;
+    char text[64], why[BT_WHY];
+    size_t n = strlen(k->range);
+    if (n < 5 || n >= sizeof text) return false;
+    memcpy(text, k->range, n + 1);
+    char *comma = strchr(text, ',');
+    if (!comma || !strchr("[(", text[0]) || !strchr("])", text[n - 1])) return false;
+    r->lo_open = text[0] == '(';
+    r->hi_open = text[n - 1] == ')';
+    *comma = text[n - 1] = 0;
+    return bt_units_parse(text + 1, k->unit, &r->lo, why) && bt_units_parse(comma + 1, k->unit, &r->hi, why) && r->lo < r->hi;
+}
+
+static bool in_range(const bt_key *k, double value, const char *text, char *why)
+{
+    bt_range r;
+    bt_value_range(k, &r);
+    if ((r.lo_open ? value > r.lo : value >= r.lo) && (r.hi_open ? value < r.hi : value <= r.hi)) return true;
+    const char *bare = bt_units_bare(k->unit);
+    bool plain = !strcmp(bare, "-");
+    snprintf(why, BT_WHY, "%.40s is out of range; give a value in %s%s%s", text, k->range, plain ? "" : " ", plain ? "" : bare);
+    return false;
+}
+
+bool bt_value_is_utf8(const char *text, size_t n)
+{
+    const unsigned char *s = (const unsigned char *)text;
+    for (size_t i = 0; i < n;) {
+        int more = s[i] < 0x80 ? 0 : s[i] >= 0xC2 && s[i] < 0xE0 ? 1 : (s[i] & 0xF0) == 0xE0 ? 2 : s[i] >= 0xF0 && s[i] < 0xF5 ? 3 : -1;
+        if (more < 0 || i + (size_t)more >= n || !s[i]) return false;
+        for (int j = 1; j <= more; j++)
+            if ((s[i + (size_t)j] & 0xC0) != 0x80) return false;
+        // overlong forms, surrogates, beyond U+10FFFF
+        if (s[i] == 0xE0 && s[i + 1] < 0xA0) return false;
+        if (s[i] == 0xED && s[i + 1] > 0x9F) return false;
+        if (s[i] == 0xF0 && s[i + 1] < 0x90) return false;
+        if (s[i] == 0xF4 && s[i + 1] > 0x8F) return false;
+        i += (size_t)more + 1;
+    }
+    return true;
+}
+
+static bool read_real(const bt_key *k, void *base, const char *text, char *why)
+{
+    double v;
+    if (!bt_value_read_coordinate(k, text, &v, why)) return false;
+    memcpy(member_of(k, base), &v, sizeof v);
+    return true;
+}
+
+static bool read_int(const bt_key *k, void *base, const char *text, char *why)
+{
+    const char *digits = text + (*text == '-' || *text == '+');
+    size_t n = strspn(digits, "0123456789");
+    if (!n || digits[n]) {
+        snprintf(why, BT_WHY, "\"%.40s\" is not a whole number; give digits only", text);
+        return false;
+    }
+    errno = 0;
+    int64_t v = strtoll(text, NULL, 10);
+    if (errno == ERANGE) {
+        snprintf(why, BT_WHY, "%.40s is too large; give a value in %s", text, k->range);
+        return false;
+    }
+    if (!in_range(k, (double)v, text, why)) return false;
+    memcpy(member_of(k, base), &v, sizeof v);
+    return true;
+}
+
+static bool read_bool(const bt_key *k, void *base, const char *text, char *why)
+{
+    static const char *const yes[] = {"true", "yes", "on"}, *const no[] = {"false", "no", "off"};
+    for (int i = 0; i < 3; i++)
+        if (!strcmp(text, yes[i]) || !strcmp(text, no[i])) {
+            bool v = !strcmp(text, yes[i]);
+            memcpy(member_of(k, base), &v, sizeof v);
+            return true;
+        }
+    snprintf(why, BT_WHY, "\"%.40s\" is neither true nor false; give one of them", text);
+    return false;
+}
+
+static bool read_choice(const bt_key *k, void *base, const char *text, char *why)
+{
+    for (int i = 0; k->choices[i]; i++)
+        if (!strcmp(text, k->choices[i])) {
+            // gcc gives an enum without negative members the type unsigned int
+            _Static_assert(sizeof(bt_bound) == sizeof(unsigned) && sizeof(bt_body_shape) == sizeof(unsigned), "enums are unsigned int");
+            memcpy(member_of(k, base), &(unsigned){(unsigned)i}, sizeof(unsigned));
+            return true;
+        }
+    char list[128] = "";
+    for (int i = 0; k->choices[i]; i++)
+        snprintf(list + strlen(list), sizeof list - strlen(list), "%s%s", i ? ", " : "", k->choices[i]);
+    const char *near = bt_suggest(text, k->choices);
+    if (near) snprintf(why, BT_WHY, "\"%.40s\" is not one of %s; did you mean %s?", text, list, near);
+    else snprintf(why, BT_WHY, "\"%.40s\" is not known; give one of %s", text, list);
+    return false;
+}
+
+static bool read_text(const bt_key *k, void *base, const char *text, char *why)
+{
+    size_t n = strlen(text);
+    if (n > BT_MAX_TEXT || !bt_value_is_utf8(text, n)) {
+        snprintf(why, BT_WHY, n > BT_MAX_TEXT ? "the text has %zu bytes; give at most %d" : "the text is not UTF-8; save it as UTF-8", n, BT_MAX_TEXT);
+        return false;
+    }
+    char *old, *copy = bt_alloc(n + 1, 1);
+    memcpy(copy, text, n);
+    memcpy(&old, member_of(k, base), sizeof old);
+    free(old);
+    memcpy(member_of(k, base), &copy, sizeof copy);
+    return true;
+}
+
+bool bt_value_read_coordinate(const bt_key *k, const char *text, double *value, char why[BT_WHY])
+{
+    double v;
+    if (!bt_units_parse(text, k->unit, &v, why) || !in_range(k, v, text, why)) return false;
+    *value = v;
+    return true;
+}
+
+bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, char why[BT_WHY])
+{
+    if (plain && (!*text || !strcmp(text, "~") || !strcmp(text, "null"))) {
+        snprintf(why, BT_WHY, "has no value; give one or remove the key");
+        return false;
+    }
+    bool absent = plain && !strcmp(text, "none") && k->preset && (k->preset[0] == '=' || !strcmp(k->preset, "none"));
+    switch (k->type) {
+    case BT_KEY_REAL:
+        if (!absent) return read_real(k, base, text, why);
+        memcpy(member_of(k, base), &(double){NAN}, sizeof(double));
+        return true;
+    case BT_KEY_TEXT: {
+        if (!absent) return read_text(k, base, text, why);
+        char *old;
+        memcpy(&old, member_of(k, base), sizeof old);
+        free(old);
+        memset(member_of(k, base), 0, sizeof old);
+        return true;
+    }
+    case BT_KEY_INT: return read_int(k, base, text, why);
+    case BT_KEY_BOOL: return read_bool(k, base, text, why);
+    case BT_KEY_CHOICE: return read_choice(k, base, text, why);
+    case BT_KEY_POINTS: break;
+    }
+    snprintf(why, BT_WHY, "needs a list of points; give it as [[x, y], [x, y], ...]");
+    return false;
+}
+
+// A double-quoted YAML scalar. Control characters, the line separators that YAML folds, and the characters that
+// libyaml refuses to read raw are escaped.
+static void write_text(const char *text, FILE *out)
+{
+    fputc('"', out);
+    for (const unsigned char *s = (const unsigned char *)text; *s;) {
+        unsigned code = *s;
+        int n = code < 0x80 ? 1 : code < 0xE0 ? 2 : code < 0xF0 ? 3 : 4;
+        if (n > 1) code &= 0x7Fu >> n;
+        for (int i = 1; i < n; i++) code = code << 6 | (s[i] & 0x3Fu);
+        if (code == '"' || code == '\\') fprintf(out, "\\%c", (int)code);
+        else if (code < 0x20 || (code >= 0x7F && code <= 0xA0)) fprintf(out, "\\x%02X", code);
+        else if (code == 0x2028 || code == 0x2029 || code == 0xFEFF || code == 0xFFFE || code == 0xFFFF) fprintf(out, "\\u%04X", code);
+        else fwrite(s, 1, (size_t)n, out);
+        s += n;
+    }
+    fputc('"', out);
+}
+
+void bt_value_write(const bt_key *k, const void *base, FILE *out)
+{
+    const char *member = (const char *)base + k->offset;
+    char number[64];
+    switch (k->type) {
+    case BT_KEY_REAL: {
+        double v;
+        memcpy(&v, member, sizeof v);
+        bt_units_format(v, k->unit, number, sizeof number);
+        fputs(number, out);
+        break;
+    }
+    case BT_KEY_INT: {
+        int64_t v;
+        memcpy(&v, member, sizeof v);
+        fprintf(out, "%" PRId64, v);
+        break;
+    }
+    case BT_KEY_BOOL: {
+        bool v;
+        memcpy(&v, member, sizeof v);
+        fputs(v ? "true" : "false", out);
+        break;
+    }
+    case BT_KEY_CHOICE: {
+        unsigned v;
+        memcpy(&v, member, sizeof v);
+        fputs(k->choices[v], out);
+        break;
+    }
+    case BT_KEY_TEXT: {
+        const char *text;
+        memcpy(&text, member, sizeof text);
+        if (text) write_text(text, out);
+        else fputs("none", out);
+        break;
+    }
+    case BT_KEY_POINTS: {
+        const double *p;
+        int n;
+        memcpy(&p, member, sizeof p);
+        memcpy(&n, (const char *)base + k->offset_count, sizeof n);
+        if (!n) fputs("none", out);
+        for (int i = 0; i < n; i++) {
+            fputs(i ? ", [" : "[[", out);
+            for (int j = 0; j < 2; j++) {
+                bt_units_format(p[2 * i + j], bt_schema_column(k, j).unit, number, sizeof number);
+                fprintf(out, "%s%s", j ? ", " : "", number);
+            }
+            fputs(i == n - 1 ? "]]" : "]", out);
+        }
+        break;
+    }
+    }
+}

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+// Which bodies touch or may touch within the step: pair lists, narrow phase, contact manifolds.
+//
+// Data flow of one step (detect.c), tile by tile (tiles.h):
+//   speeds ─> margins ─> pair list of the tile (kept over many steps) ─> narrow phase ─> units in the order they are swept
+//
+// What the result depends on is only this: a unit exists for every pair of an active tile whose gap along the best separating
+// axis is at most the tile's margin. The pair list with its skin, the cached axis and the skipping of far pairs are
+// conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by brute force).
+//
+// Margin. Twice the way that the fastest floe of the tile's neighbourhood makes in the step, through the water's frame.
+#ifndef BERGTOW_CONTACTS_H
+#define BERGTOW_CONTACTS_H
+
+#include "bergtow/world.h"
+
+/// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
+/// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.
+typedef struct bt_point {
+    double gap;          ///< m, negative when the bodies overlap
+    double ra[2], rb[2]; ///< contact point relative to the centroid of a, of b, m
+    uint32_t feature;    ///< which edge and vertex made the point; the same from step to step
+} bt_point;
+
+typedef struct bt_manifold {
+    bt_idx a, b;      ///< gid[a] < gid[b]
+    int n_points;     ///< 1 or 2
+    double nx, ny;    ///< unit normal from a to b
+    bt_point p[2];
+} bt_manifold;
+
+/// Largest of the speeds at velocities v and v2 in each tile and around it into tiles->bound, at least what it was with `keep`;
+/// returns the largest of all, m/s. Collective.
+double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
+
+/// Speed s of tile (x, y) into the bounds of the tiles it matters to.
+void bt_contacts_spread(struct bt_tiles *t, int32_t x, int32_t y, double s);
+
+/// Has the bound grown beyond what the last detection was made for? Collective.
+bool bt_contacts_outrun(const bt_world *w);
+
+/// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
+double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v);
+
+/// Margin for speed s: 2 Δt s, rounded up to a power of √2 so that pair lists stay valid while speeds wander; at least the slop. m
+double bt_contacts_margin(const bt_world *w, double s);
+
+/// Find this step's units at the present poses in the tiles that are active under tiles->bound. Impulses are those of the
+/// same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
+void bt_contacts_detect(bt_world *w, bool again);
+
+/// Deepest overlap of the state after a step, m: what the next step would find before it solves anything, in the tiles that have moved, crushed
+/// ice left out. Poses and velocities stay; contacts, labels, storage and marks of crushing that have come apart do not, so the state must have been
+/// saved. Collective.
+double bt_contacts_overlap(bt_world *w);
+
+/// Everything within margin, whether at rest or not (tests, deepest overlap).
+void bt_contacts_detect_all(bt_world *w, double margin);
+
+/// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of b, −1:
+/// none) settles ties between nearly equal reference edges. gap_out: the largest separation over the edge normals of both (a lower
+/// bound of the distance), axis_out its edge (numbered as in bt_pair).
+bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
+
+/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair; otherwise see src/geometry/manifold.c.
+bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin, int reference_before, bt_manifold *m, double *gap_out,
+                       int32_t *axis_out);
+
+/// All manifolds by testing all pairs, for tests; in the order of gids.
+void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man);
+
+/// Outline of body i turned by its yaw (after a change of pose).
+void bt_world_turn_outline(bt_world *w, bt_idx i);
+
+/// Vector from the centroid of a to that of b, the nearest image in periodic directions.
+static inline void bt_world_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2]);
+
+static inline double bt_nearest_image(double d, double period)
+{
+    if (period > 0) {
+        if (d > 0.5 * period) d -= period;
+        else if (d < -0.5 * period) d += period;
+    }
+    return d;
+}
+
+static inline void bt_world_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2])
+{
+    const bt_pose *pa = &w->bodies.pose[a], *pb = &w->bodies.pose[b];
+    d[0] = bt_nearest_image(pb->x - pa->x, w->par.period_x);
+    d[1] = bt_nearest_image(pb->y - pa->y, w->par.period_y);
+}
+
+#endif

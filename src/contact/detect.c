@@ -1,0 +1,383 @@
+// SPDX-License-Identifier: MIT
+// Contact detection of one step: which tiles are active, their margins, narrow phase, units with last step's impulses.
+#include <math.h>
+#include <omp.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact/contacts.h"
+#include "contact/crush.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "partition/domain.h"
+#include "geometry/merge.h"
+#include "contact/pack.h"
+#include "space/pairs.h"
+#include "space/phases.h"
+
+// A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun): a solution that flies apart
+// must not ask for tiles, and pair lists, of the whole field.
+static double most_margin(const bt_world *w) { return 16 * w->par.size; }
+
+double bt_contacts_margin(const bt_world *w, double s)
+{
+    const double least = 2 * w->par.dt * s;
+    if (!(least < most_margin(w)) && w->par.size > 0) return most_margin(w);
+    if (!(least > w->par.slop)) return w->par.slop;
+    return exp2(0.5 * ceil(2 * log2(least)));
+}
+
+double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v)
+{
+    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
+    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
+}
+
+/// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1.
+static void raise(bt_tiles *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
+{
+    for (int32_t y = y0 - 2; y <= y1 + 1; y++)
+        for (int32_t x = x0 - 2; x <= x1 + 1; x++) {
+            const bt_idx k = bt_tiles_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
+            if (k < 0) continue;
+            bt_tiles_wake(t, k);
+            t->bound[k] = bt_max(t->bound[k], s);
+        }
+}
+
+void bt_contacts_spread(bt_tiles *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
+
+/// What a large body that moves, or can be moved, asks of the tiles under it and beside it.
+static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
+{
+    bt_tiles *t = w->tiles;
+    const bt_bodies *b = &w->bodies;
+    double fastest = 0;
+    bool movable = false;
+    for (bt_idx l = t->n_tiled; l < b->n; l++) {
+        double s = bt_max(bt_contacts_speed(w, l, &v[l]), bt_contacts_speed(w, l, &v2[l]));
+        if (b->stirred[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
+        movable = movable || b->motion[l] == BT_DYNAMIC;
+        if (s == 0) continue;
+        fastest = bt_max(fastest, s);
+        const bt_tile_range r = bt_pairs_range(w, l, bt_contacts_margin(w, s) + t->reach + t->allowance);
+        raise(t, r.x0, r.x1, r.y0, r.y1, s);
+    }
+    return movable ? fastest : 0;
+}
+
+double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep)
+{
+    bt_tiles *t = w->tiles;
+    const bt_bodies *b = &w->bodies;
+    const double stir = 0.5 * w->par.slop / w->par.dt;
+    const bt_idx n = t->n - 1;
+    if (!keep) {
+        for (bt_idx j = 0; j < t->n_busy; j++) {
+            t->bound[t->busy[j]] = 0;
+            t->awake[t->busy[j]] = 0;
+        }
+    }
+    const bt_idx n_busy = t->n_busy; // others rest
+#pragma omp parallel for schedule(static) if (BT_MANY(n_busy, BT_FEW_TILES))
+    for (bt_idx j = 0; j < n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        double s = 0;
+        if (k == n) continue;
+        for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
+            s = bt_max(s, bt_max(bt_contacts_speed(w, i, &v[i]), bt_contacts_speed(w, i, &v2[i])));
+            if (b->stirred[i]) s = bt_max(s, stir);
+        }
+        t->speed[k] = s;
+    }
+    double fastest = 0;
+    for (bt_idx j = 0; j < n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        if (!(t->speed[k] > 0) || !t->tile[k].own) continue;
+        fastest = bt_max(fastest, t->speed[k]);
+        bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
+    }
+    bt_domain_tell_tiles(w, t->speed, bt_contacts_spread);
+    const double large = spread_large(w, v, v2);
+    bt_tiles_sort_busy(t);
+    // The last tile meets floes anywhere: it is made for the fastest of them all.
+    bool movable = false;
+    for (bt_idx l = t->n_tiled; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
+    fastest = bt_max(fastest, large);
+    bt_domain_maxima(w, &fastest, 1);
+    if (movable) t->bound[n] = bt_max(t->bound[n], fastest);
+    return fastest;
+}
+
+bool bt_contacts_outrun(const bt_world *w)
+{
+    const bt_tiles *t = w->tiles;
+    double any = 0;
+    for (bt_idx j = 0; j < t->n_busy && any == 0; j++) {
+        const bt_idx k = t->busy[j];
+        const bt_tile *tile = &t->tile[k];
+        any = tile->own && t->bound[k] > 0 &&
+              (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * most_margin(w));
+    }
+    bt_domain_maxima(w, &any, 1);
+    return any > 0;
+}
+
+typedef struct {
+    bt_pair_scratch pairs;
+    bt_pack_scratch pack;
+} thread_scratch;
+
+static void go_idle(bt_tile *t)
+{
+    free(t->pairs);
+    t->pairs = NULL;
+    t->n_pairs = t->cap_pairs = t->n_units = 0;
+    t->n_points = 0;
+    t->listed = false;
+    t->overlap = 0;
+}
+
+/// Contacts that several parts of a floe have found are one.
+static void merge(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
+{
+    bt_merge_parts(w, s->man, s->n);
+    size_t kept = 0;
+    for (size_t k = 0; k < s->n; k++) {
+        if (s->man[k].n_points == 0) {
+            t->pairs[s->pair[k]].n_points = 0;
+            continue;
+        }
+        s->man[kept] = s->man[k];
+        s->pair[kept++] = s->pair[k];
+    }
+    s->n = kept;
+}
+
+static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_tile *t = &w->tiles->tile[k];
+    if (t->n_scars > 0) bt_crush_prune(w, t);
+    bt_pairs_update(w, k, t, t->margin, &s->pairs);
+    bt_pack_begin(&s->pack, (size_t)t->n_pairs);
+    bool parts = false;
+    const bool near = bt_pairs_near(w, k, t, t->margin);
+    const double far = t->margin + bt_pairs_near_gap(w);
+    for (bt_idx j = 0, n = near ? t->n_near : t->n_pairs; j < n; j++) {
+        const bt_idx i = near ? t->near[j] : j;
+        bt_pair *p = &t->pairs[i];
+        const double paths = b->path[p->a] + b->path[p->b];
+        if (paths + t->margin < p->reach) {
+            p->n_points = 0;
+            if (!near && !(paths + far < p->reach)) bt_pairs_add_near(t, i);
+            continue;
+        }
+        if (!near) bt_pairs_add_near(t, i);
+        double gap;
+        bt_manifold *m = bt_pack_next(&s->pack, i);
+        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
+        p->reach = gap + paths;
+        if (!touch) {
+            p->n_points = 0;
+            continue;
+        }
+        bt_pack_keep(&s->pack);
+        parts = parts || p->part[0] || p->part[1];
+    }
+    if (parts) merge(w, t, &s->pack);
+    t->n_points = 0;
+    t->overlap = 0;
+    for (size_t i = 0; i < s->pack.n; i++) {
+        const bt_manifold *m = &s->pack.man[i];
+        t->n_points += m->n_points;
+        for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
+    }
+    bt_pack_units(w, k, &s->pack);
+    if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
+}
+
+static void wake_body(bt_world *w, bt_idx i)
+{
+    bt_tiles *t = w->tiles;
+    if (w->bodies.large[i]) return;
+    const bt_idx k = bt_tiles_at(t, w->bodies.tile[i][0], w->bodies.tile[i][1]);
+    t->awake[k] = 1;
+    bt_tiles_wake(t, k);
+}
+
+/// Tiles with bodies that units, here or on other ranks, may move; none of a step falls asleep when it is detected again.
+static void find_awake(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_tile *tile = &t->tile[t->order[i]];
+        if (tile->phase == BT_COLOURS) {
+            for (bt_idx j = 0; j < tile->n_units; j++) wake_body(w, tile->units[j].a), wake_body(w, tile->units[j].b);
+            continue;
+        }
+        const bt_idx block[4] = {t->order[i], tile->right, tile->above, tile->diagonal};
+        for (int j = 0; j < 4; j++) {
+            if (block[j] < 0) continue;
+            t->awake[block[j]] = 1;
+            bt_tiles_wake(t, block[j]);
+        }
+    }
+    bt_domain_moved_elsewhere(w, wake_body);
+    bt_tiles_sort_busy(t);
+}
+
+static void detect(bt_world *w, bool again)
+{
+    bt_tiles *t = w->tiles;
+    bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        bt_tile *tile = &t->tile[k];
+        if (!tile->own) continue;
+        const bool active = t->bound[k] > 0;
+        if (!active) {
+            if (tile->pairs || tile->n_units) go_idle(tile);
+            tile->active = false;
+            continue;
+        }
+        const double margin = bt_contacts_margin(w, t->bound[k]);
+        if (again && tile->active && margin <= tile->margin) continue;
+        tile->active = true;
+        tile->margin = margin;
+        due[n_due++] = k;
+    }
+#pragma omp parallel if (BT_MANY(n_due, BT_FEW_TILES))
+    {
+        thread_scratch s = {0};
+#pragma omp for schedule(dynamic, 4)
+        for (bt_idx i = 0; i < n_due; i++) narrow_phase(w, due[i], &s);
+        bt_pair_scratch_free(&s.pairs);
+        bt_pack_scratch_free(&s.pack);
+    }
+    free(due);
+    bt_phases_order(w);
+    bt_domain_select(w);
+    find_awake(w);
+    bt_tiles_leave(t);
+}
+
+void bt_contacts_detect(bt_world *w, bool again) { detect(w, again); }
+
+void bt_contacts_detect_all(bt_world *w, double margin)
+{
+    bt_tiles_begin(w);
+    bt_tiles_update(w, margin);
+    bt_tiles_wake_all(w->tiles);
+    // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
+    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
+    bool movable = false;
+    for (bt_idx l = w->tiles->n_tiled; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
+    if (!movable) w->tiles->bound[w->tiles->n - 1] = 0;
+    detect(w, false);
+}
+
+void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_idx cap = 64;
+    *man = bt_alloc((size_t)cap, sizeof **man);
+    *n_man = 0;
+    for (bt_gid g = 0; g < b->n_global; g++)
+        for (bt_gid h = g + 1; h < b->n_global; h++) {
+            const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
+            if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) continue;
+            for (int p = bt_part_first(b, i); p >= 0; p = bt_part_next(b, i, p))
+                for (int q = bt_part_first(b, j); q >= 0; q = bt_part_next(b, j, q)) {
+                    if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
+                    double gap;
+                    int32_t axis = -1;
+                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+                }
+        }
+    bt_merge_parts(w, *man, (size_t)*n_man);
+    bt_idx kept = 0;
+    for (bt_idx k = 0; k < *n_man; k++)
+        if ((*man)[k].n_points > 0) (*man)[kept++] = (*man)[k];
+    *n_man = kept;
+}
+
+double bt_contacts_overlap(bt_world *w)
+{
+    bt_tiles_begin(w); // from here on and again below, bodies may lie elsewhere
+    if (bt_tiles_update(w, bt_contacts_margin(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    detect(w, false);
+    const bt_tiles *t = w->tiles;
+    double deepest = 0;
+    for (bt_idx k = 0; k < t->n; k++)
+        if (t->tile[k].own) deepest = bt_max(deepest, t->tile[k].overlap);
+    bt_domain_maxima(w, &deepest, 1);
+    return deepest;
+}
+
+/// The deeper of two; of equals the one with the lower ids, so that no order of threads is seen.
+static void deeper(bt_overlaps *to, const bt_overlaps *o)
+{
+    to->pairs += o->pairs;
+    const bool same = o->deepest == to->deepest, first = o->a < to->a || (o->a == to->a && o->b < to->b);
+    if (!(o->deepest > to->deepest || (same && o->pairs > 0 && first))) return;
+    to->deepest = o->deepest;
+    to->a = o->a, to->b = o->b;
+}
+
+/// Overlaps in the pairs of one tile. A body of several parts is one body.
+static bt_overlaps overlaps_of(const bt_world *w, const bt_tile *t, double allowed)
+{
+    bt_overlaps all = {0}, pair = {0};
+    for (bt_idx i = 0; i < t->n_pairs; i++) {
+        const bt_pair *q = &t->pairs[i];
+        const bt_gid a = w->bodies.gid[q->a], b = w->bodies.gid[q->b];
+        if (pair.a != a || pair.b != b) {
+            deeper(&all, &pair);
+            pair = (bt_overlaps){.a = a, .b = b};
+        }
+        bt_manifold m;
+        double gap;
+        int32_t axis = -1;
+        if (!bt_contacts_parts(w, q->a, q->b, q->part, 0, -1, &m, &gap, &axis)) continue;
+        for (int j = 0; j < m.n_points; j++) pair.deepest = bt_max(pair.deepest, 0 - m.p[j].gap);
+        pair.pairs = pair.deepest > allowed;
+    }
+    deeper(&all, &pair);
+    return all;
+}
+
+bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
+{
+    bt_tiles_begin(w);
+    bt_tiles_update(w, w->par.slop);
+    const bt_tiles *t = w->tiles;
+    bt_overlaps all = {0};
+    // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
+#pragma omp parallel if (BT_MANY(t->n, BT_FEW_TILES))
+    {
+        bt_pair_scratch s = {0};
+#pragma omp for schedule(dynamic, 4)
+        for (bt_idx k = 0; k < t->n; k++) {
+            if (!t->tile[k].own) continue;
+            bt_tile own = t->tile[k];
+            own.pairs = NULL;
+            own.n_pairs = own.cap_pairs = 0;
+            own.listed = false;
+            bt_pairs_update(w, k, &own, 0, &s);
+            const bt_overlaps here = overlaps_of(w, &own, allowed);
+#pragma omp critical
+            deeper(&all, &here);
+            free(own.pairs);
+        }
+        bt_pair_scratch_free(&s);
+    }
+    return all;
+}
+
+double bt_world_overlap(bt_world *w)
+{
+    double deepest = bt_world_overlaps(w, 0).deepest;
+    bt_domain_maxima(w, &deepest, 1);
+    return deepest;
+}

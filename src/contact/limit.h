@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// The sweep's arithmetic for units whose normal impulses are bounded (private to the solver); equations in contact/crush.h.
+#ifndef BERGTOW_LIMIT_H
+#define BERGTOW_LIMIT_H
+
+#include "contact/crush.h"
+#include "solve/kernel.h"
+
+/// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising part of the bound,
+/// λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 + slope W), where it is above the flat part
+/// exactly when that is so at the solution. `place` and not the bias: a rebound is no crushing.
+static inline double bt_limit_point(const bt_limit *l, const bt_unit *u, int i, double b)
+{
+    const double rising = (l->base[i] - l->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + l->slope[i] * u->w[i]);
+    return bt_max(0, bt_min(-b * u->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
+}
+
+/// Bound of point i at these velocities, N s.
+static inline double bt_limit_bound(const bt_limit *l, const bt_unit *u, int i, const bt_vel *v)
+{
+    const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
+    return bt_min(l->most[i], bt_max(l->flat[i], l->base[i] + l->slope[i] * bt_max(0, approach)));
+}
+
+/// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose multiplier has
+/// the right sign, and of sides that rounding leaves in doubt the one of least value.
+static inline void bt_limit_rim(const bt_unit *u, const double b[2], const double c[2], double l[2])
+{
+    double least = INFINITY;
+    for (int side = 0; side < 4; side++) {
+        const int i = side >> 1, o = 1 - i;
+        double x[2];
+        x[i] = side & 1 ? c[i] : 0;
+        if (isinf(x[i])) continue;
+        x[o] = bt_max(0, bt_min(c[o], -(b[o] + u->w12 * x[i]) * u->mn[o]));
+        const double slope = b[i] + u->w[i] * x[i] + u->w12 * x[o];
+        const double value = x[0] * (0.5 * (u->w[0] * x[0] + u->w12 * x[1]) + b[0]) + x[1] * (0.5 * (u->w12 * x[0] + u->w[1] * x[1]) + b[1]);
+        const bool right = side & 1 ? slope <= 0 : slope >= 0;
+        if (right || value < least) l[0] = x[0], l[1] = x[1], least = value;
+        if (right) return;
+    }
+}
+
+/// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point by point, a few times: the
+/// sweeps do the rest.
+static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const double b[2], double l[2])
+{
+    enum { TURNS = 4 };
+    l[0] = (u->w12 * b[1] - u->w[1] * b[0]) * u->per_det;
+    l[1] = (u->w12 * b[0] - u->w[0] * b[1]) * u->per_det;
+    if (u->per_det > 0 && l[0] >= 0 && l[1] >= 0 && l[0] <= k->flat[0] && l[1] <= k->flat[1]) return;
+    if (k->slope[0] == 0 && k->slope[1] == 0) {
+        bt_limit_rim(u, b, k->flat, l);
+        return;
+    }
+    l[0] = u->ln[0], l[1] = u->ln[1];
+    for (int turn = 0; turn < TURNS; turn++)
+        for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, i, b[i] + u->w12 * l[1 - i]);
+}
+
+/// bt_update_unit with bounds. The solution without them is the one with them where it keeps below their flat parts: nearly everywhere.
+static inline double bt_update_limited(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+{
+    const bt_vel va = v[u->a], vb = v[u->b];
+    double l[2];
+    bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
+    if (l[0] > k->flat[0] || l[1] > k->flat[1]) {
+        double b[2];
+        for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, &va, &vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
+        if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
+        else bt_limit_two(k, u, b, l);
+    }
+    return bt_take_normals(u, l[0], l[1], va, vb, v, inv);
+}
+
+/// bt_unit_residual with bounds: a row is judged by what it would be with all others held.
+static inline double bt_limited_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+{
+    const bt_vel *va = &v[u->a], *vb = &v[u->b];
+    double worst = 0, total = 0;
+    for (int i = 0; i < u->n; i++) {
+        const double b = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i];
+        const double r = (bt_limit_point(k, u, i, b) - u->ln[i]) * u->w[i];
+        worst = bt_max(worst, fabs(r));
+        *sum += r * r;
+        total += u->ln[i];
+    }
+    const double wt = bt_tangent_velocity(u, va, vb), r = (bt_clamp(u->lt - wt * u->mt, u->mu * total) - u->lt) * u->wt;
+    *sum += r * r;
+    return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY;
+}
+
+#endif

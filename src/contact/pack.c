@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+// Units of a tile: order, geometry, effective masses, biases, warm start.
+//
+// Order. Units that follow each other should not share a body: the processor then works on several at once, where each
+// would otherwise wait for the velocities of the one before. So a tile's manifolds are coloured first-fit in the
+// order of their gids (every body of the block keeps a mask of the colours it has), and stand by colour. The order follows from the
+// manifolds and their gids alone, and is the same wherever and whenever the pair list was made.
+#include "contact/pack.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact/crush.h"
+#include "solve/kernel.h"
+
+enum { MAX_COLOURS = 64 };
+
+void bt_pack_scratch_free(bt_pack_scratch *s)
+{
+    free(s->man);
+    free(s->pair);
+    free(s->colour);
+    free(s->used);
+    *s = (bt_pack_scratch){0};
+}
+
+void bt_pack_begin(bt_pack_scratch *s, size_t n)
+{
+    s->n = 0;
+    if (n < s->cap) return;
+    s->cap = n + n / 2 + 16;
+    s->man = bt_realloc(s->man, s->cap, sizeof *s->man);
+    s->pair = bt_realloc(s->pair, s->cap, sizeof *s->pair);
+    s->colour = bt_realloc(s->colour, s->cap, sizeof *s->colour);
+}
+
+bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i)
+{
+    s->pair[s->n] = i;
+    return &s->man[s->n];
+}
+
+void bt_pack_keep(bt_pack_scratch *s) { s->n++; }
+
+/// Position of body i in the block of tile t, −1 = a large one.
+static bt_idx in_block(const bt_tiles *ts, const bt_tile *t, const bt_idx base[4], bt_idx i)
+{
+    const bt_idx block[4] = {t->right, t->above, t->diagonal};
+    if (i >= t->first && i < t->end) return i - t->first;
+    for (int k = 0; k < 3; k++)
+        if (block[k] >= 0 && i >= ts->tile[block[k]].first && i < ts->tile[block[k]].end) return base[k + 1] + i - ts->tile[block[k]].first;
+    return -1;
+}
+
+static int colour_units(const bt_world *w, const bt_tile *t, bt_pack_scratch *s, bt_idx start[MAX_COLOURS + 2])
+{
+    const bt_tiles *ts = w->tiles;
+    const bt_bodies *b = &w->bodies;
+    const bt_idx block[4] = {t->right, t->above, t->diagonal};
+    bt_idx base[4] = {0};
+    bt_idx n = t->end - t->first;
+    for (int k = 0; k < 3; k++) {
+        base[k + 1] = n;
+        if (block[k] >= 0) n += ts->tile[block[k]].end - ts->tile[block[k]].first;
+    }
+    if ((size_t)n > s->cap_used) s->used = bt_realloc(s->used, s->cap_used = 2 * (size_t)n, sizeof *s->used);
+    if (n > 0) memset(s->used, 0, (size_t)n * sizeof *s->used);
+    bt_idx count[MAX_COLOURS + 1] = {0};
+    int n_colours = 0;
+    for (size_t k = 0; k < s->n; k++) {
+        const bt_manifold *m = &s->man[k];
+        const bt_idx i = b->inv[m->a].m > 0 ? in_block(ts, t, base, m->a) : -1, j = b->inv[m->b].m > 0 ? in_block(ts, t, base, m->b) : -1;
+        const uint64_t used = (i >= 0 ? s->used[i] : 0) | (j >= 0 ? s->used[j] : 0);
+        const int colour = ~used ? __builtin_ctzll(~used) : MAX_COLOURS; // none left: at the end, one by one
+        if (colour < MAX_COLOURS && i >= 0) s->used[i] |= (uint64_t)1 << colour;
+        if (colour < MAX_COLOURS && j >= 0) s->used[j] |= (uint64_t)1 << colour;
+        s->colour[k] = (uint8_t)colour;
+        count[colour]++;
+        if (colour >= n_colours) n_colours = colour + 1;
+    }
+    start[0] = 0;
+    for (int c = 0; c < n_colours; c++) start[c + 1] = start[c] + count[c];
+    return n_colours;
+}
+
+static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
+{
+    for (int i = 0; i < m->n_points; i++)
+        for (int j = 0; j < p->n_points; j++)
+            if (p->feature[j] == m->p[i].feature) u->ln[i] = p->ln[j];
+    // The friction of the points is one number: it stays with the normal impulses that stay.
+    const double before = p->n_points > 1 ? p->ln[0] + p->ln[1] : p->n_points > 0 ? p->ln[0] : 0;
+    const double kept = u->ln[0] + u->ln[1];
+    u->lt = before == 0 ? 0 : kept == before ? p->lt : p->lt * (kept / before);
+}
+
+static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u, bt_gaps *g)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
+    const double nx = m->nx, ny = m->ny;
+    *u = (bt_unit){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points};
+    *g = (bt_gaps){.pair = pair};
+    for (int i = 0; i < m->n_points; i++) {
+        const bt_point *q = &m->p[i];
+        u->ran[i] = q->ra[0] * ny - q->ra[1] * nx;
+        u->rbn[i] = q->rb[0] * ny - q->rb[1] * nx;
+        u->w[i] = ia.m + ib.m + ia.i * u->ran[i] * u->ran[i] + ib.i * u->rbn[i] * u->rbn[i];
+        u->mn[i] = 1 / u->w[i];
+        g->gap[i] = q->gap;
+    }
+    u->rat = m->p[0].ra[0] * nx + m->p[0].ra[1] * ny;
+    u->rbt = m->p[0].rb[0] * nx + m->p[0].rb[1] * ny;
+    u->wt = ia.m + ib.m + ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt;
+    u->mt = 1 / u->wt;
+    if (m->n_points > 1) {
+        u->w12 = ia.m + ib.m + ia.i * u->ran[0] * u->ran[1] + ib.i * u->rbn[0] * u->rbn[1];
+        const double det = u->w[0] * u->w[1] - u->w12 * u->w12;
+        u->per_det = det > 1e-9 * u->w[0] * u->w[1] ? 1 / det : 0;
+    }
+    if (w->par.warm_start) inherit(m, p, u);
+    bt_pack_bias(w, u, g, 1);
+}
+
+/// Normal bias b of model equation (1).
+static double bias_of(const bt_world *w, const bt_unit *u, double gap, int i, double restitution)
+{
+    const bt_bodies *b = &w->bodies;
+    if (restitution > 0) {
+        // Newton's law on the approach at the start of the step. A pair that would meet within the step rebounds
+        // now: letting it close the gap first would lose the approach speed that the law refers to. "Meets" counts
+        // from the slop on, or rounding would decide which of two points of a square hit rebounds.
+        // Where drag takes part of the approach within the step, the law refers to what is left: the work of a row is
+        // λ (w* + w2)/2, and a rebound faster than −w* would add energy.
+        const double approach = bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
+        const double closing = bt_normal_velocity(u, i, &b->vel_free[u->a], &b->vel_free[u->b]);
+        if (approach < -w->par.rest_speed && gap + w->par.dt * bt_min(closing, 0) < w->par.slop)
+            return restitution * bt_max(approach, bt_min(closing, 0));
+    }
+    return bt_max(gap, 0) / w->par.dt;
+}
+
+void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share)
+{
+    const double restitution = share * w->bodies.restitution[u->b];
+    for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g->gap[i], i, restitution);
+}
+
+void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
+{
+    bt_tile *t = &w->tiles->tile[k];
+    if ((bt_idx)s->n > t->cap_units) {
+        t->cap_units = (bt_idx)(s->n + s->n / 4);
+        free(t->units);
+        free(t->gaps);
+        t->units = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->units);
+        t->gaps = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->gaps);
+    }
+    t->n_units = (bt_idx)s->n;
+    if (s->n == 0) return;
+    const bool crush = bt_crush_on(w);
+    if (crush) bt_crush_reserve(t);
+    bt_idx next[MAX_COLOURS + 2] = {0};
+    if (t->phase < BT_COLOURS) colour_units(w, t, s, next);
+    else memset(s->colour, 0, s->n); // in sequence
+    for (size_t i = 0; i < s->n; i++) {
+        bt_pair *p = &t->pairs[s->pair[i]];
+        const bt_idx at = next[s->colour[i]]++;
+        bt_unit *u = &t->units[at];
+        fill_unit(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
+        if (crush) {
+            bt_crush_fill(w, t, at, p, &s->man[i]);
+            bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
+        }
+        p->n_points = u->n;
+        for (int j = 0; j < u->n; j++) p->feature[j] = s->man[i].p[j].feature;
+    }
+}
+
+void bt_pack_store(bt_world *w, bt_idx k)
+{
+    bt_tile *t = &w->tiles->tile[k];
+    for (bt_idx i = 0; i < t->n_units; i++) {
+        const bt_unit *u = &t->units[i];
+        bt_pair *p = &t->pairs[t->gaps[i].pair];
+        p->ln[0] = u->ln[0];
+        p->ln[1] = u->ln[1];
+        p->lt = u->lt;
+    }
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// From the manifolds of a tile to the units that the sweeps work on (private to detection and solver).
+#ifndef BERGTOW_PACK_H
+#define BERGTOW_PACK_H
+
+#include "contact/contacts.h"
+#include "space/tiles.h"
+
+/// Manifolds of one tile, in the order of its pairs; one a thread.
+typedef struct bt_pack_scratch {
+    bt_manifold *man; ///< [n]
+    bt_idx *pair;     ///< [n] which pair
+    uint8_t *colour;  ///< [n]
+    size_t n, cap;
+    uint64_t *used;   ///< colours taken at each body of the block
+    size_t cap_used;
+} bt_pack_scratch;
+
+/// Room for n manifolds, none kept yet.
+void bt_pack_begin(bt_pack_scratch *s, size_t n);
+/// Place for the next manifold, of pair i; it counts once kept.
+bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i);
+void bt_pack_keep(bt_pack_scratch *s);
+/// The units of tile k from the manifolds kept, with the impulses of the pairs (without warm start: 0).
+void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s);
+void bt_pack_scratch_free(bt_pack_scratch *s);
+
+/// Normal biases of a unit with these gaps, `share`: factor on the restitution.
+void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share);
+
+/// Impulses and features of the units into the pairs, for the next detection.
+void bt_pack_store(bt_world *w, bt_idx k);
+
+#endif

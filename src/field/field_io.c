@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: MIT
+// Ice fields in HDF5: written whole or not at all, and checked value by value when read.
+//
+//     /floes/offsets    [n+1]   first vertex of each floe, and their number
+//     /floes/vertices   [V][2]  m, body frame: anticlockwise about the centroid
+//     /floes/pose       [n][3]  x m, y m, yaw rad
+//     /floes/thickness  [n]     m
+//     /floes/area       [n]     m², optional when read
+//     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes
+//     /case             the resolved case the field was made from
+// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a seal (seal.h): of such a file
+// any damage is refused before HDF5, which crashes on some, reads a byte. A file without one, made by h5py say, is let through to the
+// checks of its values; what damage does to HDF5 itself it cannot be kept from.
+#include <errno.h>
+#include <hdf5.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "bergtow/field.h"
+#include "bergtow/outline.h"
+#include "field/field_load.h"
+#include "base/fileio.h"
+#include "base/h5read.h"
+#include "base/h5util.h"
+#include "case/ice_bounds.h"
+#include "base/largest.h"
+#include "base/seal.h"
+
+// ---- write ----
+
+static void describe(bt_h5 *h, const char *dataset, const char *units, const char *description)
+{
+    bt_h5_attr_text(h, dataset, "units", units);
+    bt_h5_attr_text(h, dataset, "description", description);
+}
+
+bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
+{
+    // Under another name until it is complete, so that a full disk never leaves half a field under the right one.
+    size_t size = strlen(path) + sizeof ".part";
+    char *part = bt_alloc(size, 1);
+    snprintf(part, size, "%s.part", path);
+    bt_h5 h;
+    bt_status status = bt_h5_create_with_room(&h, part, err);
+    if (status == BT_OK) {
+        hsize_t n = (hsize_t)f->n, nv = (hsize_t)f->offsets[f->n];
+        bt_h5_group(&h, "/floes");
+        bt_h5_write(&h, "/floes/offsets", H5T_NATIVE_INT64, n + 1, 0, f->offsets);
+        bt_h5_write(&h, "/floes/vertices", H5T_NATIVE_DOUBLE, nv, 2, f->vertices);
+        bt_h5_write(&h, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, f->pose);
+        bt_h5_write(&h, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, f->thickness);
+        bt_h5_write(&h, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, f->area);
+        describe(&h, "/floes/offsets", "1", "first vertex of each floe, and the number of vertices");
+        describe(&h, "/floes/vertices", "m", "outlines, body frame, anticlockwise about the centroid");
+        describe(&h, "/floes/pose", "m, m, rad", "x, y, yaw");
+        describe(&h, "/floes/thickness", "m", "thickness");
+        describe(&h, "/floes/area", "m2", "area");
+        bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
+        bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
+        bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
+        char *text = bt_case_resolved(c);
+        bt_h5_write_text(&h, "/case", text ? text : "");
+        free(text);
+        bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
+        status = bt_h5_close(&h);
+        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_FIELD, err);
+        if (status == BT_OK) status = bt_file_rename(part, path, err);
+        if (status != BT_OK) unlink(part);
+    }
+    free(part);
+    return status;
+}
+
+// ---- read ----
+
+typedef struct reader {
+    hid_t file;
+    bt_nonconvex nonconvex;
+    bt_outline_counts counts;
+    bt_refusals r;
+} reader;
+
+// Whole dataset of doubles or 64-bit integers with `width` columns (0: rank 1); NULL after a refusal. *rows: its length.
+static void *read_dataset(reader *r, const char *name, bool integers, hsize_t width, hsize_t most, hsize_t *rows)
+{
+    if (r->r.status != BT_OK) return NULL;
+    void *data = NULL;
+    hid_t d = H5Dopen2(r->file, name, H5P_DEFAULT);
+    if (d < 0) {
+        bt_refuse(&r->r, "dataset %s: is missing or damaged; write the file with `bergtow field`, or add it", name);
+        return NULL;
+    }
+    hid_t space = H5Dget_space(d), type = H5Dget_type(d);
+    H5T_class_t class = H5Tget_class(type);
+    hsize_t dims[H5S_MAX_RANK] = {0};
+    int rank = H5Sget_simple_extent_dims(space, dims, NULL), wanted = width ? 2 : 1;
+    bool counts = class == H5T_INTEGER, numbers = counts || class == H5T_FLOAT;
+    if (integers ? !counts : !numbers) {
+        bt_refuse(&r->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers", integers ? "int64" : "float64");
+    } else if (rank != wanted || (width && dims[1] != width)) {
+        if (width) bt_refuse(&r->r, "dataset %s: must have two dimensions, the second of %llu", name, (unsigned long long)width);
+        else bt_refuse(&r->r, "dataset %s: must have one dimension", name);
+    } else if (dims[0] > most) {
+        bt_refuse(&r->r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
+               (unsigned long long)dims[0], (unsigned long long)most);
+    } else {
+        *rows = dims[0];
+        data = bt_alloc((size_t)(dims[0] * (width ? width : 1)) + 1, 8);
+        if (dims[0] > 0 && H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
+            bt_refuse(&r->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
+    }
+    H5Tclose(type);
+    H5Sclose(space);
+    H5Dclose(d);
+    return data;
+}
+
+static double read_ice_area(reader *r)
+{
+    double area = NAN;
+    if (r->r.status != BT_OK) return area;
+    hid_t a = H5Aopen_by_name(r->file, "/floes", "ice_area", H5P_DEFAULT, H5P_DEFAULT);
+    if (a >= 0) {
+        hid_t space = H5Aget_space(a), type = H5Aget_type(a);
+        H5T_class_t class = H5Tget_class(type);
+        bool one = H5Sget_simple_extent_npoints(space) == 1 && (class == H5T_FLOAT || class == H5T_INTEGER);
+        if (one && H5Aread(a, H5T_NATIVE_DOUBLE, &area) < 0) area = NAN;
+        H5Tclose(type);
+        H5Sclose(space);
+        H5Aclose(a);
+    }
+    if (isnan(area))
+        bt_refuse(&r->r, "attribute ice_area of /floes: is missing or no number; give the area in m2 that the "
+                         "concentration refers to");
+    return area;
+}
+
+static void check_offsets(reader *r, const int64_t *offsets, hsize_t n, hsize_t n_vertices)
+{
+    if (r->r.status != BT_OK) return;
+    if (offsets[0] != 0) bt_refuse(&r->r, "dataset /floes/offsets: begins with %lld, not 0", (long long)offsets[0]);
+    // Differences of hostile numbers overflow: compare, and only then subtract.
+    for (hsize_t i = 0; i < n && r->r.status == BT_OK; i++) {
+        int64_t a = offsets[i], b = offsets[i + 1];
+        if (a < 0 || b <= a || (hsize_t)b > n_vertices)
+            bt_refuse(&r->r, "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
+                   (unsigned long long)i, (long long)a, (long long)b, (unsigned long long)n_vertices);
+        else if (b - a > BT_MAX_VERTICES)
+            bt_refuse(&r->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a), BT_MAX_VERTICES);
+    }
+    if (r->r.status == BT_OK && (hsize_t)offsets[n] != n_vertices)
+        bt_refuse(&r->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld", (unsigned long long)n_vertices, (long long)offsets[n]);
+}
+
+static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *stored_area)
+{
+    int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+    const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * i;
+    const char *fault = bt_shape_fault(n, v);
+    if (fault) {
+        double own[2 * BT_MAX_VERTICES];
+        int n_own = n;
+        memcpy(own, v, 2 * (size_t)n * sizeof *v);
+        fault = bt_outline_admit(r->nonconvex, &n_own, own, &r->counts);
+    }
+    if (fault) {
+        bt_refuse(&r->r, "floe %d: its outline is refused: %s", i, fault);
+        return;
+    }
+    char why[BT_ICE_WHY];
+    const bt_ice_floe given = {n, v, p[0], p[1], p[2], f->thickness[i], stored_area ? stored_area[i] : NAN, 1e-9};
+    if ((fault = bt_ice_floe_fault(&given, why, NULL))) bt_refuse(&r->r, "floe %d: %s", i, fault);
+    f->area[i] = stored_area ? stored_area[i] : bt_shape_moments(n, v).area;
+}
+
+static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)
+{
+    if (r->r.status == BT_OK && rows != n)
+        bt_refuse(&r->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows, (unsigned long long)n);
+}
+
+static void read_floes(reader *r, bt_field *f)
+{
+    hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
+    bt_field_free(f);
+    f->offsets = read_dataset(r, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
+    if (r->r.status == BT_OK && n_offsets < 1) bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
+    hsize_t n = n_offsets ? n_offsets - 1 : 0;
+    f->vertices = read_dataset(r, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
+    check_offsets(r, f->offsets, n, n_vertices);
+    f->pose = read_dataset(r, "/floes/pose", false, 3, BT_MOST_FLOES, &n_pose);
+    same_length(r, "/floes/pose", n_pose, n);
+    f->thickness = read_dataset(r, "/floes/thickness", false, 0, BT_MOST_FLOES, &n_thickness);
+    same_length(r, "/floes/thickness", n_thickness, n);
+    double *stored_area = NULL;
+    if (r->r.status == BT_OK && H5Lexists(r->file, "/floes/area", H5P_DEFAULT) > 0) {
+        stored_area = read_dataset(r, "/floes/area", false, 0, BT_MOST_FLOES, &n_area);
+        same_length(r, "/floes/area", n_area, n);
+    }
+    f->ice_area = read_ice_area(r);
+    if (r->r.status == BT_OK) {
+        f->n = f->cap = (bt_idx)n;
+        f->cap_vertices = (int64_t)n_vertices;
+        f->area = bt_alloc((size_t)n, sizeof *f->area);
+        double sum = 0, size = 0;
+        for (bt_idx i = 0; i < f->n; i++) {
+            check_floe(r, f, i, stored_area);
+            sum += f->area[i];
+            size += sqrt(4 * f->area[i] / BT_PI);
+        }
+        f->concentration = sum / f->ice_area;
+        char why[BT_ICE_WHY];
+        if (r->r.status == BT_OK && bt_ice_field_fault(false, f->n, size, sum, f->ice_area, why))
+            bt_refuse(&r->r, "attribute ice_area of /floes: %s", why);
+    }
+    free(stored_area);
+}
+
+// Floes that are not convex by their hulls; the others to the bit as they were read.
+static void take_hulls(bt_field *f)
+{
+    bt_field g;
+    bt_field_init(&g);
+    double sum = 0;
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
+        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+        double hull[2 * BT_MAX_VERTICES];
+        memcpy(hull, v, 2 * (size_t)n * sizeof *v);
+        const bool convex = bt_outline_convex(n, v);
+        bt_field_add(&g, convex ? n : bt_shape_hull(n, hull), hull, p[0], p[1], p[2], f->thickness[i]);
+        if (convex) { // centred once more, which changes last digits
+            memcpy(g.vertices + 2 * g.offsets[i], v, 2 * (size_t)n * sizeof *v);
+            memcpy(g.pose + 3 * (size_t)i, p, 3 * sizeof *p);
+            g.area[i] = f->area[i];
+        }
+        sum += g.area[i];
+    }
+    g.ice_area = f->ice_area;
+    g.concentration = sum / g.ice_area;
+    bt_field_free(f);
+    *f = g;
+}
+
+bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err) { return bt_field_read_as(f, path, BT_NONCONVEX_REFUSE, err); }
+
+bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
+{
+    bool bare;
+    const bt_status sealed = bt_seal_check(path, BT_SEAL_FIELD, &bare, err);
+    if (sealed != BT_OK) return sealed;
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    if (H5Fis_hdf5(path) <= 0) {
+        bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);
+        return BT_ERR_CASE;
+    }
+    reader r = {.nonconvex = nonconvex, .r = {.path = path, .err = err, .status = BT_OK}};
+    r.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
+    if (r.file < 0) {
+        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
+        return BT_ERR_CASE;
+    }
+    if (bt_h5_whole(r.file, path, err) == BT_OK) read_floes(&r, f);
+    else r.r.status = BT_ERR_CASE;
+    H5Fclose(r.file);
+    if (r.r.status == BT_OK) {
+        if (r.counts.hulled || r.counts.rounded) take_hulls(f);
+        f->outlines = r.counts;
+    } else {
+        bt_field_free(f);
+        bt_field_init(f);
+    }
+    return r.r.status;
+}

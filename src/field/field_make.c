@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: MIT
+// The generator: sizes, cells, floes shrunk to the concentration, shaken, checked, put in order.
+//
+// Floes are drawn from the size law until their areas fill concentration × ice area; a common factor (near 1) makes it
+// exact. Cells (tessellation, sawn strips) fill the region in the same proportions. A floe is its cell scaled about the
+// centroid, so cells prove that floes do not overlap before the shake; after it, separating axes do. Regular polygons do not
+// fill their cells: they grow from where they fit, in stages between shakes (after Lubachevsky & Stillinger 1990, J. Stat.
+// Phys. 60).
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "field/field_make.h"
+#include "case/ice_bounds.h"
+#include "base/largest.h"
+#include "base/rng.h"
+
+static const double CLEARANCE = 2e-3; // water kept around obstacles / mean size
+static const double TOUCH = 1 - 1e-9; // part of the room that is used: round-off must not turn touching into overlap
+static const double STRIDE = 0.3;     // move of a floe in a step of the shake / mean gap
+static const double PUSH = 1.02;      // growth of a floe that has no room
+static const double GROWN = 1e-3;     // shortfall of area at which a growing floe counts as grown
+static const double MOST = 0.06;      // and at most this part of the size: a step turns a floe by a tenth of a radian
+enum { GROWTH_STAGES = 120 };
+
+static const char *path_of(const bt_case *c) { return c->path ? c->path : "case"; }
+
+static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
+{
+    static const char *const names[] = {[BT_ICE_VORONOI] = "voronoi floes", [BT_ICE_RECTANGLES] = "rectangles",
+                                        [BT_ICE_POLYGONS] = "regular polygons"};
+    bt_errors_add(err, "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
+                  "ice.shape, size or region", path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
+    return BT_ERR_CASE;
+}
+
+// Target areas of all floes, m²; [*n], caller frees.
+static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n, bt_errors *err)
+{
+    double expected = wanted / bt_sizes_mean_area(s);
+    if (expected > BT_MOST_FLOES) {
+        bt_errors_add(err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
+                      path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
+        return BT_ERR_CASE;
+    }
+    size_t cap = 64;
+    *target = bt_alloc(cap, sizeof **target);
+    *n = 0;
+    double sum = 0;
+    for (;;) {
+        double d = bt_sizes_draw(s, c->ice.seed, *n), a = BT_PI / 4 * d * d;
+        if (*n > 0 && wanted - sum < a / 2) break; // nearer without it
+        if ((size_t)*n == cap) *target = bt_realloc(*target, cap *= 2, sizeof **target);
+        (*target)[(*n)++] = a;
+        sum += a;
+        if (sum >= wanted) break;
+    }
+    if (sum > 2 * wanted) {
+        bt_errors_add(err, "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
+                      "a larger region, or ice.concentration: 0", path_of(c), bt_sizes_mean(s), wanted);
+        free(*target);
+        return BT_ERR_CASE;
+    }
+    for (bt_idx i = 0; i < *n; i++) (*target)[i] *= wanted / sum;
+    return BT_OK;
+}
+
+static double total_area(const bt_field *f)
+{
+    double sum = 0;
+    for (bt_idx i = 0; i < f->n; i++) sum += f->area[i];
+    return sum;
+}
+
+static double mean_gap(const bt_yard *y, const bt_field *f, double *size)
+{
+    double d = 0, area = total_area(f);
+    for (bt_idx i = 0; i < f->n; i++) d += 2 * sqrt(f->area[i] / BT_PI) / f->n;
+    *size = d;
+    double root = sqrt(area / y->ice_area);
+    // Between floes of diameter d in cells of diameter d/√c; far apart, a third of the spacing stands for it, so
+    // that a shake of fifteen gaps is five spacings, which is enough to forget a lattice.
+    return d / root * bt_min(1 - root, 1.0 / 3);
+}
+
+// Cells of the case's kind. wanted: area of all floes, m².
+static bt_cells make_cells(const bt_case *c, const bt_yard *y, bt_idx n, const double *target, double wanted)
+{
+    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_cells_tessellate(y, n, target, c->ice.seed);
+    double aspect = c->ice.aspect > 0 ? bt_max(c->ice.aspect, 1 / c->ice.aspect) : 1;
+    // Around an obstacle rectangles stay rectangles, unless that wastes too much water.
+    for (int effort = 0;; effort++) {
+        bt_cells cells = bt_cells_saw(y, n, target, aspect, c->ice.seed, effort);
+        double fill = 0;
+        for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
+        if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
+        bt_cells_free(&cells);
+    }
+}
+
+// One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
+static bt_status floes_from_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
+                                  bt_errors *err)
+{
+    double *room = bt_alloc((size_t)cells->n, sizeof *room);
+    for (bt_idx i = 0; i < cells->n; i++) {
+        if (cells->nv[i] < 3) continue;
+        bt_idx k = f->n;
+        bt_field_add(f, cells->nv[i], cells->v[i], 0, 0, 0, 0);
+        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        double s = sqrt(cells->target[i] / f->area[k]);
+        bt_field_scale(f, k, s);
+        room[k] = (1 - 1e-6) / s;
+    }
+    double reached = bt_field_fit(f, room, wanted);
+    free(room);
+    return reached > (1 - 1e-6) * wanted ? BT_OK : cannot_pack(c, reached / y->ice_area, err);
+}
+
+// Largest factor by which polygon v, centred at (x, y), fits into the cell.
+static double fit_into(int nc, const double *cell, double x, double y, int n, const double *v, double c, double s)
+{
+    double t = INFINITY;
+    for (int i = 0; i < nc; i++) {
+        const double *p = cell + 2 * i, *q = cell + 2 * ((i + 1) % nc);
+        double nx = q[1] - p[1], ny = p[0] - q[0], h = 0;
+        for (int k = 0; k < n; k++)
+            h = bt_max(h, nx * (c * v[2 * k] - s * v[2 * k + 1]) + ny * (s * v[2 * k] + c * v[2 * k + 1]));
+        t = bt_min(t, (nx * (p[0] - x) + ny * (p[1] - y)) / h);
+    }
+    return t;
+}
+
+// Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
+static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
+                                   bt_errors *err)
+{
+    int sides = (int)c->ice.sides;
+    if (c->ice.sides < 3 || c->ice.sides > 32) {
+        bt_errors_add(err, "%s: ice.sides: %lld is refused: a regular polygon has 3 to 32 sides here", path_of(c),
+                      (long long)c->ice.sides);
+        return BT_ERR_CASE;
+    }
+    double sum = 0, v[2 * 32];
+    for (bt_idx i = 0; i < cells->n; i++)
+        if (cells->nv[i] >= 3) sum += cells->target[i];
+    double *goal = bt_alloc((size_t)cells->n, sizeof *goal), *room = bt_alloc((size_t)cells->n, sizeof *room);
+    for (bt_idx i = 0; i < cells->n; i++) {
+        if (cells->nv[i] < 3) continue;
+        bt_moments m = bt_shape_moments(cells->nv[i], cells->v[i]);
+        bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_ORIENT, i);
+        double yaw = 2 * BT_PI * bt_rng_uniform(&r);
+        bt_idx k = f->n;
+        goal[k] = cells->target[i] * wanted / sum;
+        bt_shape_regular(sides, goal[k], v);
+        double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, cos(yaw), sin(yaw));
+        bt_field_add(f, sides, v, m.cx, m.cy, yaw, 0);
+        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        bt_field_scale(f, k, bt_min(1, 0.999 * t));
+    }
+    bt_status status = BT_OK;
+    double best_area = 0, best_least = 0;
+    int idle = 0;
+    for (int stage = 1; status == BT_OK; stage++) {
+        bt_field_room(y, f, 2, room);
+        double least = 1; // part of its goal that the smallest floe has
+        for (bt_idx i = 0; i < f->n; i++) {
+            if (room[i] < 1) bt_field_scale(f, i, TOUCH * room[i]);
+            least = bt_min(least, f->area[i] / goal[i]);
+        }
+        double area = total_area(f);
+        // A shake leaves overlaps of about its slop, which have just cost that much of the area: settle makes it up.
+        if (least > 1 - GROWN) break;
+        idle = area > best_area * (1 + 2e-4) || least > best_least + 2e-3 ? 0 : idle + 1;
+        best_area = bt_max(best_area, area);
+        best_least = bt_max(best_least, least);
+        if (stage > GROWTH_STAGES || idle > 8) {
+            status = cannot_pack(c, best_area / y->ice_area, err);
+            break;
+        }
+        double size, gap = mean_gap(y, f, &size);
+        for (bt_idx i = 0; i < f->n; i++) {
+            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so that
+            // grown floes do not trap it.
+            bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (room[i] - 1))));
+        }
+        status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
+    }
+    free(goal);
+    free(room);
+    return status;
+}
+
+// Take out what overlap the shake has left, and bring the area back to what was asked.
+static bt_status settle(const bt_case *c, const bt_yard *y, bt_field *f, double wanted, bt_errors *err)
+{
+    double *room = bt_alloc((size_t)f->n, sizeof *room);
+    bt_field_room(y, f, 1.2, room);
+    bt_status status = BT_OK;
+    for (bt_idx i = 0; i < f->n && status == BT_OK; i++) {
+        room[i] *= TOUCH;
+        if (room[i] > 0.9) continue;
+        bt_errors_add(err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
+                      path_of(c), (long long)i);
+        status = BT_ERR_NUMERIC;
+    }
+    if (status == BT_OK) {
+        double reached = bt_field_fit(f, room, wanted);
+        if (reached < 0.995 * wanted) {
+            bt_errors_add(err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
+                          path_of(c), reached / y->ice_area, wanted / y->ice_area);
+            status = BT_ERR_NUMERIC;
+        }
+    }
+    free(room);
+    return status;
+}
+
+double bt_field_thickness(const bt_case *c, bt_idx i)
+{
+    // ln h ~ N(μ, σ) with the mean and standard deviation asked for
+    double h = c->ice.thickness, s2 = log1p(c->ice.thickness_spread * c->ice.thickness_spread);
+    if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
+    bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
+    double least, most;
+    bt_ice_thickness_range(&least, &most);
+    return bt_min(most, bt_max(least, h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2)));
+}
+
+static void set_thickness(const bt_case *c, bt_field *f)
+{
+    for (bt_idx i = 0; i < f->n; i++) f->thickness[i] = bt_field_thickness(c, i);
+}
+
+static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
+{
+    double wanted = c->ice.concentration * y->ice_area, *target;
+    bt_idx n;
+    bt_status status = draw_targets(c, sizes, wanted, &target, &n, err);
+    if (status != BT_OK) return status;
+    bt_cells cells = make_cells(c, y, n, target, wanted);
+    free(target);
+    status = c->ice.shape == BT_ICE_POLYGONS ? polygons_in_cells(c, y, &cells, wanted, f, err)
+                                             : floes_from_cells(c, y, &cells, wanted, f, err);
+    bt_cells_free(&cells);
+    if (status != BT_OK) return status;
+    bt_field_sort(f, y);
+    double size, gap = mean_gap(y, f, &size);
+    status = bt_field_shake(c, y, f, c->ice.shake * gap, bt_min(STRIDE * gap, MOST * size), 0, err);
+    if (status != BT_OK) return status;
+    status = settle(c, y, f, wanted, err);
+    if (status != BT_OK) return status;
+    bt_field_sort(f, y);
+    set_thickness(c, f);
+    return BT_OK;
+}
+
+bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
+{
+    bt_field_free(f);
+    bt_field_init(f);
+    bt_sizes sizes;
+    bt_status status = bt_sizes_init(&sizes, c, err);
+    if (status != BT_OK) return status;
+    bt_yard y;
+    status = bt_yard_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
+    if (status == BT_OK && c->ice.concentration > 0) status = make(c, &y, &sizes, f, err);
+    f->ice_area = y.ice_area;
+    f->concentration = y.ice_area > 0 ? total_area(f) / y.ice_area : 0;
+    bt_yard_free(&y);
+    if (status != BT_OK) {
+        bt_field_free(f);
+        bt_field_init(f);
+    }
+    return status;
+}

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// Where ice may lie: the ice region, its periodic directions, and the bodies that stand in it.
+#include "field/field_make.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double MOST_GROWTH = 20; // of a body by the clearance: beyond that it is a line
+
+static void place(int n, double *v, double x, double y, double yaw)
+{
+    double c = cos(yaw), s = sin(yaw);
+    for (int i = 0; i < n; i++) {
+        double px = v[2 * i], py = v[2 * i + 1];
+        v[2 * i] = x + c * px - s * py;
+        v[2 * i + 1] = y + s * px + c * py;
+    }
+}
+
+// Area of a polygon within the region.
+static double area_inside(const bt_yard *y, int n, const double *v)
+{
+    double a[2 * (BT_MAX_VERTICES + 4)], b[2 * (BT_MAX_VERTICES + 4)];
+    n = bt_shape_clip(n, v, -1, 0, -y->x0, a);
+    n = bt_shape_clip(n, a, 1, 0, y->x1, b);
+    n = bt_shape_clip(n, b, 0, -1, -y->y0, a);
+    n = bt_shape_clip(n, a, 0, 1, y->y1, b);
+    return n >= 3 ? bt_shape_moments(n, b).area : 0;
+}
+
+// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so slender that room for the
+// clearance cannot be made by scaling: it would keep floes away all along its line, and its images would be without number.
+static bool add_obstacle(bt_yard *y, int n, const double *v)
+{
+    double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
+    bt_moments m = bt_shape_moments(n, v);
+    // Scaling about the centroid by 1 + clearance/inradius moves every edge out by at least the clearance.
+    double grow = 1 + y->clearance / bt_max(m.inradius, 1e-9 * m.radius);
+    if (grow > MOST_GROWTH) return false;
+    double r = m.radius * grow;
+    // A body far outside a periodic domain is brought back first, so that images next to it suffice.
+    double wx = m.cx, wy = m.cy;
+    bt_yard_wrap(y, &wx, &wy);
+    int reach_x = y->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = y->periodic_y ? 1 + (int)(r / ly) : 0;
+    for (int ix = -reach_x; ix <= reach_x; ix++)
+        for (int iy = -reach_y; iy <= reach_y; iy++) {
+            double cx = wx + ix * lx, cy = wy + iy * ly;
+            // Floes at home reach over a periodic edge by less than half a period.
+            double over_x = y->periodic_x ? lx / 2 : 0, over_y = y->periodic_y ? ly / 2 : 0;
+            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y || cy - r > y->y1 + over_y) continue;
+            y->obstacles = bt_realloc(y->obstacles, (size_t)y->n_obstacles + 1, sizeof *y->obstacles);
+            bt_obstacle *o = &y->obstacles[y->n_obstacles++];
+            *o = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
+            for (int k = 0; k < n; k++) {
+                o->v[2 * k] = cx + (v[2 * k] - m.cx);
+                o->v[2 * k + 1] = cy + (v[2 * k + 1] - m.cy);
+            }
+            y->ice_area -= area_inside(y, n, o->v);
+            for (int k = 0; k < n; k++) {
+                o->v[2 * k] = cx + grow * (v[2 * k] - m.cx);
+                o->v[2 * k + 1] = cy + grow * (v[2 * k + 1] - m.cy);
+            }
+        }
+    return true;
+}
+
+static bool spans(double a0, double a1, double d0, double length)
+{
+    return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
+}
+
+static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+{
+    // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
+    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    for (int ix = -over_x; ix <= over_x; ix++)
+        for (int iy = -over_y; iy <= over_y; iy++) {
+            double v[2 * BT_MAX_VERTICES];
+            memcpy(v, own, 2 * (size_t)n * sizeof *v);
+            place(n, v, x + ix * c->domain.length, z + iy * c->domain.width, yaw);
+            if (!add_obstacle(y, n, v)) return false;
+        }
+    return true;
+}
+
+bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err)
+{
+    *y = (bt_yard){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
+    if (!(y->x1 > y->x0 && y->y1 > y->y0)) {
+        bt_errors_add(err, "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
+                      c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
+        return BT_ERR_CASE;
+    }
+    y->periodic_x = bt_bound_wraps(c->domain.ends) && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
+    y->periodic_y = c->domain.sides == BT_BOUND_PERIODIC && spans(y->y0, y->y1, c->domain.y0, c->domain.width);
+    y->ice_area = (y->x1 - y->x0) * (y->y1 - y->y0);
+
+    double v[2 * BT_MAX_VERTICES];
+    int nv = bt_case_waterline(c, v);
+    bool wide = nv < 3 || add_body(y, c, nv, v, c->body.x, c->body.y, c->body.yaw);
+    for (bt_idx i = 0; i < c->n_floes && wide; i++) {
+        const bt_floe_def *d = &c->floes[i];
+        nv = bt_case_floe_outline(d, v);
+        wide = nv < 3 || add_body(y, c, nv, v, d->x, d->y, d->yaw);
+    }
+    if (!wide) {
+        bt_errors_add(err, "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m between it and the ice; take a wider one, or smaller floes (ice.size)",
+                      c->path ? c->path : "case", clearance);
+        return BT_ERR_CASE;
+    }
+    if (!(y->ice_area > 0)) {
+        bt_errors_add(err, "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
+                      c->path ? c->path : "case");
+        return BT_ERR_CASE;
+    }
+    return BT_OK;
+}
+
+void bt_yard_free(bt_yard *y)
+{
+    free(y->obstacles);
+    *y = (bt_yard){0};
+}
+
+static double wrap(double x, double low, double high)
+{
+    double l = high - low;
+    x -= l * floor((x - low) / l);
+    return x < high ? x : low; // round-off may land on the upper edge
+}
+
+void bt_yard_wrap(const bt_yard *y, double *px, double *py)
+{
+    if (y->periodic_x) *px = wrap(*px, y->x0, y->x1);
+    if (y->periodic_y) *py = wrap(*py, y->y0, y->y1);
+}
+
+// Area left of a cell cut by edge e of a polygon (outer side kept).
+static int cut_outside(int n, const double *v, int m, const double *o, int e, double *out)
+{
+    const double *p = o + 2 * e, *q = o + 2 * ((e + 1) % m);
+    double nx = q[1] - p[1], ny = p[0] - q[0], l = hypot(nx, ny); // outward normal of an anticlockwise edge
+    if (l == 0) return 0;
+    return bt_shape_clip(n, v, -nx / l, -ny / l, -(nx * p[0] + ny * p[1]) / l, out);
+}
+
+// Does an edge of polygon v have all of o on its outer side?
+static bool edge_separates(int n, const double *v, int m, const double *o)
+{
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
+        double nx = q[1] - p[1], ny = p[0] - q[0];
+        bool all = true;
+        for (int k = 0; k < m && all; k++) all = nx * (o[2 * k] - p[0]) + ny * (o[2 * k + 1] - p[1]) >= 0;
+        if (all) return true;
+    }
+    return false;
+}
+
+int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
+{
+    enum { CAP = 2 * BT_MAX_VERTICES };
+    double trial[2 * CAP], best[2 * CAP];
+    for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
+        if (n > 4 * BT_CELL_VERTICES) n = bt_cell_clean(n, v, 0); // many obstacles around one cell
+        const bt_obstacle *o = &y->obstacles[k];
+        double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+        for (int i = 0; i < n; i++) {
+            x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
+            y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
+        }
+        if (x0 > o->x + o->radius || x1 < o->x - o->radius || y0 > o->y + o->radius || y1 < o->y - o->radius) continue;
+        const double *outline = o->v;
+        int m = o->n;
+        double box[8];
+        if (boxed) {
+            double bx0 = INFINITY, bx1 = -INFINITY, by0 = INFINITY, by1 = -INFINITY;
+            for (int i = 0; i < o->n; i++) {
+                bx0 = bt_min(bx0, o->v[2 * i]), bx1 = bt_max(bx1, o->v[2 * i]);
+                by0 = bt_min(by0, o->v[2 * i + 1]), by1 = bt_max(by1, o->v[2 * i + 1]);
+            }
+            memcpy(box, (double[8]){bx0, by0, bx1, by0, bx1, by1, bx0, by1}, sizeof box);
+            outline = box;
+            m = 4;
+        }
+        if (edge_separates(n, v, m, outline)) continue;
+        // An edge of the obstacle that separates leaves the cell whole and so wins.
+        int n_best = 0;
+        double best_area = 0;
+        for (int e = 0; e < m; e++) {
+            int nt = cut_outside(n, v, m, outline, e, trial);
+            double area = nt >= 3 ? bt_shape_moments(nt, trial).area : 0;
+            if (area > best_area) {
+                best_area = area;
+                n_best = nt;
+                memcpy(best, trial, 2 * (size_t)nt * sizeof *best);
+            }
+        }
+        n = n_best;
+        memcpy(v, best, 2 * (size_t)n * sizeof *v);
+    }
+    return n;
+}
+
+int bt_cell_clean(int n, double *v, double shortest)
+{
+    // A subset of the vertices of a convex polygon is convex and lies inside it. Of the shortest edge's two ends, the
+    // one whose removal costs less area goes.
+    while (n > 3) {
+        int at = 0;
+        double least = INFINITY;
+        for (int i = 0; i < n; i++) {
+            int j = (i + 1) % n;
+            double l = hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
+            if (l < least) least = l, at = i;
+        }
+        if (least >= shortest && n <= BT_CELL_VERTICES) break;
+        double loss[2];
+        for (int e = 0; e < 2; e++) {
+            const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n), *r = v + 2 * ((at + e + 1) % n);
+            loss[e] = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        }
+        int gone = (at + (loss[1] < loss[0])) % n;
+        memmove(v + 2 * gone, v + 2 * (gone + 1), 2 * (size_t)(n - gone - 1) * sizeof *v);
+        n--;
+    }
+    return n;
+}

@@ -1,0 +1,598 @@
+// SPDX-License-Identifier: MIT
+// Floe outlines in GeoJSON (RFC 7946): a FeatureCollection of Polygons, as image analysis and GIS programs write it.
+//
+//     {"type": "FeatureCollection", "features": [
+//       {"type": "Feature", "id": 7, "properties": {"thickness": 1.2},
+//        "geometry": {"type": "Polygon", "coordinates": [[[east, north], [east, north], ..., [east, north]]]}}, ...]}
+//
+// Positions are [longitude, latitude] in degrees, unless a member `crs` as before RFC 7946 [GeoJSON 2008] says that
+// they are metres [east, north] of a projection (map_crs.h), or the case says so of a file without one
+// (ice.outlines_crs). Degrees are projected about an origin (bergtow/outline.h), metres are taken as they are, less
+// those of an origin. Then, on the map and in the frame of the case,
+//
+//     basin:       x = east,  y = north      both pairs run anticlockwise seen from above
+//     geographic:  x = north, y = east       both run clockwise: this frame is left-handed seen from above
+//
+// so that a floe lies on the ground as it lies on the map, in both frames: no mirror. A basin has no north; its x,
+// along, is drawn to the right. Rings that run anticlockwise on the map, as RFC 7946 has them, run clockwise in the
+// geographic frame: rings are turned as needed. A MultiPolygon of one polygon is one, too. A height (third coordinate)
+// is passed over. Files of this program before had metres [x, y] of the frame, by their mark `bergtow`: they are read
+// as they were written.
+#include <errno.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+#include "bergtow/outline.h"
+#include "field/field_load.h"
+#include "field/field_make.h"
+#include "base/fileio.h"
+#include "case/ice_bounds.h"
+#include "base/largest.h"
+#include "field/map_crs.h"
+#include "field/map_features.h"
+#include "base/suggest.h"
+
+static const double FARTHEST = 100e3; // m from the origin: the projection is one of small areas
+static const double DEGREE = BT_PI / 180;
+
+/// What the coordinates of a file are.
+typedef enum { DEGREES, PLANE, FRAME } coordinates;
+
+/// All coordinates of a file, as they stand there.
+typedef struct survey {
+    double low[3], high[3]; ///< first, second, first from 0° on
+    size_t feature;         ///< the first that is no place in degrees; SIZE_MAX: none
+    double odd[2];          ///< its vertex
+} survey;
+
+typedef struct reader {
+    const bt_case *c;
+    bt_refusals r;
+    bt_field *f;
+    coordinates kind;
+    bool assumed;      ///< degrees because nothing says else
+    bt_map_crs crs;
+    double lon0, lat0;   ///< rad
+    double east0, north0; ///< m
+    int names;         ///< distinct near names in outlines.nearly
+} reader;
+
+/// "feature 3" or "feature 3 (id 17)".
+static const char *name_of(const json_t *feature, size_t index, char out[96])
+{
+    const json_t *id = json_object_get(feature, "id");
+    if (!id) id = json_object_get(json_object_get(feature, "properties"), "id");
+    if (json_is_string(id)) snprintf(out, 96, "feature %zu (id %.60s)", index, json_string_value(id));
+    else if (json_is_integer(id)) snprintf(out, 96, "feature %zu (id %" JSON_INTEGER_FORMAT ")", index, json_integer_value(id));
+    else snprintf(out, 96, "feature %zu", index);
+    return out;
+}
+
+/// The outer ring of a feature that the parser was left, or NULL and why not.
+static const json_t *ring_of(const json_t *feature, const char **why)
+{
+    const json_t *geometry = json_object_get(feature, "geometry"), *polygon = json_object_get(geometry, "coordinates");
+    const char *type = json_string_value(json_object_get(geometry, "type"));
+    if (type && !strcmp(type, "MultiPolygon")) {
+        if (json_array_size(polygon) != 1) {
+            *why = "it has several polygons (MultiPolygon); make each a feature of its own";
+            return NULL;
+        }
+        polygon = json_array_get(polygon, 0);
+    } else if (!type || strcmp(type, "Polygon")) {
+        *why = "its geometry is not a Polygon; take it out";
+        return NULL;
+    }
+    if (json_array_size(polygon) > 1) {
+        *why = "it has holes, and a floe has none here; take out all rings but the first";
+        return NULL;
+    }
+    const json_t *ring = json_array_get(polygon, 0);
+    if (!json_is_array(ring))
+        *why = "its coordinates are no list of rings; write [[[east, north], [east, north], ...]]";
+    else if (json_array_size(ring) > BT_MOST_RING) *why = "it has more than 10000 vertices; simplify it";
+    else return ring;
+    return NULL;
+}
+
+/// Coordinates of feature i as they are in the file, the closing one left out; their number, 0 and why not.
+static int coordinates_of(bt_features *features, size_t i, double *v, const char **why)
+{
+    size_t n;
+    const double *read = bt_features_ring(features, i, &n);
+    const json_t *feature = bt_features_at(features, i), *ring = read ? NULL : ring_of(feature, why);
+    if (!read && !ring) return 0;
+    if (json_object_get(feature, "crs") || json_object_get(json_object_get(feature, "geometry"), "crs")) {
+        *why = "it has a crs of its own; give one to the whole FeatureCollection";
+        return 0;
+    }
+    if (read) memcpy(v, read, 2 * n * sizeof *v);
+    else n = json_array_size(ring);
+    for (size_t k = 0; ring && k < n; k++) {
+        const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
+        if (!json_is_number(x) || !json_is_number(y)) {
+            *why = "a vertex is no pair of numbers; write [east, north]";
+            return 0;
+        }
+        v[2 * k] = json_number_value(x);
+        v[2 * k + 1] = json_number_value(y);
+    }
+    if (n > 1 && v[0] == v[2 * n - 2] && v[1] == v[2 * n - 1]) n--;
+    if (n < 3) *why = "it has fewer than 3 vertices";
+    return n < 3 ? 0 : (int)n;
+}
+
+/// A vertex of feature i into the survey.
+static void see(survey *b, size_t i, double x, double y, double lon)
+{
+    const double q[3] = {x, y, x < 0 ? x + 360 : x};
+    for (int a = 0; a < 3; a++) b->low[a] = bt_min(b->low[a], q[a]), b->high[a] = bt_max(b->high[a], q[a]);
+    if (b->feature == SIZE_MAX && !(fabs(x) <= lon && fabs(y) <= 90)) b->feature = i, b->odd[0] = x, b->odd[1] = y;
+}
+
+/// Box of all coordinates; lon: the farthest longitude that is one.
+static survey look_over(bt_features *features, double lon)
+{
+    survey b = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}, .feature = SIZE_MAX};
+    for (size_t i = 0; i < features->n; i++) {
+        const char *why;
+        size_t n;
+        const double *read = bt_features_ring(features, i, &n);
+        for (size_t k = 0; read && k < n; k++) see(&b, i, read[2 * k], read[2 * k + 1], lon);
+        const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
+        for (size_t k = 0; ring && k < json_array_size(ring); k++) {
+            const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
+            if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon); // others are told with their feature
+        }
+    }
+    return b;
+}
+
+/// The origin in the mark that this program leaves in its files, if there is one.
+static void take_origin(const json_t *mark, double origin[2])
+{
+    const json_t *list = json_object_get(mark, "origin"), *x = json_array_get(list, 0), *y = json_array_get(list, 1);
+    if (!json_is_number(x) || !json_is_number(y) || !(fabs(json_number_value(x)) <= 1e8) ||
+        !(fabs(json_number_value(y)) <= 1e8))
+        return;
+    origin[0] = json_number_value(x);
+    origin[1] = json_number_value(y);
+}
+
+/// Degrees that are none, or that are latitude before longitude; and the place of x = y = 0: the case's, that of the
+/// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
+/// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
+static void begin_degrees(reader *s, bt_features *features, const json_t *mark)
+{
+    const bt_case *c = s->c;
+    const survey b = look_over(features, s->assumed ? 180 : 360);
+    const bool given = !isnan(c->ice.origin_lon), swapped = bt_max(fabs(b.low[0]), fabs(b.high[0])) <= 90 &&
+                                                            bt_max(fabs(b.low[1]), fabs(b.high[1])) <= 360;
+    if (!isnan(c->ice.origin_east))
+        bt_refuse(&s->r, "its coordinates are degrees, and ice.origin_east and ice.origin_north are metres; give "
+                         "ice.origin_lon and ice.origin_lat, or none");
+    if (b.feature != SIZE_MAX) {
+        bt_refuse(
+            &s->r,
+            "feature %zu has a vertex [%g, %g], which is not longitude and latitude in degrees, in this order: %s",
+            b.feature, b.odd[0], b.odd[1],
+            swapped      ? "latitude seems to come first; swap the two numbers of every position"
+            : s->assumed ? "without a crs coordinates are degrees within 180 and 90 (RFC 7946); for metres east and "
+                           "north give the file its crs, or set ice.outlines_crs: plane; "
+                           "for longitudes from 0 to 360 set ice.outlines_crs: lonlat"
+                         : "correct it, or say what its coordinates are");
+        return;
+    }
+    const int a = b.high[2] - b.low[2] < b.high[0] - b.low[0] ? 2 : 0;
+    double middle[2] = {(b.low[a] + b.high[a]) / 2, (b.low[1] + b.high[1]) / 2};
+    if (!(b.low[0] <= b.high[0])) middle[0] = middle[1] = 0; // no place at all
+    // No sea ice is so far south, and the other way round it could be: the Bohai Sea at 37° has the ice nearest to the
+    // equator.
+    if (!given && fabs(middle[1]) < 30 && fabs(middle[0]) >= 30 && swapped) {
+        bt_refuse(&s->r,
+                  "its outlines lie about latitude %.4g, longitude %.4g, where no sea ice is: latitude seems to come "
+                  "first; write [longitude, latitude], or give "
+                  "ice.origin_lon and ice.origin_lat if the place is right",
+                  middle[1], middle[0]);
+        return;
+    }
+    if (middle[0] > 180) middle[0] -= 360;
+    take_origin(mark, middle);
+    s->lon0 = given ? c->ice.origin_lon : middle[0] * DEGREE;
+    s->lat0 = given ? c->ice.origin_lat : bt_min(90, bt_max(-90, middle[1])) * DEGREE;
+}
+
+/// The place of x = y = 0 in a plane: the case's, that of the file's mark, the middle where the crs is a projection,
+/// whose zeros are far away; otherwise zero.
+static void begin_plane(reader *s, bt_features *features, const json_t *mark)
+{
+    const bt_case *c = s->c;
+    const survey b = look_over(features, 180);
+    const bool given = !isnan(c->ice.origin_east), projected = s->crs.kind == BT_MAP_PLANE;
+    if (!isnan(c->ice.origin_lon) && s->kind == PLANE)
+        bt_refuse(&s->r, "its coordinates are metres, and ice.origin_lon and ice.origin_lat are degrees; give "
+                         "ice.origin_east and ice.origin_north, or none");
+    if (given && s->kind == FRAME)
+        bt_refuse(&s->r, "its coordinates are metres of the case's frame, whose origin they have; remove "
+                         "ice.origin_east and ice.origin_north");
+    const bool any = b.low[0] <= b.high[0];
+    if (projected && any && b.feature == SIZE_MAX)
+        bt_refuse(&s->r,
+                  "its crs is %s, in metres, and all its coordinates lie within 180 and 90, as degrees do; correct the "
+                  "crs of the file",
+                  s->crs.name);
+    if (s->r.status != BT_OK) return;
+    double origin[2] = {0, 0};
+    if (projected && any) origin[0] = (b.low[0] + b.high[0]) / 2, origin[1] = (b.low[1] + b.high[1]) / 2;
+    take_origin(mark, origin);
+    s->east0 = given ? c->ice.origin_east : origin[0];
+    s->north0 = given ? c->ice.origin_north : origin[1];
+    if (s->kind == FRAME || !any) return;
+    const bool basin = c->domain.frame == BT_FRAME_BASIN; // the domain on the map
+    const double east = basin ? c->domain.x0 : c->domain.y0, north = basin ? c->domain.y0 : c->domain.x0;
+    const double far_east = east + (basin ? c->domain.length : c->domain.width),
+                 far_north = north + (basin ? c->domain.width : c->domain.length);
+    if (b.low[0] - s->east0 > far_east || b.high[0] - s->east0 < east || b.low[1] - s->north0 > far_north ||
+        b.high[1] - s->north0 < north)
+        bt_refuse(&s->r,
+                  "all outlines, east %.10g to %.10g m, north %.10g to %.10g m, lie outside the domain, which is east "
+                  "%.10g to %.10g m, north %.10g to %.10g m on the map; say "
+                  "where x = y = 0 is with ice.origin_east and ice.origin_north",
+                  b.low[0], b.high[0], b.low[1], b.high[1], east + s->east0, far_east + s->east0, north + s->north0,
+                  far_north + s->north0);
+}
+
+/// A vertex on the map to the case's frame.
+static void to_frame(const bt_case *c, double east, double north, double v[2])
+{
+    const bool basin = c->domain.frame == BT_FRAME_BASIN;
+    v[0] = basin ? east : north;
+    v[1] = basin ? north : east;
+}
+
+/// To metres in the case's frame, in place; why not, or NULL.
+static const char *place(const reader *s, int n, double *v)
+{
+    for (int i = 0; i < n && s->kind == PLANE; i++)
+        to_frame(s->c, v[2 * i] - s->east0, v[2 * i + 1] - s->north0, v + 2 * i);
+    for (int i = 0; i < n && s->kind == DEGREES; i++) {
+        double north, east, swapped_north, swapped_east;
+        bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, s->lon0, s->lat0, &north, &east);
+        bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, s->lon0, s->lat0, &swapped_north, &swapped_east);
+        if (!(hypot(north, east) <= FARTHEST)) {
+            if (fabs(v[2 * i]) <= 90 && hypot(swapped_north, swapped_east) <= FARTHEST)
+                return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
+                       "[longitude, latitude]";
+            return s->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
+                                "longer holds; set ice.origin_lon and ice.origin_lat, or take it out; "
+                                "if its coordinates are metres, east and north, give the file its crs or set "
+                                "ice.outlines_crs: plane"
+                              : "it is more than 100 km from the origin, where the projection of a small area no "
+                                "longer holds; set ice.origin_lon and ice.origin_lat, or take it out";
+        }
+        to_frame(s->c, east, north, v + 2 * i);
+    }
+    return NULL;
+}
+
+static void turn_round(int n, double *v)
+{
+    for (int i = 0, j = n - 1; i < j; i++, j--)
+        for (int a = 0; a < 2; a++) {
+            const double x = v[2 * i + a];
+            v[2 * i + a] = v[2 * j + a];
+            v[2 * j + a] = x;
+        }
+}
+
+/// Is a property likely to be a thickness under another name?
+static bool is_nearly_thickness(const char *name)
+{
+    static const char *const others[] = {"thick", "height",   "h",   "ice_height", "draft",
+                                         "dicke", "tykkelse", "sit", NULL};
+    char lower[64];
+    size_t n = 0;
+    for (; name[n] && n < sizeof lower - 1; n++)
+        lower[n] = (char)(name[n] >= 'A' && name[n] <= 'Z' ? name[n] + 'a' - 'A' : name[n]);
+    lower[n] = 0;
+    for (int i = 0; others[i]; i++)
+        if (!strcmp(lower, others[i])) return true;
+    return strstr(lower, "thick") || bt_suggest_distance(lower, "thickness", 4) <= 3;
+}
+
+/// Count a feature that has no thickness but one of nearly this name, and keep the first such names.
+static void look_for_thickness(reader *s, const json_t *properties)
+{
+    bt_outline_counts *o = &s->f->outlines;
+    const char *name;
+    json_t *value;
+    bool any = false;
+    json_object_foreach((json_t *)properties, name, value) {
+        if (!is_nearly_thickness(name) || json_is_null(value)) continue;
+        any = true;
+        char entry[48];
+        snprintf(entry, sizeof entry, "`%.40s`", name);
+        for (char *c = entry; *c; c++)
+            if ((unsigned char)*c < 0x20 || (unsigned char)*c >= 0x7F) *c = '?';
+        if (strstr(o->nearly, entry) || strlen(o->nearly) + strlen(entry) + 3 > sizeof o->nearly) continue;
+        if (s->names++) strcat(o->nearly, ", ");
+        strcat(o->nearly, entry);
+    }
+    o->unnamed += any;
+}
+
+static void read_feature(reader *s, bt_features *features, size_t index, double *v)
+{
+    char name[96], text[BT_ICE_WHY];
+    const json_t *feature = bt_features_at(features, index);
+    const char *why = NULL;
+    int n = coordinates_of(features, index, v, &why);
+    if (n) why = place(s, n, v);
+    bt_outline_counts *counts = &s->f->outlines;
+    if (!why) {
+        const int clean = bt_outline_clean(n, v);
+        counts->dropped += n - clean;
+        n = clean;
+        // Anticlockwise on the map is clockwise in the geographic frame.
+        const bool clockwise = bt_outline_area2(n, v) < 0,
+                   mirrored = s->kind != FRAME && s->c->domain.frame == BT_FRAME_GEOGRAPHIC;
+        if (clockwise) turn_round(n, v);
+        counts->turned += clockwise != mirrored;
+        why = bt_outline_admit(s->c->ice.nonconvex, &n, v, counts);
+    }
+    if (why) {
+        bt_refuse(&s->r, "%s is refused: %s", name_of(feature, index, name), why);
+        return;
+    }
+    const json_t *properties = json_object_get(feature, "properties"),
+                 *given = json_object_get(properties, "thickness");
+    double thickness = bt_field_thickness(s->c, s->f->n);
+    if (given && !json_is_null(given)) thickness = json_is_number(given) ? json_number_value(given) : NAN;
+    else look_for_thickness(s, properties);
+    const bt_idx i = s->f->n;
+    bt_field_add(s->f, n, v, 0, 0, 0, thickness);
+    counts->read++;
+    const bt_field *f = s->f;
+    const bt_ice_floe floe = {n,
+                              f->vertices + 2 * f->offsets[i],
+                              f->pose[3 * i],
+                              f->pose[3 * i + 1],
+                              f->pose[3 * i + 2],
+                              thickness,
+                              f->area[i],
+                              1e-6};
+    if ((why = bt_ice_floe_fault(&floe, text, NULL))) bt_refuse(&s->r, "%s: %s", name_of(feature, index, name), why);
+}
+
+/// Metres as the case calls them, of a file that does not say it.
+static void choose_metres(reader *s, bool basin)
+{
+    const bt_crs key = s->c->ice.outlines_crs;
+    s->kind = key == BT_CRS_PLANE ? PLANE : FRAME;
+    snprintf(s->crs.name, sizeof s->crs.name, "local");
+    if (key == BT_CRS_METRES && !basin)
+        bt_refuse(&s->r, "ice.outlines_crs: metres was [x, y] = [north, east] in the geographic frame, while positions "
+                         "are [east, north] in GeoJSON; set plane for metres [east, north], "
+                         "or frame for [x, y]");
+}
+
+/// What the coordinates are: by the mark of this program, the file's crs, the case; a file that contradicts the case is
+/// refused.
+static void choose_coordinates(reader *s, const json_t *root)
+{
+    const json_t *crs = json_object_get(root, "crs"), *mark = json_object_get(root, "bergtow");
+    const char *type = json_string_value(json_object_get(crs, "type")),
+               *name = json_string_value(json_object_get(json_object_get(crs, "properties"), "name"));
+    const char *frame = json_string_value(json_object_get(mark, "frame")),
+               *marked = json_string_value(json_object_get(mark, "coordinates"));
+    const bt_crs key = s->c->ice.outlines_crs;
+    const bool basin = s->c->domain.frame == BT_FRAME_BASIN, degrees = key == BT_CRS_LONLAT,
+               metres = key != BT_CRS_FILE && key != BT_CRS_LONLAT;
+    const bool old = marked && !strcmp(marked, "metres") && !crs; // [x, y] of the frame
+    s->crs.kind = BT_MAP_LOCAL;
+    if (crs && (!type || strcmp(type, "name") || !name) && key == BT_CRS_FILE) {
+        bt_refuse(&s->r, "its crs is not given by a name ({\"type\": \"name\", \"properties\": {\"name\": "
+                         "\"EPSG:32633\"}}); give it so, or take it out and set ice.outlines_crs: lonlat or plane");
+        return;
+    }
+    if (crs && name) s->crs = bt_map_crs_of(name);
+    const bool said = crs && name && s->crs.kind != BT_MAP_UNKNOWN;
+    if (old || (said && s->crs.kind == BT_MAP_LOCAL)) {
+        s->kind = old ? FRAME : PLANE;
+        snprintf(s->crs.name, sizeof s->crs.name, "local");
+        if (degrees || (old ? key == BT_CRS_PLANE : key == BT_CRS_FRAME))
+            bt_refuse(&s->r, "its coordinates are metres%s, written by bergtow; remove ice.outlines_crs: %s",
+                      old ? " x, y of the case's frame" : " east and north",
+                      degrees ? "lonlat"
+                      : old   ? "plane"
+                              : "frame");
+        else if (frame && strcmp(frame, basin ? "basin" : "geographic"))
+            bt_refuse(&s->r,
+                      "its coordinates are metres of the frame %.20s; set domain.frame: %.20s, or make the field for "
+                      "this frame",
+                      frame, frame);
+    } else if (said && s->crs.kind == BT_MAP_WARPED) {
+        bt_refuse(&s->r,
+                  "its crs is %s, Mercator, whose metres are not those on the ground: shorter by the cosine of the "
+                  "latitude; transform the file to degrees (ogr2ogr -t_srs EPSG:4326) or to UTM",
+                  s->crs.name);
+    } else if (said) {
+        s->kind = s->crs.kind == BT_MAP_DEGREES ? DEGREES : PLANE;
+        if (s->kind == DEGREES ? metres : degrees || key == BT_CRS_FRAME || (key == BT_CRS_METRES && !basin))
+            bt_refuse(
+                &s->r,
+                "its crs is %s, in %s, and ice.outlines_crs says else; remove the key, or correct the crs of the file",
+                s->crs.name, s->kind == DEGREES ? "degrees" : "metres east and north");
+    } else if (crs && key == BT_CRS_FILE) {
+        bt_refuse(&s->r,
+                  "its crs, %.100s, is not known here as degrees or as metres east and north; transform the file to "
+                  "degrees (ogr2ogr -t_srs EPSG:4326), or set ice.outlines_crs: plane if its "
+                  "coordinates are metres east and north",
+                  name);
+    } else if (metres) {
+        choose_metres(s, basin);
+    } else {
+        s->kind = DEGREES;
+        s->assumed = !degrees;
+        snprintf(s->crs.name, sizeof s->crs.name, "OGC:CRS84");
+    }
+}
+
+static void set_concentration(reader *s)
+{
+    bt_yard y;
+    const bt_status status = bt_yard_init(&y, s->c, 0, s->r.err);
+    if (status != BT_OK) s->r.status = status;
+    double sum = 0;
+    for (bt_idx i = 0; i < s->f->n; i++) sum += s->f->area[i];
+    s->f->ice_area = y.ice_area;
+    s->f->concentration = status == BT_OK ? sum / y.ice_area : 0;
+    bt_yard_free(&y);
+}
+
+/// What the floes are together: far too small or large, they are in other units.
+static void check_whole(reader *s)
+{
+    double size = 0, thickness = 0;
+    for (bt_idx i = 0; i < s->f->n; i++) size += sqrt(4 * s->f->area[i] / BT_PI), thickness += s->f->thickness[i];
+    char why[BT_ICE_WHY];
+    if (bt_ice_domain_fault(s->c, s->f, why))
+        bt_refuse(&s->r, "%s%s", why,
+                  s->assumed ? "; without a crs they are degrees (RFC 7946): if they are metres, give the file its crs "
+                               "or set ice.outlines_crs: plane"
+                             : "");
+    else if (s->kind != DEGREES && size < 0.1 * thickness)
+        bt_refuse(&s->r,
+                  "its floes are %.3g m in size and %.3g m thick in the mean, as floes whose coordinates are degrees "
+                  "look in metres; if they are degrees, take out its crs and ice.outlines_crs",
+                  size / s->f->n, thickness / s->f->n);
+}
+
+static void read_features(reader *s, bt_features *features)
+{
+    const json_t *root = features->root, *mark = json_object_get(root, "bergtow");
+    const char *type = json_string_value(json_object_get(root, "type"));
+    if (!type || strcmp(type, "FeatureCollection") || !features->listed) {
+        bt_refuse(&s->r, "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
+        return;
+    }
+    if (features->n == 0 || features->n > BT_MOST_FLOES) {
+        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n, BT_MOST_FLOES);
+        return;
+    }
+    choose_coordinates(s, root);
+    if (s->r.status == BT_OK && s->kind == DEGREES) begin_degrees(s, features, mark);
+    else if (s->r.status == BT_OK) begin_plane(s, features, mark);
+    if (s->r.status != BT_OK) return;
+    double *v = bt_alloc(2 * (BT_MOST_RING + 1), sizeof *v);
+    for (size_t i = 0; i < features->n; i++) read_feature(s, features, i, v);
+    free(v);
+    bt_outline_counts *o = &s->f->outlines;
+    o->lon = s->kind == DEGREES ? s->lon0 : NAN;
+    o->lat = s->kind == DEGREES ? s->lat0 : NAN;
+    o->east = s->kind == PLANE ? s->east0 : NAN;
+    o->north = s->kind == PLANE ? s->north0 : NAN;
+    snprintf(o->crs, sizeof o->crs, "%s", s->crs.name);
+    if (s->r.status != BT_OK) return;
+    set_concentration(s);
+    if (s->r.status == BT_OK) check_whole(s);
+    // Numbers of floes are those of features only when none is missing.
+    if (s->r.status == BT_OK) bt_field_check_places(s->c, s->f, "feature", &s->r);
+}
+
+bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err)
+{
+    const char *path = c->ice.outlines;
+    bt_field_free(f);
+    bt_field_init(f);
+    bt_features features;
+    reader s = {.c = c, .r = {.path = path, .err = err, .status = bt_features_open(&features, path, err)}, .f = f};
+    if (s.r.status == BT_OK) read_features(&s, &features);
+    bt_features_close(&features);
+    if (s.r.status != BT_OK) {
+        bt_field_free(f);
+        bt_field_init(f);
+    }
+    return s.r.status;
+}
+
+// --- write -----------------------------------------------------------------------------------------------------------
+
+/// How a field is written.
+typedef struct map {
+    const bt_field *f;
+    const bt_case *c;
+    bool degrees;
+    double lon0, lat0, east0, north0; ///< rad; m
+} map;
+
+/// A vertex of the case's frame as it stands in the file.
+static void write_position(FILE *out, const map *m, double x, double y)
+{
+    const bool basin = m->c->domain.frame == BT_FRAME_BASIN;
+    const double east = basin ? x : y, north = basin ? y : x;
+    double first = m->east0 + east, second = m->north0 + north;
+    if (m->degrees) {
+        bt_outline_unproject(north, east, m->lon0, m->lat0, &first, &second);
+        first /= DEGREE, second /= DEGREE;
+    }
+    fprintf(out, "[%.17g,%.17g]", first, second);
+}
+
+static void write_floe(FILE *out, const map *m, bt_idx i)
+{
+    const bt_field *f = m->f;
+    const double *p = f->pose + 3 * (size_t)i, c = cos(p[2]), s = sin(p[2]);
+    const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
+    const bool mirrored = m->c->domain.frame == BT_FRAME_GEOGRAPHIC; // anticlockwise on the map [RFC 7946, 3.1.6]
+    fprintf(out, "%s\n{\"type\":\"Feature\",\"id\":%d,\"properties\":{\"thickness\":%.17g},\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[", i ? "," : "", (int)i,
+            f->thickness[i]);
+    for (int64_t k = 0; k <= n; k++) { // the first once more: a ring is closed
+        const double *v = f->vertices + 2 * (first + (mirrored ? (2 * n - 1 - k) % n : k % n));
+        if (k) fputc(',', out);
+        write_position(out, m, p[0] + c * v[0] - s * v[1], p[1] + s * v[0] + c * v[1]);
+    }
+    fprintf(out, "]]}}");
+}
+
+bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) return bt_file_fail(path, "write the outlines", errno, err);
+    const bt_outline_counts *o = &f->outlines;
+    const bt_map_crs from = bt_map_crs_of(o->crs);
+    const bool lonlat = o->read && isfinite(o->lon), projected = o->read && from.kind == BT_MAP_PLANE,
+               plane = o->read && isfinite(o->east);
+    const bool known = lonlat || (!projected && !isnan(c->ice.origin_lon));
+    const map m = {
+        .f = f,
+        .c = c,
+        .degrees = known,
+        .lon0 = lonlat ? o->lon : c->ice.origin_lon,
+        .lat0 = lonlat ? o->lat : c->ice.origin_lat,
+        .east0 = plane ? o->east : 0,
+        .north0 = plane ? o->north : 0,
+    };
+    fprintf(out, "{\"type\":\"FeatureCollection\",\n");
+    if (!known)
+        fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
+                projected ? o->crs : BT_MAP_LOCAL_NAME);
+    fprintf(out,
+            "\"bergtow\":{\"version\":\"%s\",\"coordinates\":\"%s\",\"origin\":[%.17g,%.17g],\"frame\":\"%s\",\"ice_"
+            "area_m2\":%.17g},\n\"features\":[",
+            BT_VERSION, known ? "longitude and latitude, degrees" : "east and north, metres",
+            known ? m.lon0 / DEGREE : m.east0, known ? m.lat0 / DEGREE : m.north0,
+            c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", f->ice_area);
+    for (bt_idx i = 0; i < f->n; i++) write_floe(out, &m, i);
+    fprintf(out, "\n]}\n");
+    const bool whole = fclose(out) == 0;
+    const bt_status status = whole ? bt_file_write(path, text, err) : bt_file_fail(path, "write the outlines", ENOMEM, err);
+    free(text);
+    return status;
+}

@@ -1,0 +1,287 @@
+// SPDX-License-Identifier: MIT
+// The lead ahead of the towed body; what it is: field/lead.h.
+#include "field/lead.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/shape.h"
+#include "field/field_make.h"
+#include "base/largest.h"
+
+static const double SLIT = 1e-4;        // width of a cut / diameter of the largest piece, assumed
+static const double SHORT_EDGE = 0.01;  // edges cut off / root of a piece's area, as in the generator
+enum { JOINT = 32, ROOM = BT_MAX_VERTICES + 2 };
+
+/// One convex part of the strip: a leg, or the round of a joint.
+typedef struct {
+    int n;
+    double v[2 * JOINT]; ///< about (x, y), m
+    double x, y, radius; ///< bounding circle, m
+} part;
+
+typedef struct {
+    const bt_lead *l;
+    part *parts;
+    int n;
+} strip;
+
+static strip make_strip(const bt_lead *l)
+{
+    strip s = {.l = l, .parts = bt_alloc(2 * (size_t)l->n, sizeof *s.parts)};
+    const double half = 0.5 * l->width;
+    for (int i = 0; i + 1 < l->n; i++) {
+        const double *p = l->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = hypot(dx, dy);
+        if (length > 0) {
+            const double ax = 0.5 * dx, ay = 0.5 * dy, bx = -half * dy / length, by = half * dx / length;
+            s.parts[s.n++] = (part){.n = 4, .v = {-ax - bx, -ay - by, ax - bx, ay - by, ax + bx, ay + by, bx - ax, by - ay},
+                                    .x = p[0] + ax, .y = p[1] + ay, .radius = hypot(0.5 * length, half)};
+        }
+        if (i == 0) continue;
+        part *joint = &s.parts[s.n++];
+        *joint = (part){.n = JOINT, .x = p[0], .y = p[1]};
+        bt_shape_regular(JOINT, BT_PI * half * half, joint->v);
+        joint->radius = hypot(joint->v[0], joint->v[1]);
+    }
+    return s;
+}
+
+/// Periods from which a floe at x with its radius may meet a part: first and last.
+static void images(double x, double reach, double period, int *first, int *last)
+{
+    *first = *last = 0;
+    if (!(period > 0)) return;
+    *first = (int)ceil((x - reach) / period);
+    *last = (int)floor((x + reach) / period);
+}
+
+/// Does the convex polygon v, about its centroid at (x, y), overlap the strip?
+static bool overlaps(const strip *s, int n, const double *v, double radius, double x, double y)
+{
+    const double touch = 1e-9 * s->l->width;
+    for (int k = 0; k < s->n; k++) {
+        const part *p = &s->parts[k];
+        const double dx = p->x - x, dy = p->y - y, reach = p->radius + radius;
+        int i0, i1, j0, j1;
+        images(dx, reach, s->l->period_x, &i0, &i1);
+        images(dy, reach, s->l->period_y, &j0, &j1);
+        for (int i = i0; i <= i1; i++)
+            for (int j = j0; j <= j1; j++) {
+                const double ox = dx - i * s->l->period_x, oy = dy - j * s->l->period_y;
+                if (hypot(ox, oy) < reach && bt_apart_of(n, v, p->n, p->v, ox, oy).gap < -touch) return true;
+            }
+    }
+    return false;
+}
+
+/// Unit vector of the axis of the largest second moment of area about the centroid: along the longer extent. The second moments of
+/// triangle (0, p, q) of area a are a/12 (p p + q q + (p+q)(p+q)).
+static void long_axis(int n, const double *v, double axis[2])
+{
+    double xx = 0, yy = 0, xy = 0;
+    for (int i = 0; i < n; i++) {
+        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0), a = p[0] * q[1] - p[1] * q[0], sx = p[0] + q[0], sy = p[1] + q[1];
+        xx += a * (p[0] * p[0] + q[0] * q[0] + sx * sx);
+        yy += a * (p[1] * p[1] + q[1] * q[1] + sy * sy);
+        xy += a * (p[0] * p[1] + q[0] * q[1] + sx * sy);
+    }
+    const double angle = 0.5 * atan2(2 * xy, xx - yy);
+    axis[0] = cos(angle), axis[1] = sin(angle);
+}
+
+/// Drop vertices at short edges: what stays is convex and lies within.
+static int drop_short_edges(int n, double *v)
+{
+    const double shortest = SHORT_EDGE * sqrt(bt_shape_moments(n, v).area);
+    for (int i = 0; i < n && n > 3;) {
+        const int j = i + 1 < n ? i + 1 : 0;
+        if (hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]) >= shortest) {
+            i++;
+            continue;
+        }
+        n--;
+        memmove(v + 2 * j, v + 2 * (j + 1), 2 * (size_t)(n - j) * sizeof *v);
+        i = 0;
+    }
+    return n;
+}
+
+typedef struct {
+    const strip *s;
+    double largest;    ///< area of the largest piece in the strip, m²
+    double x, y, c, sine, yaw, thickness; ///< of the floe that is cut
+    bt_field *out;
+} saw;
+
+/// Cut the polygon v (frame of the floe, room for ROOM vertices) until its pieces are small enough, and add them to the field.
+static void cut(const saw *k, int n, const double *v)
+{
+    double own[2 * ROOM], world[2 * ROOM], half[2 * ROOM], axis[2];
+    memcpy(own, v, 2 * (size_t)n * sizeof *v);
+    const bt_moments m = bt_shape_centre(n, own);
+    for (int i = 0; i < n; i++) {
+        world[2 * i] = k->c * own[2 * i] - k->sine * own[2 * i + 1];
+        world[2 * i + 1] = k->sine * own[2 * i] + k->c * own[2 * i + 1];
+    }
+    const double x = k->x + k->c * m.cx - k->sine * m.cy, y = k->y + k->sine * m.cx + k->c * m.cy;
+    if (m.area <= k->largest || !overlaps(k->s, n, world, m.radius, x, y)) {
+        bt_field_add(k->out, n, v, k->x, k->y, k->yaw, k->thickness);
+        return;
+    }
+    long_axis(n, own, axis);
+    const double slit = SLIT * k->s->l->floe_size;
+    for (int side = -1; side <= 1; side += 2) {
+        int nh = bt_shape_clip(n, own, side * axis[0], side * axis[1], -0.5 * slit, half);
+        nh = drop_short_edges(nh, half);
+        for (int i = 0; i < nh; i++) half[2 * i] += m.cx, half[2 * i + 1] += m.cy;
+        cut(k, nh, half);
+    }
+}
+
+static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
+{
+    const double *pose = f->pose + 3 * (size_t)i, size = s->l->floe_size;
+    const saw k = {.s = s, .largest = BT_PI / 4 * size * size, .x = pose[0], .y = pose[1], .c = cos(pose[2]), .sine = sin(pose[2]),
+                   .yaw = pose[2], .thickness = f->thickness[i], .out = out};
+    const bt_idx first = out->n;
+    cut(&k, (int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
+    double area = 0;
+    for (bt_idx p = first; p < out->n; p++) area += out->area[p];
+    const double low[2] = {s->l->x0, s->l->y0}, period[2] = {s->l->round_x, s->l->period_y};
+    for (bt_idx p = first; p < out->n; p++) {
+        out->thickness[p] *= f->area[i] / area;
+        for (size_t d = 0; d < 2; d++) { // a piece of a floe on a periodic edge may lie beyond it
+            double *at = &out->pose[3 * (size_t)p + d];
+            if (period[d] > 0) *at -= period[d] * floor((*at - low[d]) / period[d]);
+        }
+    }
+}
+
+/// Floes that overlap the strip, and their area.
+static void mark(const strip *s, const bt_field *f, uint8_t *taken, bt_lead_stats *st)
+{
+    double *outline = bt_field_outlines(f);
+    for (bt_idx i = 0; i < f->n; i++) {
+        const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
+        const double *v = outline + 2 * f->offsets[i];
+        taken[i] = overlaps(s, n, v, bt_shape_moments(n, v).radius, f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1]);
+        if (!taken[i]) continue;
+        st->taken++;
+        st->area_taken += f->area[i];
+    }
+    free(outline);
+}
+
+static void copy(const bt_field *f, bt_idx i, bt_field *out)
+{
+    const int64_t n = f->offsets[i + 1] - f->offsets[i], at = out->offsets[out->n];
+    const bt_idx k = out->n;
+    bt_field_add(out, (int)n, f->vertices + 2 * f->offsets[i], f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1], f->pose[3 * (size_t)i + 2], f->thickness[i]);
+    // As it was, to the bit: adding has centred it once more.
+    memcpy(out->vertices + 2 * at, f->vertices + 2 * f->offsets[i], 2 * (size_t)n * sizeof *f->vertices);
+    memcpy(out->pose + 3 * (size_t)k, f->pose + 3 * (size_t)i, 3 * sizeof *f->pose);
+    out->area[k] = f->area[i];
+}
+
+bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_errors *err)
+{
+    *st = (bt_lead_stats){.mode = l->mode, .width = l->width, .concentration_before = f->concentration, .concentration_after = f->concentration};
+    for (int i = 0; i + 1 < l->n; i++) st->length += hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
+    if (l->mode == BT_LEAD_NONE || f->n == 0) return BT_OK;
+    strip s = make_strip(l);
+    uint8_t *taken = bt_alloc((size_t)f->n, sizeof *taken);
+    mark(&s, f, taken, st);
+    // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger than allowed is cut.
+    const double most = l->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * l->floe_size * l->floe_size) : 0;
+    bt_status status = BT_OK;
+    if (most > BT_MOST_FLOES) {
+        bt_errors_add(err, "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, or a narrower or shorter lead",
+                      l->name, l->floe_size, most, BT_MOST_FLOES);
+        status = BT_ERR_CASE;
+    }
+    if (status == BT_OK) {
+        bt_field out;
+        bt_field_init(&out);
+        out.ice_area = f->ice_area;
+        double pieces = 0;
+        for (bt_idx i = 0; i < f->n; i++) {
+            const bt_idx first = out.n;
+            if (!taken[i]) copy(f, i, &out);
+            else if (l->mode == BT_LEAD_MANAGED) cut_floe(&s, f, i, &out);
+            for (bt_idx p = first; taken[i] && p < out.n; p++, st->pieces++) pieces += sqrt(4 * out.area[p] / BT_PI);
+        }
+        double area = 0;
+        for (bt_idx i = 0; i < out.n; i++) area += out.area[i];
+        out.concentration = st->concentration_after = f->ice_area > 0 ? area / f->ice_area : 0;
+        st->mean_piece = st->pieces > 0 ? pieces / (double)st->pieces : 0;
+        out.outlines = f->outlines;
+        bt_field_free(f);
+        *f = out;
+    }
+    free(taken);
+    free(s.parts);
+    return status;
+}
+
+/// From the body through the way-points (corners are not rounded), after the last straight on, lead.length in all. Returns the number of points.
+static int planned_path(const bt_case *c, double *path)
+{
+    double left = c->lead.length, ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    int n = 1;
+    path[0] = c->body.x;
+    path[1] = c->body.y;
+    for (int k = 0; k < c->tow.n_waypoints && left > 0; k++) {
+        const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1], far = hypot(dx, dy);
+        if (far == 0) continue;
+        ux = dx / far, uy = dy / far;
+        const double leg = bt_min(far, left);
+        path[2 * n] = path[2 * n - 2] + leg * ux;
+        path[2 * n + 1] = path[2 * n - 1] + leg * uy;
+        left -= leg;
+        n++;
+    }
+    if (left <= 0) return n;
+    path[2 * n] = path[2 * n - 2] + left * ux;
+    path[2 * n + 1] = path[2 * n - 1] + left * uy;
+    return n + 1;
+}
+
+bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err)
+{
+    *s = (bt_lead_stats){0};
+    if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
+    if (f->outlines.split > 0) {
+        bt_errors_add(err, "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set ice.nonconvex to hull, or draw the lead in the file",
+                      c->path ? c->path : "case", (long long)f->outlines.split);
+        return BT_ERR_CASE;
+    }
+    double *path = bt_alloc((size_t)c->tow.n_waypoints + 2, 2 * sizeof *path);
+    const int n = planned_path(c, path);
+    const bt_lead l = {
+        .name = c->path ? c->path : "case",
+        .mode = c->lead.mode,
+        .width = c->lead.width,
+        .floe_size = c->lead.floe_size,
+        .n = n,
+        .path = path,
+        .x0 = c->domain.x0,
+        .y0 = c->domain.y0,
+        .period_x = c->domain.ends == BT_BOUND_PERIODIC ? c->domain.length : 0,
+        .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
+        .round_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
+    };
+    const bt_status status = bt_lead_cut(&l, f, s, err);
+    free(path);
+    return status;
+}
+
+void bt_lead_stats_print(const bt_lead_stats *s)
+{
+    if (s->mode == BT_LEAD_NONE) return;
+    printf("  lead                %.4g m wide, %.4g m long: %lld floes (%.4g m2) ", s->width, s->length, (long long)s->taken, s->area_taken);
+    if (s->mode == BT_LEAD_CHANNEL) printf("removed");
+    else printf("cut into %lld pieces of %.3g m", (long long)s->pieces, s->mean_piece);
+    printf("; concentration %.4g, was %.4g\n", s->concentration_after, s->concentration_before);
+}

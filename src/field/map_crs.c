@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// Names of coordinate reference systems that are known as degrees, or as metres east and north, without a projection
+// library.
+//
+// GeoJSON has longitude before latitude and east before north, whatever order the registry gives to the axes of a
+// system [RFC 7946, 3.1.1; GeoJSON 2008, 2.1.1], so an EPSG code says what the two numbers are and not which is which.
+// Degrees on WGS84, ETRS89 and NAD83 are taken as the same: they differ by less than 3 m, all places alike. Metres of a
+// projection are used as they are, as coordinates in a plane: what a projection does to scale (UTM: 0.9996 to 1.001
+// within its zone; polar ones: 0.97 to 1.04 north of 65°) and the angle between its north and the true one
+// (convergence; UTM: up to 3°, polar: any) are not corrected. Mercator is not taken: at 76° its metres are a quarter of
+// a metre long. Codes: EPSG registry.
+#include "field/map_crs.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static const struct {
+    int first, last;
+    bt_map_kind kind;
+    bool any_north;
+} known[] = {
+    {4326, 4326, BT_MAP_DEGREES, false}, // WGS 84
+    {4979, 4979, BT_MAP_DEGREES, false}, // the same with a height
+    {4258, 4258, BT_MAP_DEGREES, false}, // ETRS89
+    {4937, 4937, BT_MAP_DEGREES, false}, // the same with a height
+    {4269, 4269, BT_MAP_DEGREES, false}, // NAD83
+    {4617, 4617, BT_MAP_DEGREES, false}, // NAD83 (CSRS)
+    {32601, 32660, BT_MAP_PLANE, false}, // UTM north, WGS 84
+    {32701, 32760, BT_MAP_PLANE, false}, // UTM south
+    {25828, 25838, BT_MAP_PLANE, false}, // UTM, ETRS89
+    {26901, 26923, BT_MAP_PLANE, false}, // UTM, NAD83
+    {3411, 3413, BT_MAP_PLANE, true}, // NSIDC sea ice polar stereographic: Hughes north, south; WGS 84 north
+    {3976, 3976, BT_MAP_PLANE, true}, // NSIDC sea ice polar stereographic south, WGS 84
+    {3031, 3031, BT_MAP_PLANE, true}, // Antarctic polar stereographic
+    {3995, 3996, BT_MAP_PLANE, true}, // Arctic polar stereographic, IBCAO
+    {5041, 5042, BT_MAP_PLANE, true}, // UPS north, south
+    {32661, 32661, BT_MAP_PLANE, true}, // UPS north, other order of axes in the registry
+    {32761, 32761, BT_MAP_PLANE, true}, // UPS south
+    {5936, 5940, BT_MAP_PLANE, true}, // EPSG Alaska, Canada, Greenland, Norway, Russia polar stereographic
+    {3571, 3576, BT_MAP_PLANE, true}, // north pole Lambert azimuthal equal-area, six meridians
+    {6931, 6932, BT_MAP_PLANE, true}, // EASE-Grid 2.0 north, south
+    {3857, 3857, BT_MAP_WARPED, false}, // Pseudo-Mercator of web maps
+    {3395, 3395, BT_MAP_WARPED, false}, // World Mercator
+    {3785, 3785, BT_MAP_WARPED, false}, // Pseudo-Mercator, withdrawn
+    {900913, 900913, BT_MAP_WARPED, false}, // the same, before it had a code
+};
+
+/// Behind the last ':' or '/'.
+static const char *last_word(const char *name)
+{
+    const char *last = name;
+    for (const char *s = name; *s; s++)
+        if (*s == ':' || *s == '/') last = s + 1;
+    return last;
+}
+
+static bool holds(const char *name, const char *word)
+{
+    for (; *name; name++)
+        if (!strncasecmp(name, word, strlen(word))) return true;
+    return false;
+}
+
+bt_map_crs bt_map_crs_of(const char *name)
+{
+    bt_map_crs crs = {.kind = BT_MAP_UNKNOWN};
+    const char *word = last_word(name);
+    snprintf(crs.name, sizeof crs.name, "%.31s", name);
+    if (!strcmp(name, BT_MAP_LOCAL_NAME)) {
+        crs.kind = BT_MAP_LOCAL;
+        snprintf(crs.name, sizeof crs.name, "local");
+    } else if (!strcasecmp(word, "CRS84") || !strcasecmp(word, "CRS84h") || !strcasecmp(word, "CRS83")) {
+        crs.kind = BT_MAP_DEGREES;
+        snprintf(crs.name, sizeof crs.name, "OGC:CRS%s", word + 3);
+    } else if (holds(name, "EPSG") && *word && strlen(word) <= 6 && strspn(word, "0123456789") == strlen(word)) {
+        const int code = atoi(word);
+        snprintf(crs.name, sizeof crs.name, "EPSG:%d", code);
+        for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+            if (code >= known[i].first && code <= known[i].last)
+                crs.kind = known[i].kind, crs.any_north = known[i].any_north;
+    }
+    return crs;
+}

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: MIT
+// Collisions of the towed body: events over steps, their forces, loads by panel; definitions in loads/impact.h.
+#include "loads/impact.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "partition/domain.h"
+#include "loads/touch.h"
+
+#define TURNED 1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
+
+bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w)
+{
+    const bt_idx towed = bt_world_towed(w);
+    if (towed < 0 || c->impact.conversion == BT_IMPACT_NONE) return NULL;
+    bt_impacts *m = bt_alloc(1, sizeof *m);
+    *m = (bt_impacts){
+        .rule = {.conversion = c->impact.conversion, .duration = c->impact.duration, .pressure = c->impact.pressure,
+                 .real_corner = c->impact.corner == BT_CORNER_REAL, .corner_angle = c->impact.corner_angle,
+                 .least_speed = c->impact.least_speed},
+        .dt = w->par.dt,
+        .tolerance = w->par.tolerance,
+        .sheet = c->ice.density * (1 + c->ice.added_mass),
+        .body_height = c->body.draft + c->body.sail,
+    };
+    const bt_bodies *b = &w->bodies;
+    const int64_t first = b->offset[towed];
+    bt_panels_init(&m->panels, (int)c->impact.panels, (int)(b->offset[towed + 1] - first), b->vertices + 2 * first);
+    return m;
+}
+
+void bt_impacts_free(bt_impacts *m)
+{
+    if (!m) return;
+    bt_panels_free(&m->panels);
+    free(m->touch);
+    free(m->closed);
+    free(m->open);
+    free(m);
+}
+
+// --- force of a collision --------------------------------------------------------------------------------------------
+
+void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
+{
+    if (!r->real_corner || !(e->corner > 0 && e->corner < BT_PI)) e->corner = r->corner_angle;
+    if (r->conversion == BT_IMPACT_CRUSHING) {
+        const double k = 2 * r->pressure * e->thickness * tan(0.5 * e->corner);
+        e->peak = bt_min(e->approach, e->impulse / e->mass) * sqrt(k * e->mass);
+        e->mean = 2 / BT_PI * e->peak;
+        e->duration = 0.5 * BT_PI * sqrt(e->mass / k);
+    } else {
+        e->duration = r->duration;
+        e->mean = e->impulse / r->duration;
+        e->peak = 0.5 * BT_PI * e->mean;
+    }
+}
+
+void bt_impact_describe(const bt_impact_rule *r, char out[160])
+{
+    if (r->conversion == BT_IMPACT_CRUSHING)
+        snprintf(out, 160, "crushing of %s%g deg at %g kPa", r->real_corner ? "the real corner, without one of " : "a corner of ", r->corner_angle * 180 / BT_PI, r->pressure / 1e3);
+    else snprintf(out, 160, "half-sine of %g s", r->duration);
+}
+
+// --- events over steps -----------------------------------------------------------------------------------------------
+
+static void close_event(bt_impacts *m, const bt_impact_open *o)
+{
+    if (m->n_closed == m->cap_closed) m->closed = bt_realloc(m->closed, (size_t)(m->cap_closed = m->cap_closed ? 2 * m->cap_closed : 64), sizeof *m->closed);
+    bt_impact *e = &m->closed[m->n_closed++];
+    *e = o->so_far;
+    e->panel = bt_panels_at(&m->panels, e->x, e->y);
+    bt_impact_convert(&m->rule, e);
+}
+
+/// Touches t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that may go on.
+static bool follow(const bt_impacts *m, bt_touch *t, int64_t n, double time, bt_impact_open *o, bool *begun)
+{
+    double sum = 0, approach = 0, rest = 0;
+    int64_t most = 0;
+    for (int64_t i = 0; i < n; i++) {
+        sum += t[i].collision;
+        if (t[i].collision > 0) approach = bt_max(approach, t[i].approach);
+        rest = bt_max(rest, t[i].rest);
+        if (t[i].collision > t[most].collision) most = i;
+    }
+    const bool goes_on = *begun && sum > 0 && approach <= TURNED * o->rest + m->tolerance;
+    if (!goes_on && !(sum > 0 && approach >= m->rule.least_speed)) {
+        for (int64_t i = 0; i < n; i++) t[i].collision = 0; // a push
+        return false;
+    }
+    if (!goes_on) *o = (bt_impact_open){.so_far = {.time = time, .gid = t[0].gid, .approach = approach}};
+    *begun = true;
+    bt_impact *e = &o->so_far;
+    e->impulse += sum;
+    o->rest = rest;
+    if (t[most].collision > o->largest) {
+        o->largest = t[most].collision;
+        e->x = t[most].x, e->y = t[most].y;
+        e->mass = t[most].mass, e->thickness = t[most].thickness, e->corner = t[most].corner;
+    }
+    return rest > m->tolerance;
+}
+
+/// Merge this step's touches into the open events; both are in the order of gids.
+static void follow_events(bt_impacts *m, double time)
+{
+    bt_impact_open *next = NULL;
+    int64_t n_next = 0, at = 0;
+    if (m->n_touch > 0) next = bt_alloc((size_t)m->n_touch, sizeof *next);
+    for (int64_t i = 0; i < m->n_touch;) {
+        int64_t end = i + 1;
+        while (end < m->n_touch && m->touch[end].gid == m->touch[i].gid) end++;
+        while (at < m->n_open && m->open[at].so_far.gid < m->touch[i].gid) close_event(m, &m->open[at++]);
+        const bool was_open = at < m->n_open && m->open[at].so_far.gid == m->touch[i].gid;
+        const bt_impact_open before = was_open ? m->open[at++] : (bt_impact_open){0};
+        bt_impact_open o = before;
+        bool there = was_open;
+        const bool stays = follow(m, m->touch + i, end - i, time, &o, &there);
+        const bool same = was_open && o.so_far.time == before.so_far.time;
+        if (was_open && (!same || !stays)) {
+            // Closed as it is, with this step's part if there was one; and another may have begun.
+            close_event(m, same ? &o : &before);
+        }
+        if (there && !same && !stays) close_event(m, &o);
+        if (stays) next[n_next++] = o;
+        i = end;
+    }
+    while (at < m->n_open) close_event(m, &m->open[at++]);
+    free(m->open);
+    m->open = next;
+    m->n_open = n_next;
+}
+
+// --- one step --------------------------------------------------------------------------------------------------------
+
+/// Impulses of the step into panels and sums. c, s: yaw of the body at X1.
+static void add_loads(bt_impacts *m, double c, double s)
+{
+    double hit[2] = {0, 0};
+    m->largest_push = 0;
+    for (int64_t i = 0; i < m->n_touch; i++) {
+        const bt_touch *t = &m->touch[i];
+        const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx, part = t->collision / t->normal;
+        hit[0] += part * fx, hit[1] += part * fy;
+        m->largest_push = bt_max(m->largest_push, (t->normal - t->collision) / m->dt);
+        for (int k = 0; k < 2; k++) {
+            if (!(t->point[k] > 0)) continue;
+            const double share = t->point[k] / t->normal / m->dt;
+            bt_panels_load(&m->panels, t->px[k], t->py[k], t->point[k] / m->dt, share * fx, share * fy);
+        }
+    }
+    m->collision_x = c * hit[0] - s * hit[1];
+    m->collision_y = s * hit[0] + c * hit[1];
+}
+
+void bt_impacts_take(bt_world *w)
+{
+    bt_impacts *m = w->impacts;
+    if (!m) return;
+    const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
+    free(m->touch);
+    m->touch = bt_touch_collect(w, m, &m->n_touch);
+    m->n_closed = 0;
+    follow_events(m, (double)(w->step + 1) * w->par.dt);
+    bt_panels_clear(&m->panels);
+    add_loads(m, p->c, p->s);
+}
+
+void bt_impacts_end(bt_impacts *m)
+{
+    m->n_closed = 0;
+    for (int64_t i = 0; i < m->n_open; i++) close_event(m, &m->open[i]);
+    m->n_open = 0;
+}

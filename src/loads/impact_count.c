@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+// Collisions in the window of a run and before it: numbers, the largest, the largest peaks; see impact_count.h.
+#include "loads/impact_count.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_history *h, const bt_steady *w)
+{
+    const double *push = h->column[BT_COL_PUSH];
+    *c = (bt_impact_count){.start = w->start, .hours = (double)w->n * m->dt / 3600, .start_peak = NAN};
+    bt_impact_describe(&m->rule, c->conversion);
+    c->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *c->peaks);
+    c->panel = bt_alloc((size_t)m->panels.n, sizeof *c->panel);
+    c->collision_resistance = bt_stats_mean(w->n ? h->column[BT_COL_COLLISION] + w->first : NULL, w->n).mean;
+    c->push_resistance = w->series[BT_REPORTED_ICE].mean.mean - c->collision_resistance;
+    c->largest_push = bt_history_largest(push, w->first, h->n);
+    c->start_push = bt_history_largest(push, 0, w->first);
+}
+
+void bt_impact_count_free(bt_impact_count *c)
+{
+    free(c->peaks);
+    free(c->panel);
+    *c = (bt_impact_count){0};
+}
+
+// --- the largest peaks -----------------------------------------------------------------------------------------------
+
+static void sift_down(double *heap, int64_t n, int64_t i)
+{
+    for (;;) {
+        int64_t least = i;
+        for (int64_t k = 2 * i + 1; k <= 2 * i + 2 && k < n; k++)
+            if (heap[k] < heap[least]) least = k;
+        if (least == i) return;
+        const double x = heap[i];
+        heap[i] = heap[least], heap[least] = x;
+        i = least;
+    }
+}
+
+static void keep_peak(bt_impact_count *c, double peak)
+{
+    if (c->n_peaks == BT_IMPACT_PEAKS) {
+        if (peak <= c->peaks[0]) return;
+        c->peaks[0] = peak;
+        sift_down(c->peaks, c->n_peaks, 0);
+        return;
+    }
+    int64_t i = c->n_peaks++;
+    for (; i > 0 && c->peaks[(i - 1) / 2] > peak; i = (i - 1) / 2) c->peaks[i] = c->peaks[(i - 1) / 2];
+    c->peaks[i] = peak;
+}
+
+static int descending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x < y) - (x > y);
+}
+
+void bt_impact_count_peaks(const bt_impact_count *c, double *peaks)
+{
+    if (c->n_peaks == 0) return;
+    memcpy(peaks, c->peaks, (size_t)c->n_peaks * sizeof *peaks);
+    qsort(peaks, (size_t)c->n_peaks, sizeof *peaks, descending);
+}
+
+// --- counting --------------------------------------------------------------------------------------------------------
+
+void bt_impact_count_add(bt_impact_count *c, const bt_impact *e)
+{
+    bt_panel_hits *p = &c->panel[(int)e->panel];
+    c->n_all++;
+    if (!(e->time >= c->start)) {
+        if (!(e->peak <= c->start_peak)) c->start_peak = e->peak;
+        p->start_peak = bt_max(p->start_peak, e->peak);
+        return;
+    }
+    if (c->n++ == 0 || e->peak > c->largest.peak) c->largest = *e;
+    keep_peak(c, e->peak);
+    p->n++;
+    p->peak = bt_max(p->peak, e->peak);
+}

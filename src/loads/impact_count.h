@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Collisions and pushes counted over the window of a run, which is known only when the run ends (private to the recorder). On rank 0.
+//
+// A collision belongs to the window when the step in which it begins does: time >= start. Those before it are the start's, counted apart. They are
+// read back from the file they were written to, 104 B each, piece by piece: a million of them is a file of 104 MB, and in memory no more than the
+// largest peaks (80 kB) and a piece (0.9 MB). What is of steps (resistance by collisions and by push, largest push) is a column of the
+// history. Rejected: counters that begin anew when the start that is found moves, which it also does backwards; all peaks in memory.
+#ifndef BT_IMPACT_COUNT_H
+#define BT_IMPACT_COUNT_H
+
+#include "loads/impact.h"
+#include "base/history.h"
+#include "output/steady.h"
+
+enum { BT_IMPACT_PEAKS = 10000 }; ///< the largest peaks kept for the exceedance table
+
+/// Collisions on one panel.
+typedef struct bt_panel_hits {
+    int64_t n;            ///< in the window
+    double peak;          ///< largest of them, N
+    double start_peak;    ///< largest before, N
+} bt_panel_hits;
+
+typedef struct bt_impact_count {
+    char conversion[160]; ///< what it is, in words
+    double start;         ///< of the window, s; NaN without one
+    double hours;         ///< its length
+    int64_t n_all, n;     ///< collisions of the whole run, in the window
+    bt_impact largest;    ///< by peak, in the window
+    double start_peak;    ///< largest before it, N; NaN without a collision there
+    double *peaks;        ///< [n_peaks] of the window, a heap with the smallest first, N
+    int64_t n_peaks;
+    bt_panel_hits *panel; ///< [panels]
+    double collision_resistance, push_resistance; ///< means over the window, N
+    double largest_push, start_push; ///< of one floe in a step, in the window and before it, N; NaN without a step there
+} bt_impact_count;
+
+/// Begin to count over the window; what is of steps is taken at once.
+void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_history *h, const bt_steady *w);
+void bt_impact_count_free(bt_impact_count *c);
+
+/// A collision of the run, in any order.
+void bt_impact_count_add(bt_impact_count *c, const bt_impact *e);
+
+/// The largest peaks kept, into peaks[n_peaks], largest first.
+void bt_impact_count_peaks(const bt_impact_count *c, double *peaks);
+
+#endif

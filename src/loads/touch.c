@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+// Contacts of the towed body as a step leaves them: where, how hard, how fast; see loads/impact.h for the equations.
+#include "loads/touch.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "space/tiles.h"
+#include "partition/domain.h"
+#include "solve/kernel.h"
+#include "space/phases.h"
+
+enum { TOUCH_WIDTH = sizeof(bt_touch) / sizeof(double) };
+_Static_assert(sizeof(bt_touch) % sizeof(double) == 0, "a touch is a row of doubles");
+
+typedef struct {
+    bt_touch *row;
+    int64_t n, cap;
+} touches;
+
+/// Interior angle of body i at its vertex v, rad; NaN when there is no such vertex.
+static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
+{
+    const double *o = b->outline + 2 * b->offset[i];
+    const uint32_t n = (uint32_t)(b->offset[i + 1] - b->offset[i]);
+    if (v == n) v = 0; // the end of the last edge
+    if (v > n) return NAN;
+    const double *at = o + 2 * v, *before = o + 2 * (v ? v - 1 : n - 1), *after = o + 2 * (v + 1 < n ? v + 1 : 0);
+    const double px = at[0] - before[0], py = at[1] - before[1], qx = after[0] - at[0], qy = after[1] - at[1];
+    return BT_PI - atan2(px * qy - py * qx, px * qx + py * qy);
+}
+
+/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that meet, the sharper.
+static double corner_of(const bt_bodies *b, const bt_unit *u, uint32_t feature)
+{
+    if ((feature >> 20) == 0x7ffu) return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
+    const bool reference_b = feature >> 31, of_reference = feature & 1u;
+    return interior_angle(b, reference_b == of_reference ? u->b : u->a, (feature & 0xfffffu) >> 1);
+}
+
+/// Masses without the drag that the solver's contain: a collision is short against the step.
+static bt_inv bare(const bt_bodies *b, bt_idx i)
+{
+    return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
+}
+
+static bt_touch touch_of(const bt_world *w, const bt_impacts *m, const bt_tile *tile, const bt_unit *u, bt_idx towed)
+{
+    const bt_bodies *b = &w->bodies;
+    const bool is_b = u->b == towed;
+    const bt_idx other = is_b ? u->a : u->b;
+    const double sign = is_b ? 1 : -1, total = u->ln[0] + u->ln[1], share[2] = {u->ln[0] / total, u->ln[1] / total};
+    const bt_inv ia = bare(b, u->a), ib = bare(b, u->b);
+    double v1 = 0, v2 = 0, ran = 0, rbn = 0, arm = 0;
+    for (int i = 0; i < u->n; i++) {
+        v1 += share[i] * bt_normal_velocity(u, i, &b->vel_start[u->a], &b->vel_start[u->b]);
+        v2 += share[i] * bt_normal_velocity(u, i, &b->vel[u->a], &b->vel[u->b]);
+        ran += share[i] * u->ran[i];
+        rbn += share[i] * u->rbn[i];
+    }
+    arm = is_b ? rbn : ran;
+    const double effect = ia.m + ib.m + ia.i * ran * ran + ib.i * rbn * rbn;
+    const double coupled = effect + (ia.i * ran * u->rat + ib.i * rbn * u->rbt) * (u->lt / total);
+    double collision = 0;
+    if (v1 < 0 && v2 > v1) collision = coupled > 0 ? bt_min(total, (v2 - v1) / coupled) : total;
+
+    // Arms in the world's axes from their products with n and t, turned into the body's frame at X1.
+    const bt_pose *p = &b->pose[towed];
+    const double along = is_b ? u->rbt : u->rat;
+    const double nx = p->c * u->nx + p->s * u->ny, ny = p->c * u->ny - p->s * u->nx;
+    bt_touch t = {
+        .gid = (double)b->gid[other],
+        .x = along * nx + arm * ny,
+        .y = along * ny - arm * nx,
+        .nx = sign * nx,
+        .ny = sign * ny,
+        .normal = total,
+        .friction = u->lt,
+        .collision = collision,
+        .approach = bt_max(0, -v1),
+        .rest = bt_max(0, -v2),
+        .mass = 1 / effect,
+        .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
+        .corner = corner_of(b, u, tile->pairs[tile->gaps[u - tile->units].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+    };
+    for (int i = 0; i < u->n; i++) {
+        const double a = is_b ? u->rbn[i] : u->ran[i];
+        t.px[i] = along * nx + a * ny;
+        t.py[i] = along * ny - a * nx;
+        t.point[i] = u->ln[i];
+    }
+    return t;
+}
+
+static void add(touches *t, const bt_touch *row)
+{
+    if (t->n == t->cap) t->row = bt_realloc(t->row, (size_t)(t->cap = t->cap ? 2 * t->cap : 64), sizeof *t->row);
+    t->row[t->n++] = *row;
+}
+
+static int by_gid(const void *a, const void *b)
+{
+    // A pair has one manifold. A floe of several parts has more: then by place.
+    const bt_touch *p = a, *q = b;
+    if (p->gid != q->gid) return p->gid < q->gid ? -1 : 1;
+    if (p->x != q->x) return p->x < q->x ? -1 : 1;
+    return (p->y > q->y) - (p->y < q->y);
+}
+
+bt_touch *bt_touch_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
+{
+    const bt_tiles *ts = w->tiles;
+    const bt_idx towed = bt_world_towed(w);
+    // A large movable body has its contacts in the last tile, which comes last of all; one of infinite mass has them in the tiles of the floes.
+    const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
+    touches all = {0};
+#pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_TILES))
+    {
+        touches mine = {0};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx i = from; i < ts->n_order; i++) {
+            const bt_tile *tile = &ts->tile[ts->order[i]];
+            for (bt_idx j = 0; j < tile->n_units; j++) {
+                const bt_unit *u = &tile->units[j];
+                if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
+                const bt_touch t = touch_of(w, m, tile, u, towed);
+                add(&mine, &t);
+            }
+        }
+#pragma omp critical
+        for (int64_t i = 0; i < mine.n; i++) add(&all, &mine.row[i]);
+        free(mine.row);
+    }
+    bt_touch *rows = all.row;
+    *n = all.n;
+    if (w->domain) {
+        rows = (bt_touch *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row, n);
+        free(all.row);
+    }
+    if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_gid);
+    return rows;
+}

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: MIT
+// The contact problem of the step just solved, as a local problem in FCLIB's format.
+//
+// Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
+// share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
+// (it is no contact) is held at its solved value. With ice.crushing the bounds of the normal impulses are those at the solution.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/fclib.h"
+#include "contact/crush.h"
+#include "solve/solver.h"
+#include "contact/limit.h"
+
+typedef struct {
+    int32_t contact; ///< in the order of the manifolds
+    int side;        ///< −1: the body is a, +1: it is b
+} touch;
+
+/// One contact point.
+typedef struct {
+    bt_gid gid_a, gid_b;
+    int point;
+    bt_idx a, b;
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound;
+} row;
+
+static int by_gids(const void *p, const void *q)
+{
+    const row *a = p, *b = q;
+    if (a->gid_a != b->gid_a) return a->gid_a < b->gid_a ? -1 : 1;
+    if (a->gid_b != b->gid_b) return a->gid_b < b->gid_b ? -1 : 1;
+    return (a->point > b->point) - (a->point < b->point);
+}
+
+/// Inverse-mass product of two rows' directions at the shared body: [n n', n t'; t n', t t'].
+static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, double out[4])
+{
+    const double rn = sr > 0 ? r->rbn : r->ran, rt = sr > 0 ? r->rbt : r->rat;
+    const double qn = sq > 0 ? q->rbn : q->ran, qt = sq > 0 ? q->rbt : q->rat;
+    const double s = sr * sq, c = r->nx * q->nx + r->ny * q->ny, d = r->nx * q->ny - r->ny * q->nx;
+    out[0] += s * (inv.m * c + inv.i * rn * qn);  // n·n'
+    out[1] += s * (-inv.m * d + inv.i * rn * qt); // n·t' with t' = (−n'_y, n'_x)
+    out[2] += s * (inv.m * d + inv.i * rt * qn);  // t·n'
+    out[3] += s * (inv.m * c + inv.i * rt * qt);  // t·t'
+}
+
+/// Normal and tangential row of every contact point, in the order of the gids.
+static row *rows_of(const bt_world *w, int *n)
+{
+    const bt_tiles *ts = w->tiles;
+    int64_t most = 0;
+    for (bt_idx k = 0; k < ts->n; k++) most += ts->tile[k].n_points;
+    row *rows = bt_alloc((size_t)most, sizeof *rows);
+    *n = 0;
+    for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
+            const bt_unit *u = &ts->tile[k].units[j];
+            const double total = u->ln[0] + u->ln[1];
+            for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
+                rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = i, .a = u->a, .b = u->b, .nx = u->nx,
+                                     .ny = u->ny, .ran = u->ran[i], .rbn = u->rbn[i], .rat = u->rat, .rbt = u->rbt, .bias = u->bias[i],
+                                     .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
+                                     .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel) : INFINITY};
+        }
+    if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
+    return rows;
+}
+
+/// Lever of a row's contact point from r × n and r × t, with t = (−n_y, n_x): r = (r × t) n − (r × n) t.
+static void lever_of(double nx, double ny, double rn, double rt, double out[2])
+{
+    out[0] = rt * nx + rn * ny;
+    out[1] = rt * ny - rn * nx;
+}
+
+/// Where the rows and all bodies are; the arrays belong to the caller afterwards.
+static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
+{
+    const bt_bodies *b = &w->bodies;
+    int64_t *body = bt_alloc(2 * (size_t)n, sizeof *body);
+    double *normal = bt_alloc(2 * (size_t)n, sizeof *normal), *lever = bt_alloc(4 * (size_t)n, sizeof *lever);
+    double *pose = bt_alloc(3 * (size_t)b->n_global, sizeof *pose);
+    for (int k = 0; k < n; k++) {
+        const row *p = &rows[k];
+        body[2 * k] = p->gid_a, body[2 * k + 1] = p->gid_b;
+        normal[2 * k] = p->nx, normal[2 * k + 1] = p->ny;
+        lever_of(p->nx, p->ny, p->ran, p->rat, lever + 4 * k);
+        lever_of(p->nx, p->ny, p->rbn, p->rbt, lever + 4 * k + 2);
+    }
+    for (bt_gid g = 0; g < b->n_global; g++) {
+        const bt_idx i = bt_world_index(w, g);
+        const double at[3] = {i < 0 ? NAN : b->pose[i].x, i < 0 ? NAN : b->pose[i].y, i < 0 ? NAN : b->pose[i].yaw};
+        memcpy(pose + 3 * g, at, sizeof at);
+    }
+    return (bt_fclib_places){.time = (double)w->step * w->par.dt, .dt = w->par.dt, .body = body, .normal = normal, .lever = lever, .n_bodies = (int64_t)b->n_global, .pose = pose};
+}
+
+static int by_contact(const void *a, const void *b)
+{
+    const touch *p = a, *q = b;
+    return (p->contact > q->contact) - (p->contact < q->contact);
+}
+
+bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    int n;
+    row *rows = rows_of(w, &n);
+
+    // Which contacts touch each movable body.
+    int64_t *first = bt_alloc((size_t)b->n + 1, sizeof *first);
+    for (int k = 0; k < n; k++) {
+        if (b->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
+        if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
+    }
+    for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
+    touch *at = bt_alloc((size_t)first[b->n], sizeof *at);
+    int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
+    for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
+    for (int k = 0; k < n; k++) {
+        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (touch){k, -1};
+        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (touch){k, 1};
+    }
+
+    int64_t most = 0;
+    for (int k = 0; k < n; k++) {
+        const bt_idx ends[2] = {rows[k].a, rows[k].b};
+        for (int e = 0; e < 2; e++) most += first[ends[e] + 1] - first[ends[e]];
+    }
+    int64_t *ptr = bt_alloc(2 * (size_t)n + 1, sizeof *ptr);
+    int32_t *col = bt_alloc(4 * (size_t)most, sizeof *col);
+    double *val = bt_alloc(4 * (size_t)most, sizeof *val);
+    double *q = bt_alloc(2 * (size_t)n, sizeof *q), *mu = bt_alloc((size_t)n, sizeof *mu);
+    double *u = bt_alloc(2 * (size_t)n, sizeof *u), *r = bt_alloc(2 * (size_t)n, sizeof *r);
+    double *bound = bt_alloc((size_t)n, sizeof *bound);
+    for (int k = 0; k < n; k++) {
+        const row *p = &rows[k];
+        const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
+        const double dx = vb->x - va->x, dy = vb->y - va->y;
+        u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
+        u[2 * k + 1] = p->nx * dy - p->ny * dx + p->rbt * vb->w - p->rat * va->w;
+        r[2 * k] = p->ln;
+        r[2 * k + 1] = p->lt;
+        mu[k] = p->mu;
+        bound[k] = p->bound;
+    }
+    // Neighbours of a contact: the union of the contacts at its two bodies, in the order of the contacts.
+    touch *near = NULL;
+    size_t cap = 0;
+    for (int k = 0; k < n; k++) {
+        const row *p = &rows[k];
+        size_t m = 0;
+        const bt_idx ends[2] = {p->a, p->b};
+        for (int e = 0; e < 2; e++) {
+            const size_t add = (size_t)(first[ends[e] + 1] - first[ends[e]]);
+            if (m + add > cap) near = bt_realloc(near, cap = 2 * (m + add), sizeof *near);
+            for (size_t i = 0; i < add; i++) near[m++] = at[first[ends[e]] + (int64_t)i];
+        }
+        if (m) qsort(near, m, sizeof *near, by_contact);
+        int64_t entries = ptr[2 * k];
+        int64_t blocks = 0;
+        for (size_t i = 0; i < m; i++) blocks += i == 0 || near[i].contact != near[i - 1].contact;
+        int64_t e0 = entries, e1 = entries + 2 * blocks;
+        ptr[2 * k + 1] = e1;
+        ptr[2 * k + 2] = e1 + 2 * blocks;
+        for (size_t i = 0; i < m;) {
+            const int o = near[i].contact;
+            double block[4] = {0};
+            for (; i < m && near[i].contact == o; i++) {
+                const bt_idx body = near[i].side > 0 ? rows[o].b : rows[o].a;
+                couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, b->inv[body], block);
+            }
+            for (int t = 0; t < 2; t++) {
+                col[e0] = col[e1] = 2 * o + t;
+                val[e0++] = block[t];
+                val[e1++] = block[2 + t];
+            }
+        }
+    }
+    for (int i = 0; i < 2 * n; i++) {
+        double wr = 0;
+        for (int64_t e = ptr[i]; e < ptr[i + 1]; e++) wr += val[e] * r[col[e]];
+        q[i] = u[i] - wr;
+    }
+    const bt_fclib_places places = places_of(w, rows, n);
+    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, &places, "bergtow",
+                                              "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
+    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
+    return status;
+}

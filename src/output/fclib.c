@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// The contact problem of one step in the file format of FCLIB, so that other solvers can check ours.
+//
+// Layout as FCLIB's reader (github.com/FrictionalContactLibrary/fclib, src/fclib.h) expects it; every scalar is a dataset
+// of one entry, integers are of 32 bits:
+//     /fclib_local/spacedim                       2
+//     /fclib_local/W/{nzmax, m, n, nz, p, i, x}    nz = −2: compressed rows (p [m+1], i columns, x values)
+//     /fclib_local/vectors/{q [m], mu [m/2]}
+//     /fclib_local/info/{title, description, math_info}   fixed-length strings
+//     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
+//     /bound, /places                              of our own: bounds of the normal impulses; where contacts and bodies are
+// A guess must have u as well as r, or the reader fails.
+#include "bergtow/fclib.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fileio.h"
+#include "base/h5util.h"
+
+#define COMPRESSED_ROWS (-2)
+
+static bt_status refuse(const char *path, const char *reason, bt_errors *err)
+{
+    bt_errors_add(err, "%s: the contact problem is not written: %s", path, reason);
+    return BT_ERR_USAGE;
+}
+
+static bt_status check_problem(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                               const double *solution_u, const double *solution_r, bt_errors *err)
+{
+    if (n_contacts < 1) return refuse(path, "there are no contacts in this step; choose a step with contacts", err);
+    if (n_contacts > INT32_MAX / 2) return refuse(path, "the format has 32-bit sizes; choose a smaller case", err);
+    if (!solution_u != !solution_r) return refuse(path, "a solution needs both velocities and impulses", err);
+    const int m = 2 * n_contacts;
+    if (w_ptr[0] != 0 || w_ptr[m] > INT32_MAX)
+        return refuse(path, "the format has 32-bit sizes; choose a smaller case", err);
+    for (int i = 0; i < m; i++) {
+        if (w_ptr[i + 1] < w_ptr[i]) return refuse(path, "the rows of W are out of order", err);
+        for (int64_t k = w_ptr[i]; k < w_ptr[i + 1]; k++)
+            if (w_col[k] < 0 || w_col[k] >= m) return refuse(path, "W has a column outside the problem", err);
+    }
+    return BT_OK;
+}
+
+static void write_int(bt_h5 *h, const char *name, int value) { bt_h5_write(h, name, H5T_NATIVE_INT, 1, 0, &value); }
+
+static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const int32_t *w_col, const double *w_val,
+                          const double *q, const double *mu)
+{
+    const int m = 2 * n_contacts;
+    int32_t *rows = bt_alloc((size_t)m + 1, sizeof *rows);
+    for (int i = 0; i <= m; i++) rows[i] = (int32_t)w_ptr[i];
+    bt_h5_group(h, "/fclib_local");
+    write_int(h, "/fclib_local/spacedim", 2);
+    bt_h5_group(h, "/fclib_local/W");
+    write_int(h, "/fclib_local/W/nzmax", rows[m]);
+    write_int(h, "/fclib_local/W/m", m);
+    write_int(h, "/fclib_local/W/n", m);
+    write_int(h, "/fclib_local/W/nz", COMPRESSED_ROWS);
+    bt_h5_write(h, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows);
+    bt_h5_write(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, w_col);
+    bt_h5_write(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, w_val);
+    bt_h5_group(h, "/fclib_local/vectors");
+    bt_h5_write(h, "/fclib_local/vectors/q", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, q);
+    bt_h5_write(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, mu);
+    free(rows);
+}
+
+static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_col, const double *w_val, const double *q,
+                        const double *r)
+{
+    double *u = bt_alloc((size_t)m, sizeof *u);
+    for (int i = 0; i < m; i++) {
+        u[i] = q[i];
+        for (int64_t k = w_ptr[i]; k < w_ptr[i + 1]; k++) u[i] += w_val[k] * r[w_col[k]];
+    }
+    bt_h5_group(h, "/guesses");
+    write_int(h, "/guesses/number_of_guesses", 1);
+    bt_h5_group(h, "/guesses/1");
+    bt_h5_write(h, "/guesses/1/u", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, u);
+    bt_h5_write(h, "/guesses/1/r", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, r);
+    free(u);
+}
+
+static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
+{
+    bt_h5_attr_text(h, path, "units", units);
+    bt_h5_attr_text(h, path, "description", text);
+}
+
+static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
+{
+    bt_h5_group(h, "/places");
+    bt_h5_attr_double(h, "/places", "time", p->time);
+    bt_h5_attr_double(h, "/places", "dt", p->dt);
+    bt_h5_write(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body);
+    describe(h, "/places/body", "1", "ids of the two bodies of each contact");
+    bt_h5_write(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal);
+    describe(h, "/places/normal", "1", "from the first body to the second, world frame");
+    bt_h5_write(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever);
+    describe(h, "/places/lever", "m", "from the centroid of the first and of the second body to the contact point, world frame, at the start of the step");
+    bt_h5_write(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose);
+    describe(h, "/places/pose", "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
+}
+
+bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                                 const double *w_val, const double *q, const double *mu, const double *guess_r,
+                                 const double *solution_u, const double *solution_r, const double *bound, const bt_fclib_places *places,
+                                 const char *title, const char *description, bt_errors *err)
+{
+    bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
+    if (status != BT_OK) return status;
+    const int m = 2 * n_contacts;
+    const size_t size = strlen(path) + sizeof ".tmp";
+    char *temporary = bt_alloc(size, 1);
+    snprintf(temporary, size, "%s.tmp", path);
+
+    bt_h5 h;
+    if (bt_h5_create(&h, temporary, err) == BT_OK) {
+        write_problem(&h, n_contacts, w_ptr, w_col, w_val, q, mu);
+        bt_h5_group(&h, "/fclib_local/info");
+        bt_h5_write_text(&h, "/fclib_local/info/title", title ? title : "");
+        bt_h5_write_text(&h, "/fclib_local/info/description", description ? description : "");
+        bt_h5_write_text(&h, "/fclib_local/info/math_info",
+                         "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent");
+        if (bound) bt_h5_write(&h, "/bound", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, bound);
+        if (places) write_places(&h, places, (hsize_t)n_contacts);
+        if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
+        if (solution_r) {
+            bt_h5_group(&h, "/solution");
+            bt_h5_write(&h, "/solution/u", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, solution_u);
+            bt_h5_write(&h, "/solution/r", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, solution_r);
+        }
+        bt_h5_close(&h);
+    }
+    status = h.status;
+    if (status == BT_OK && rename(temporary, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
+    if (status != BT_OK) unlink(temporary);
+    free(temporary);
+    return status;
+}
+
+bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
+                               const double *w_val, const double *q, const double *mu, const double *guess_r,
+                               const double *solution_u, const double *solution_r, const char *title,
+                               const char *description, bt_errors *err)
+{
+    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, NULL, title, description, err);
+}

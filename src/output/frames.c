@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: MIT
+// The bodies and their frames in result.h5, each rank writing its block of them.
+//
+// Outlines are kept in single precision, as /xdmf stores them: 8 bytes a vertex and 1 byte a body are all that a rank
+// holds of its block between frames. Everything else passes through one buffer of 1 MB.
+#include "output/frames.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "bergtow/shape.h"
+#include "output/xdmf.h"
+
+_Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
+
+/// Rows first up to first + n, copied from memory.
+static void write_copy(bt_slab *s, int64_t first, int64_t n, const void *rows)
+{
+    if (n > 0) bt_slab_write(s, first, n, rows);
+}
+
+typedef struct outlines { bt_slab vertices, offsets, thickness, area, topology; } outlines;
+
+static outlines create_outlines(bt_h5 *h, const char *group, const char *height, const char *topology, int64_t n, int64_t n_vertices)
+{
+    char path[64];
+#define NAMED(name) (snprintf(path, sizeof path, "%s/%s", group, name), path)
+    outlines o = {
+        .vertices = bt_slab_fixed(h, NAMED("vertices"), H5T_NATIVE_DOUBLE, n_vertices, 2, false),
+        .offsets = bt_slab_fixed(h, NAMED("offsets"), H5T_NATIVE_INT64, n + 1, 0, false),
+        .thickness = bt_slab_fixed(h, NAMED(height), H5T_NATIVE_DOUBLE, n, 0, false),
+        .area = bt_slab_fixed(h, NAMED("area"), H5T_NATIVE_DOUBLE, n, 0, false),
+        // Vertex numbers in XDMF are of 32 bits here: enough for 2^31 vertices a block.
+        .topology = bt_slab_fixed(h, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
+    };
+    bt_h5_attr_text(h, NAMED("vertices"), "units", "m");
+    bt_h5_attr_text(h, NAMED(height), "units", "m");
+    bt_h5_attr_text(h, NAMED("area"), "units", "m2");
+#undef NAMED
+    return o;
+}
+
+static void describe(bt_h5 *h, const bt_record_bodies *b)
+{
+    const int64_t towed = b->towed < 0 ? -1 : b->towed - b->n_floes;
+    bt_h5_attr_text(h, "/floes/vertices", "description", "x, y in the frame of the floe, anticlockwise about its centroid");
+    bt_h5_attr_text(h, "/floes/offsets", "description", "floe i has the vertices offsets[i] up to offsets[i + 1]");
+    bt_h5_attr_text(h, "/bodies/height", "description", "draft + sail of the towed body, 0 for walls");
+    bt_h5_write_names(h, "/bodies/names", (hsize_t)(b->n_bodies - b->n_floes), b->names);
+    bt_h5_write(h, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed);
+    bt_h5_attr_text(h, "/bodies/towed", "description", "which of these bodies is towed, -1 = none");
+}
+
+/// Bodies from .. from + n of the block b to rows first .. first + n of the datasets; `before`: vertices of the rows before.
+static void write_outlines(outlines *o, const bt_record_bodies *b, int64_t from, int64_t n, int64_t first, int64_t before, char *buffer)
+{
+    const int64_t *offsets = b->offsets + from, v0 = offsets[0];
+    write_copy(&o->vertices, before, offsets[n] - v0, b->vertices + 2 * (v0 - b->offsets[0]));
+    write_copy(&o->thickness, first, n, b->thickness + from);
+    write_copy(&o->area, first, n, b->area + from);
+    // Every rank writes the ends of its bodies; the first one also the 0 at the start.
+    bt_rows r = bt_rows_from(&o->offsets, first ? first + 1 : 0, buffer);
+    if (!first) *(int64_t *)bt_rows_next(&r) = 0;
+    for (int64_t i = 1; i <= n; i++) *(int64_t *)bt_rows_next(&r) = before + offsets[i] - v0;
+    bt_rows_end(&r);
+    r = bt_rows_from(&o->topology, before + 2 * first, buffer);
+    for (int64_t i = 0; i < n; i++) {
+        const int64_t count = offsets[i + 1] - offsets[i];
+        *(int32_t *)bt_rows_next(&r) = BT_XDMF_POLYGON;
+        *(int32_t *)bt_rows_next(&r) = (int32_t)count;
+        for (int64_t v = 0; v < count; v++) *(int32_t *)bt_rows_next(&r) = (int32_t)(before + offsets[i] - v0 + v);
+    }
+    bt_rows_end(&r);
+}
+
+static void write_bodies(bt_frames *f, const bt_record_bodies *b)
+{
+    bt_h5 *h = f->h;
+    bt_h5_group(h, "/floes");
+    bt_h5_group(h, "/bodies");
+    bt_h5_group(h, "/xdmf");
+    outlines o[2] = {create_outlines(h, "/floes", "thickness", "/xdmf/floes", f->n_floes, f->floe_vertices),
+                     create_outlines(h, "/bodies", "height", "/xdmf/bodies", f->n_others, f->other_vertices)};
+    describe(h, b);
+    bt_slab *all[] = {&o[0].vertices, &o[0].offsets, &o[0].thickness, &o[0].area, &o[0].topology,
+                      &o[1].vertices, &o[1].offsets, &o[1].thickness, &o[1].area, &o[1].topology};
+    enum { N = sizeof all / sizeof *all };
+    const bool last = f->comm->rank == f->comm->size - 1;
+    if (bt_slab_share(f->comm, all, N) == BT_OK) {
+        char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
+        // An empty block of floes still has the 0 of the offsets to write if nobody is before it.
+        if (f->own_floes > 0 || (last && f->n_floes == 0)) write_outlines(&o[0], b, 0, f->own_floes, f->first, f->vertices_before, buffer);
+        if (last) write_outlines(&o[1], b, f->own_floes, f->own_others, 0, 0, buffer);
+        free(buffer);
+    }
+    for (int k = 0; k < N; k++) bt_slab_close(all[k]);
+}
+
+static void keep_outlines(bt_frames *f, const bt_record_bodies *b)
+{
+    const int64_t n = f->own_floes + f->own_others, nv = b->offsets[n] - b->offsets[0];
+    f->n_vertices = bt_alloc((size_t)n, sizeof *f->n_vertices);
+    f->vertices = bt_alloc(2 * (size_t)nv, sizeof *f->vertices);
+    for (int64_t i = 0; i < n; i++) f->n_vertices[i] = (uint8_t)(b->offsets[i + 1] - b->offsets[i]);
+    for (int64_t v = 0; v < 2 * nv; v++) f->vertices[v] = (float)b->vertices[v];
+}
+
+static void create_datasets(bt_frames *f)
+{
+    bt_h5 *h = f->h;
+    bt_h5_group(h, "/frames");
+    f->time = bt_h5_growing(h, "/frames/time", H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){256, 1}, false);
+    f->pose = bt_slab_growing(h, "/frames/pose", H5T_NATIVE_DOUBLE, f->n_floes, 3);
+    f->body_pose = bt_slab_growing(h, "/frames/body_pose", H5T_NATIVE_DOUBLE, f->n_others, 3);
+    f->contact_force = bt_slab_growing(h, "/frames/contact_force", H5T_NATIVE_DOUBLE, f->n_floes, 0);
+    f->speed = bt_slab_growing(h, "/frames/speed", H5T_NATIVE_DOUBLE, f->n_floes + f->n_others, 0);
+    bt_h5_attr_text(h, "/frames/time", "units", "s");
+    bt_h5_attr_text(h, "/frames/pose", "units", "m, m, rad");
+    bt_h5_attr_text(h, "/frames/pose", "description", "x, y, yaw of each floe");
+    bt_h5_attr_text(h, "/frames/body_pose", "units", "m, m, rad");
+    bt_h5_attr_text(h, "/frames/body_pose", "description", "x, y, yaw of each of /bodies");
+    bt_h5_attr_text(h, "/frames/contact_force", "units", "N");
+    bt_h5_attr_text(h, "/frames/contact_force", "description", "largest normal contact force on the floe in the step");
+    bt_h5_attr_text(h, "/frames/speed", "units", "m/s");
+    bt_h5_attr_text(h, "/frames/speed", "description", "speed of the centroid: floes, then /bodies");
+}
+
+void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first)
+{
+    for (int k = 0; k < c->size; k++) first[k] = bt_comm_first(c, k, n_floes);
+    first[c->size] = n_bodies;
+}
+
+void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b)
+{
+    *f = (bt_frames){.h = h, .comm = c, .n_floes = b->n_floes, .n_others = b->n_bodies - b->n_floes, .time = -1};
+    f->first = bt_comm_first(c, c->rank, b->n_floes);
+    f->own_floes = bt_comm_first(c, c->rank + 1, b->n_floes) - f->first;
+    f->own_others = c->rank == c->size - 1 ? f->n_others : 0;
+    const int64_t *end = b->offsets + f->own_floes;
+    f->vertices_before = bt_comm_before(c, end[0] - b->offsets[0], &f->floe_vertices);
+    bt_comm_before(c, end[f->own_others] - end[0], &f->other_vertices);
+    keep_outlines(f, b);
+    write_bodies(f, b);
+    create_datasets(f);
+}
+
+/// Quantities of a frame that are written row by row.
+enum quantity { POSE, FORCE, SPEED, FORCE_4, SPEED_4 };
+
+/// Bodies from .. from + n of the block to rows first .. first + n.
+static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_frame_row *row, int64_t n, char *buffer)
+{
+    bt_rows r = bt_rows_from(s, first, buffer);
+    for (int64_t i = 0; i < n; i++) {
+        void *to = bt_rows_next(&r);
+        switch (q) {
+        case POSE: memcpy(to, (const double[3]){row[i].x, row[i].y, row[i].yaw}, 3 * sizeof(double)); break;
+        case FORCE: *(double *)to = row[i].contact_force; break;
+        case SPEED: *(double *)to = row[i].speed; break;
+        case FORCE_4: *(float *)to = (float)row[i].contact_force; break;
+        case SPEED_4: *(float *)to = (float)row[i].speed; break;
+        }
+    }
+    bt_rows_end(&r);
+}
+
+/// All vertices of bodies from .. from + n of the block in the world frame; `local`: vertices of the block before them.
+static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt_frame_row *row, int64_t from, int64_t n, int64_t local, char *buffer)
+{
+    bt_rows r = bt_rows_from(s, first, buffer);
+    const float *p = f->vertices + 2 * local;
+    for (int64_t i = from; i < from + n; i++) {
+        const double c = cos(row[i].yaw), sine = sin(row[i].yaw);
+        for (int v = 0; v < f->n_vertices[i]; v++, p += 2) {
+            float *to = bt_rows_next(&r);
+            to[0] = (float)(row[i].x + c * (double)p[0] - sine * (double)p[1]);
+            to[1] = (float)(row[i].y + sine * (double)p[0] + c * (double)p[1]);
+        }
+    }
+    bt_rows_end(&r);
+}
+
+/// Datasets of the frame in single precision, see xdmf.c.
+typedef struct paraview { bt_slab points, speed, force; } paraview;
+
+static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, int64_t points, bool force)
+{
+    char path[64];
+#define NAMED(name) (snprintf(path, sizeof path, "/xdmf/%06lld/%s_%s", (long long)f->n, kind, name), path)
+    paraview p = {
+        .points = bt_slab_fixed(f->h, NAMED("points"), H5T_NATIVE_FLOAT, points, 2, true),
+        .speed = bt_slab_fixed(f->h, NAMED("speed"), H5T_NATIVE_FLOAT, cells, 0, true),
+        .force = {.h = f->h, .dataset = -1, .piece = 1, .row_bytes = 4},
+    };
+    if (force) p.force = bt_slab_fixed(f->h, NAMED("force"), H5T_NATIVE_FLOAT, cells, 0, true);
+#undef NAMED
+    return p;
+}
+
+static void write_frame(bt_frames *f, paraview *floes, paraview *others, const bt_frame_row *rows)
+{
+    char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
+    const int64_t nf = f->own_floes, nb = f->own_others;
+    write_rows(&f->pose, POSE, f->first, rows, nf, buffer);
+    write_rows(&f->contact_force, FORCE, f->first, rows, nf, buffer);
+    write_rows(&f->speed, SPEED, f->first, rows, nf + nb, buffer);
+    write_rows(&f->body_pose, POSE, 0, rows + nf, nb, buffer);
+    write_points(f, &floes->points, f->vertices_before, rows, 0, nf, 0, buffer);
+    write_rows(&floes->speed, SPEED_4, f->first, rows, nf, buffer);
+    write_rows(&floes->force, FORCE_4, f->first, rows, nf, buffer);
+    write_points(f, &others->points, 0, rows, nf, nb, f->floe_vertices - f->vertices_before, buffer);
+    write_rows(&others->speed, SPEED_4, 0, rows + nf, nb, buffer);
+    free(buffer);
+}
+
+bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows)
+{
+    bt_h5 *h = f->h;
+    bt_status status = bt_comm_agree(f->comm, h->status);
+    if (status != BT_OK) return status;
+    bt_slab_grow(&f->pose, f->n);
+    bt_slab_grow(&f->body_pose, f->n);
+    bt_slab_grow(&f->contact_force, f->n);
+    bt_slab_grow(&f->speed, f->n);
+    char path[64];
+    snprintf(path, sizeof path, "/xdmf/%06lld", (long long)f->n);
+    bt_h5_group(h, path);
+    paraview floes = create_paraview(f, "floe", f->n_floes, f->floe_vertices, true);
+    paraview others = create_paraview(f, "body", f->n_others, f->other_vertices, false);
+    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, // these stay open
+                         &floes.points, &floes.speed, &floes.force, &others.points, &others.speed};
+    enum { N = sizeof shared / sizeof *shared };
+    status = bt_slab_share(f->comm, shared, N);
+    if (status == BT_OK) write_frame(f, &floes, &others, rows);
+    for (int k = 4; k < N; k++) bt_slab_close(shared[k]);
+    // The time comes last: a reader that counts frames by it finds them whole.
+    status = bt_comm_agree(f->comm, h->status);
+    if (status != BT_OK) {
+        bt_h5_give_up(h, status);
+        return status;
+    }
+    bt_h5_append(h, f->time, H5T_NATIVE_DOUBLE, (hsize_t)f->n, 1, &time);
+    if (f->n == f->cap) {
+        f->cap = f->cap ? 2 * f->cap : 64;
+        f->times = bt_realloc(f->times, (size_t)f->cap, sizeof *f->times);
+    }
+    f->times[f->n++] = time;
+    return BT_OK;
+}
+
+void bt_frames_close(bt_frames *f)
+{
+    bt_slab *all[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed};
+    for (int k = 0; k < 4; k++)
+        if (all[k]->h) bt_slab_close(all[k]);
+    if (f->h && f->time >= 0) H5Dclose(f->time);
+    free(f->vertices);
+    free(f->n_vertices);
+    free(f->times);
+    *f = (bt_frames){.time = -1};
+}

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: MIT
+// The bodies and their frames in result.h5, each rank writing its block of them.
+#ifndef BT_FRAMES_H
+#define BT_FRAMES_H
+
+#include "output/record.h"
+#include "base/h5slab.h"
+
+typedef struct bt_frames {
+    bt_h5 *h;
+    const bt_comm *comm;
+    int64_t n_floes, n_others;      ///< of all ranks: floes, other bodies
+    int64_t first;                  ///< first body of this rank's block
+    int64_t own_floes, own_others;  ///< of the block
+    float *vertices;                ///< [vertices of the block][2] m, own frame
+    uint8_t *n_vertices;            ///< [bodies of the block]
+    int64_t floe_vertices, other_vertices; ///< of all ranks
+    int64_t vertices_before;        ///< of floes on the ranks before this one
+    hid_t time;
+    bt_slab pose, body_pose, contact_force, speed;
+    double *times;                  ///< [n] s
+    int64_t n, cap;                 ///< frames
+} bt_frames;
+
+/// Collective. Write /floes and /bodies, make /frames and /xdmf. *f is zeroed memory. What fails shows in h->status of
+/// the rank that met it.
+void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b);
+/// Collective. Add a frame: rows of this rank's block. Returns the same status on all ranks; after a failure the file stays as
+/// the last flush left it.
+bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows);
+void bt_frames_close(bt_frames *f); ///< datasets and memory
+
+#endif

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Bodies from the ranks that hold them to the ranks that record them.
+//
+// The world lies on the ranks as the computation wants it; result.h5 has the bodies in the order of their ids. Each body is sent
+// once, by the rank that speaks for it, to the rank whose block of ids holds it (bt_record_blocks). Lost and doubled bodies show here.
+#include "output/handover.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "output/observe.h"
+#include "partition/domain.h"
+
+typedef struct list {
+    bt_idx n;       ///< bodies this rank speaks for
+    bt_gid *gid;    ///< [n]
+    bt_idx *body;   ///< [n]
+    int64_t *first; ///< [ranks + 1] blocks
+    int64_t count;  ///< bodies of this rank's block
+} list;
+
+static list make_list(const bt_comm *c, const bt_world *w, const bt_roster *roster)
+{
+    list l = {.gid = bt_alloc((size_t)w->bodies.n, sizeof *l.gid), .body = bt_alloc((size_t)w->bodies.n, sizeof *l.body),
+              .first = bt_alloc((size_t)c->size + 1, sizeof *l.first)};
+    for (bt_idx i = 0; i < w->bodies.n; i++) {
+        if (!bt_domain_owns(w, i)) continue;
+        l.gid[l.n] = w->bodies.gid[i];
+        l.body[l.n++] = i;
+    }
+    bt_record_blocks(c, roster->n_floes, (bt_idx)w->bodies.n_global, l.first);
+    l.count = l.first[c->rank + 1] - l.first[c->rank];
+    return l;
+}
+
+static void free_list(list *l)
+{
+    free(l->gid);
+    free(l->body);
+    free(l->first);
+}
+
+static int most_vertices(const bt_comm *c, const bt_bodies *b)
+{
+    double most = 0;
+    for (bt_idx i = 0; i < b->n; i++) most = bt_max(most, bt_body_corners(b, i));
+    bt_comm_reduce(c, NULL, 0, &most, 1, NULL, 0);
+    return (int)most;
+}
+
+/// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
+static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const list *l, const int64_t *offsets, double *vertices, bt_errors *err)
+{
+    enum { PORTION = 4 };
+    const int most = most_vertices(c, b);
+    double (*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows), (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
+    bt_status status = BT_OK;
+    for (int from = 0; from < most && status == BT_OK; from += PORTION) {
+        for (bt_idx i = 0; i < l->n; i++)
+            for (int k = 0; k < PORTION; k++) {
+                const int64_t v = b->offset[l->body[i]] + from + k;
+                const bool there = from + k < bt_body_corners(b, l->body[i]); // the outline, not its parts
+                rows[i][k][0] = there ? b->vertices[2 * v] : 0;
+                rows[i][k][1] = there ? b->vertices[2 * v + 1] : 0;
+            }
+        status = bt_comm_rows_by_gid(c, l->first, l->n, l->gid, 2 * PORTION, &rows[0][0][0], &block[0][0][0], err);
+        for (int64_t i = 0; i < l->count; i++)
+            for (int k = 0; k < PORTION; k++) {
+                const int64_t v = offsets[i] + from + k;
+                if (v >= offsets[i + 1]) break;
+                vertices[2 * v] = block[i][k][0];
+                vertices[2 * v + 1] = block[i][k][1];
+            }
+    }
+    free(rows);
+    free(block);
+    return status;
+}
+
+bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    list l = make_list(c, w, roster);
+    double (*rows)[3] = bt_alloc((size_t)l.n, sizeof *rows), (*block)[3] = bt_alloc((size_t)l.count, sizeof *block);
+    for (bt_idx i = 0; i < l.n; i++) {
+        const bt_idx k = l.body[i];
+        rows[i][0] = bt_body_corners(b, k);
+        rows[i][1] = roster->thickness[l.gid[i]];
+        rows[i][2] = b->area[k];
+    }
+    bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, 3, &rows[0][0], &block[0][0], err);
+    int64_t *offsets = bt_alloc((size_t)l.count + 1, sizeof *offsets);
+    double *thickness = bt_alloc((size_t)l.count, sizeof *thickness), *area = bt_alloc((size_t)l.count, sizeof *area);
+    for (int64_t i = 0; i < l.count; i++) {
+        offsets[i + 1] = offsets[i] + (int64_t)block[i][0];
+        thickness[i] = block[i][1];
+        area[i] = block[i][2];
+    }
+    free(rows);
+    free(block);
+    double *vertices = bt_alloc(2 * (size_t)offsets[l.count], sizeof *vertices);
+    if (status == BT_OK) status = hand_over_vertices(c, b, &l, offsets, vertices, err);
+    free_list(&l);
+    *out = (bt_record_bodies){.n_floes = roster->n_floes, .n_bodies = (bt_idx)b->n_global, .offsets = offsets, .vertices = vertices, .thickness = thickness,
+                              .area = area, .names = roster->names, .towed = (bt_idx)w->towed};
+    if (status != BT_OK) bt_handover_free(out);
+    return status;
+}
+
+void bt_handover_free(bt_record_bodies *b)
+{
+    free((void *)b->offsets);
+    free((void *)b->vertices);
+    free((void *)b->thickness);
+    free((void *)b->area);
+    *b = (bt_record_bodies){0};
+}
+
+bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    double *force = bt_alloc((size_t)b->n, sizeof *force);
+    bt_observe_contact_force(w, force);
+    list l = make_list(c, w, roster);
+    bt_frame_row *rows = bt_alloc((size_t)l.n, sizeof *rows), *block = bt_alloc((size_t)l.count, sizeof *block);
+    for (bt_idx i = 0; i < l.n; i++) {
+        const bt_idx k = l.body[i];
+        rows[i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
+                                 .speed = hypot(b->vel[k].x, b->vel[k].y)};
+    }
+    free(force);
+    _Static_assert(sizeof *rows == 5 * sizeof(double), "a row is a line of doubles");
+    const bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, 5, (const double *)rows, (double *)block, err);
+    free_list(&l);
+    free(rows);
+    *out = status == BT_OK ? block : NULL;
+    if (status != BT_OK) free(block);
+    return status;
+}

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// Collisions as numbers for scripts and readers: how many, the largest, how often a peak is exceeded.
+//
+// Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times: at the rate k/T. The table takes the ranks
+// 1, 2, 5, 10, ...; nothing is fitted and nothing between ranks is made up. A rate near 1/T rests on one peak.
+#include "output/impact_report.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "output/summary.h"
+
+/// The k-th of 1, 2, 5, 10, 20, ...
+static int64_t rank_of(int k)
+{
+    static const int64_t of[] = {1, 2, 5};
+    int64_t r = of[k % 3];
+    for (int i = 0; i < k / 3; i++) r *= 10;
+    return r;
+}
+
+static double *sorted(const bt_impact_count *c)
+{
+    double *p = bt_alloc((size_t)c->n_peaks + 1, sizeof *p);
+    bt_impact_count_peaks(c, p);
+    return p;
+}
+
+void bt_impacts_json(bt_json *j, const bt_impact_count *c)
+{
+    if (!c) {
+        bt_json_string(j, "impacts", NULL);
+        return;
+    }
+    bt_json_open(j, "impacts", '{');
+    bt_json_string(j, "conversion", c->conversion);
+    bt_json_number(j, "from_s", c->start);
+    bt_json_number(j, "hours", c->hours);
+    bt_json_int(j, "collisions_whole_run", c->n_all);
+    bt_json_int(j, "collisions", c->n);
+    bt_json_number(j, "collisions_per_hour", c->hours > 0 ? (double)c->n / c->hours : NAN);
+    bt_json_number(j, "mean_collision_resistance_n", c->collision_resistance);
+    bt_json_number(j, "mean_push_resistance_n", c->push_resistance);
+    bt_json_number(j, "largest_push_n", c->largest_push);
+    bt_json_number(j, "start_largest_push_n", c->start_push);
+    bt_json_number(j, "start_largest_peak_n", c->start_peak);
+    if (c->n > 0) {
+        const bt_impact *e = &c->largest;
+        bt_json_open(j, "largest", '{');
+        bt_json_number(j, "peak_n", e->peak);
+        bt_json_number(j, "mean_n", e->mean);
+        bt_json_number(j, "duration_s", e->duration);
+        bt_json_number(j, "impulse_ns", e->impulse);
+        bt_json_number(j, "approach_m_s", e->approach);
+        bt_json_number(j, "effective_mass_kg", e->mass);
+        bt_json_number(j, "time_s", e->time);
+        bt_json_int(j, "floe", (int64_t)e->gid);
+        bt_json_int(j, "panel", (int64_t)e->panel);
+        bt_json_number(j, "x_m", e->x);
+        bt_json_number(j, "y_m", e->y);
+        bt_json_close(j, '}');
+    } else {
+        bt_json_string(j, "largest", NULL);
+    }
+    double *peaks = sorted(c);
+    bt_json_open(j, "exceedance", '[');
+    for (int k = 0; rank_of(k) <= c->n_peaks; k++) {
+        bt_json_open(j, NULL, '{');
+        bt_json_int(j, "rank", rank_of(k));
+        bt_json_number(j, "per_hour", (double)rank_of(k) / c->hours);
+        bt_json_number(j, "peak_n", peaks[rank_of(k) - 1]);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, ']');
+    bt_json_close(j, '}');
+    free(peaks);
+}
+
+void bt_impacts_print(const bt_impact_count *c)
+{
+    if (!c || !(c->hours > 0)) return;
+    char a[32], b[32];
+    printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n", (long long)c->n, c->start,
+           (double)c->n / c->hours, bt_force_text(a, c->collision_resistance), bt_force_text(b, c->push_resistance));
+    if (c->n > 0) {
+        printf("    peaks (%s)", c->conversion);
+        double *peaks = sorted(c);
+        // A few of the ranks: the largest, then tenfold.
+        for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
+            printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]), (double)rank_of(k) / c->hours);
+        printf("; largest push %s\n", bt_force_text(a, c->largest_push));
+        free(peaks);
+    }
+    if (c->n_all > c->n)
+        printf("    start             %lld before the window, the largest peak %s, the largest push %s\n", (long long)(c->n_all - c->n),
+               bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
+}

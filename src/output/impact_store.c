@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: MIT
+// Datasets of collisions and panels; one table names the columns of a collision.
+#include "output/impact_store.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
+#define PIECE 8192 // rows that are read back at once
+
+static const struct {
+    const char *name, *units, *description;
+    size_t offset;
+    bool whole;
+} columns[] = {
+#define ROW(name_, member, whole_, units_, text) {name_, units_, text, offsetof(bt_impact, member), whole_}
+    ROW("time", time, false, "s", "end of the step in which the collision began"),
+    ROW("floe", gid, true, "1", "id of the floe; from n_floes on one of /bodies, as a wall"),
+    ROW("x", x, false, "m", "where on the hull, in the frame of the towed body"),
+    ROW("y", y, false, "m", "where on the hull, in the frame of the towed body"),
+    ROW("panel", panel, true, "1", "panel of the hull"),
+    ROW("impulse", impulse, false, "N s", "normal impulse that the approach explains, over all its steps"),
+    ROW("approach", approach, false, "m/s", "normal speed of approach at the start of the first step"),
+    ROW("effective_mass", mass, false, "kg", "m_e = 1 / n.(1/M_a + 1/M_b).n with rotation and added mass"),
+    ROW("thickness", thickness, false, "m", "thickness of the floe"),
+    ROW("corner", corner, false, "rad", "angle of the crushed corner; used by conversion crushing alone"),
+    ROW("mean", mean, false, "N", "mean force by the conversion"),
+    ROW("peak", peak, false, "N", "peak force by the conversion"),
+    ROW("duration", duration, false, "s", "conversion duration: of the collision; crushing: time from touch to peak"),
+#undef ROW
+};
+_Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS && sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
+               "every number of a collision has its column");
+
+/// Numbers x[n] of column k into rows[n].
+static void put_column(bt_impact *rows, int64_t n, int k, const double *x)
+{
+    for (int64_t i = 0; i < n; i++) memcpy((char *)&rows[i] + columns[k].offset, &x[i], sizeof *x);
+}
+
+static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
+{
+    bt_h5_attr_text(h, path, "units", units);
+    bt_h5_attr_text(h, path, "description", text);
+}
+
+static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
+{
+    bt_h5 *h = s->h;
+    const hsize_t n = (hsize_t)p->n;
+    double *start = bt_alloc(2 * (size_t)p->n + 2, sizeof *start), *middle = bt_alloc(2 * (size_t)p->n, sizeof *middle), *normal = bt_alloc(2 * (size_t)p->n, sizeof *normal);
+    for (int k = 0; k <= p->n; k++) bt_panels_point(p, k, start + 2 * k, NULL);
+    for (int k = 0; k < p->n; k++) bt_panels_point(p, k + 0.5, middle + 2 * k, normal + 2 * k);
+    bt_h5_group(h, "/panels");
+    bt_h5_attr_double(h, "/panels", "length", p->arc[p->n_vertices] / p->n);
+    bt_h5_attr_text(h, "/panels", "description", "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the body's own x axis");
+    bt_h5_write(h, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
+    describe(h, "/panels/ends", "m", "panel k reaches from point k to k + 1, frame of the towed body");
+    bt_h5_write(h, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
+    describe(h, "/panels/middle", "m", "middle of each panel, frame of the towed body");
+    bt_h5_write(h, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
+    describe(h, "/panels/normal", "1", "outward normal there");
+    free(start);
+    free(middle);
+    free(normal);
+    if (!series) return;
+    s->force = bt_h5_growing(h, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n}, false);
+    s->normal = bt_h5_growing(h, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
+    describe(h, "/panels/force", "N", "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry of /series");
+    describe(h, "/panels/load", "N", "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
+}
+
+void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c)
+{
+    *s = (bt_impact_store){.h = h, .from = m, .earliest = bt_case_earliest_window(c), .force = -1, .normal = -1, .n_panels = m->panels.n};
+    bt_panel_blocks_init(&s->blocks, s->n_panels);
+    bt_h5_group(h, "/impacts");
+    char text[160], path[64];
+    bt_impact_describe(&m->rule, text);
+    bt_h5_attr_text(h, "/impacts", "conversion", text);
+    bt_h5_attr_text(h, "/impacts", "description", "collisions with the towed body in the order in which they ended");
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+        s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){CHUNK, 1}, false);
+        describe(h, path, columns[k].units, columns[k].description);
+    }
+    s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
+    create_panels(s, &m->panels, c->output.panels);
+}
+
+static void write_rows(bt_impact_store *s)
+{
+    if (s->n_rows == 0) return;
+    double *x = bt_alloc((size_t)s->n_rows, sizeof *x);
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+        for (int64_t i = 0; i < s->n_rows; i++) memcpy(&x[i], (const char *)&s->rows[i] + columns[k].offset, sizeof *x);
+        bt_h5_append(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)s->written, (hsize_t)s->n_rows, x);
+    }
+    free(x);
+    s->written += s->n_rows;
+    s->n_rows = 0;
+}
+
+void bt_impact_store_take_closed(bt_impact_store *s)
+{
+    if (!s->h || s->from->n_closed == 0) return;
+    const int64_t n = s->from->n_closed;
+    if (s->n_rows + n > s->cap_rows) {
+        s->cap_rows = 2 * (s->n_rows + n);
+        s->rows = bt_realloc(s->rows, (size_t)s->cap_rows, sizeof *s->rows);
+    }
+    memcpy(s->rows + s->n_rows, s->from->closed, (size_t)n * sizeof *s->rows);
+    s->n_rows += n;
+    if (s->n_rows >= CHUNK) write_rows(s);
+}
+
+void bt_impact_store_take(bt_impact_store *s, double time)
+{
+    if (!s->h) return;
+    bt_impact_store_take_closed(s);
+    bt_panel_blocks_add(&s->blocks, s->from->panels.panel, time < s->earliest);
+    for (int k = 0; k < s->n_panels; k++) {
+        const bt_panel *p = &s->from->panels.panel[k];
+        s->sum[3 * k] += p->fx;
+        s->sum[3 * k + 1] += p->fy;
+        s->sum[3 * k + 2] += p->normal;
+    }
+    s->n_merged++;
+}
+
+void bt_impact_store_end_sample(bt_impact_store *s)
+{
+    if (!s->h || s->n_merged == 0) return;
+    const size_t n = (size_t)s->n_panels;
+    if (s->force >= 0) {
+        if (s->n_samples == s->cap_samples) {
+            s->cap_samples = s->cap_samples ? 2 * s->cap_samples : 64;
+            s->forces = bt_realloc(s->forces, (size_t)s->cap_samples * n, 2 * sizeof *s->forces);
+            s->normals = bt_realloc(s->normals, (size_t)s->cap_samples * n, sizeof *s->normals);
+        }
+        double *f = s->forces + 2 * n * (size_t)s->n_samples, *l = s->normals + n * (size_t)s->n_samples;
+        for (size_t k = 0; k < n; k++) {
+            f[2 * k] = s->sum[3 * k] / (double)s->n_merged;
+            f[2 * k + 1] = s->sum[3 * k + 1] / (double)s->n_merged;
+            l[k] = s->sum[3 * k + 2] / (double)s->n_merged;
+        }
+        s->n_samples++;
+    }
+    memset(s->sum, 0, 3 * n * sizeof *s->sum);
+    s->n_merged = 0;
+}
+
+void bt_impact_store_write(bt_impact_store *s)
+{
+    if (!s->h) return;
+    write_rows(s);
+    if (s->n_samples > 0) {
+        bt_h5_append(s->h, s->force, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->forces);
+        bt_h5_append(s->h, s->normal, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->normals);
+    }
+    s->samples_written += s->n_samples;
+    s->n_samples = 0;
+}
+
+void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c)
+{
+    bt_impact *rows = bt_alloc(PIECE, sizeof *rows);
+    double *x = bt_alloc(PIECE, sizeof *x);
+    for (int64_t first = 0; first < s->written && s->h->status == BT_OK; first += PIECE) {
+        const int64_t n = s->written - first < PIECE ? s->written - first : PIECE;
+        for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+            bt_h5_read_back(s->h, s->column[k], H5T_NATIVE_DOUBLE, (hsize_t)first, (hsize_t)n, x);
+            put_column(rows, n, k, x);
+        }
+        for (int64_t i = 0; i < n && s->h->status == BT_OK; i++) bt_impact_count_add(c, &rows[i]);
+    }
+    free(rows);
+    free(x);
+}
+
+void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w)
+{
+    const size_t n = (size_t)s->n_panels;
+    const double steps = (double)w->n;
+    bt_panel_loads *before = bt_alloc(2 * n, sizeof *before), *within = before + n;
+    bt_panel_blocks_reduce(&s->blocks, w->put_off, before, within);
+    double *x = bt_alloc(7 * n, sizeof *x);
+    int64_t *count = bt_alloc(n, sizeof *count);
+    for (size_t k = 0; k < n; k++) {
+        x[2 * k] = within[k].fx / steps, x[2 * k + 1] = within[k].fy / steps; // NaN when no step counts
+        x[2 * n + k] = within[k].normal / steps;
+        x[3 * n + k] = within[k].most;
+        x[4 * n + k] = c->panel[k].peak;
+        x[5 * n + k] = before[k].most;
+        x[6 * n + k] = c->panel[k].start_peak;
+        count[k] = c->panel[k].n;
+    }
+    bt_h5 *h = s->h;
+    bt_h5_attr_double(h, "/panels", "from", w->start);
+    bt_h5_attr_int(h, "/panels", "steps", w->n);
+    bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
+    describe(h, "/panels/mean_force", "N", "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
+    const struct { const char *path, *text; } of_normals[] = {
+        {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
+        {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt"},
+        {"/panels/max_peak", "largest peak of a collision in the window by the conversion of /impacts"},
+        {"/panels/start_max_load", "largest sum of the normal forces in a step before the window, impulse / dt"},
+        {"/panels/start_max_peak", "largest peak of a collision before the window by the conversion of /impacts"},
+    };
+    for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++) {
+        bt_h5_write(h, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
+        describe(h, of_normals[k].path, "N", of_normals[k].text);
+    }
+    bt_h5_write(h, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
+    describe(h, "/panels/collisions", "1", "collisions in the window");
+    free(x);
+    free(count);
+    free(before);
+}
+
+static const bt_state_row state_rows[] = {
+#define STATE(member) {#member, BT_ITEM_I64, 1, offsetof(bt_impact_store, member)}
+    STATE(written), STATE(n_merged), STATE(samples_written), {"panel_steps", BT_ITEM_I64, 1, offsetof(bt_impact_store, blocks.steps)},
+#undef STATE
+};
+enum { N_STATE = sizeof state_rows / sizeof *state_rows, LOADS_WIDTH = sizeof(bt_panel_loads) / sizeof(double) };
+
+void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
+{
+    if (!s->h) return;
+    bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, s);
+    bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps), LOADS_WIDTH, s->blocks.load);
+}
+
+/// Can the rows that are kept be counted?
+static bool rows_sound(const bt_impact_store *s)
+{
+    bool sound = true;
+    for (int64_t i = 0; i < s->n_rows; i++) {
+        const bt_impact *e = &s->rows[i];
+        sound = sound && e->panel >= 0 && e->panel < s->n_panels && isfinite(e->time) && isfinite(e->peak);
+    }
+    return sound;
+}
+
+/// The first n rows of the old file into the new one.
+static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
+{
+    double *x = bt_alloc(PIECE, sizeof *x);
+    s->cap_rows = PIECE;
+    s->rows = bt_realloc(s->rows, PIECE, sizeof *s->rows);
+    for (int64_t first = 0; first < n && old->status == BT_OK; first += PIECE) {
+        s->n_rows = n - first < PIECE ? n - first : PIECE;
+        for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
+            char path[64];
+            snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+            bt_h5_read(old, path, H5T_NATIVE_DOUBLE, first, s->n_rows, 1, x);
+            put_column(s->rows, s->n_rows, k, x);
+        }
+        if (old->status == BT_OK && rows_sound(s)) {
+            write_rows(s);
+        } else if (old->status == BT_OK) {
+            bt_errors_add(old->err, "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is damaged: restore it", old->path);
+            old->status = BT_ERR_CASE;
+        }
+    }
+    free(x);
+}
+
+/// Steps up to `step` that do not end before the earliest start.
+static int64_t late_steps(const bt_impact_store *s, int64_t step)
+{
+    int64_t n = 0;
+    for (int64_t k = 1; k <= step; k++) n += !((double)k * s->from->dt < s->earliest);
+    return n;
+}
+
+static void load_blocks(bt_impact_store *s, bt_snapshot *from, int64_t steps)
+{
+    int64_t rows = 0;
+    double *load = bt_snapshot_copy(from, "collisions/panel_blocks", BT_ITEM_F64, LOADS_WIDTH, &rows);
+    bool finite = true;
+    for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
+    bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
+    bt_snapshot_want(from, steps == late_steps(s, bt_snapshot_int(from, "world/step")), "collisions/panel_steps", -1, "does not fit the number of steps");
+    if (!from->faulty) bt_snapshot_want(from, rows == bt_panel_blocks_rows(&s->blocks, steps), "collisions/panel_blocks", -1, "does not fit the number of steps");
+    if (from->faulty) free(load);
+    else bt_panel_blocks_restore(&s->blocks, steps, (bt_panel_loads *)(void *)load);
+}
+
+void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old)
+{
+    if (!s->h) return;
+    bt_impact_store then = *s;
+    bt_snapshot_take_rows(from, "collisions", state_rows, N_STATE, &then);
+    bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
+    const int64_t there = bt_h5_size(old, "/impacts/time", 0), entries = bt_snapshot_int(from, "record/entries");
+    bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1, "is not the number of steps in the entry under way");
+    bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1, "is not a number of collisions that result.h5 has");
+    bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1, "is not the number of entries");
+    load_blocks(s, from, then.blocks.steps);
+    if (from->faulty || old->status != BT_OK) return;
+    s->n_merged = then.n_merged;
+    load_rows(s, old, then.written);
+    const size_t n = (size_t)then.samples_written, width = (size_t)s->n_panels;
+    if (s->force >= 0 && n > 0) {
+        s->cap_samples = s->n_samples = then.samples_written;
+        s->forces = bt_realloc(s->forces, n * width, 2 * sizeof *s->forces);
+        s->normals = bt_realloc(s->normals, n * width, sizeof *s->normals);
+        bt_h5_read(old, "/panels/force", H5T_NATIVE_DOUBLE, 0, s->n_samples, 2 * s->n_panels, s->forces);
+        bt_h5_read(old, "/panels/load", H5T_NATIVE_DOUBLE, 0, s->n_samples, s->n_panels, s->normals);
+    }
+    if (old->status == BT_OK) bt_impact_store_write(s);
+}
+
+void bt_impact_store_close(bt_impact_store *s)
+{
+    if (!s->h) return;
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++)
+        if (s->column[k] >= 0) H5Dclose(s->column[k]);
+    if (s->force >= 0) H5Dclose(s->force);
+    if (s->normal >= 0) H5Dclose(s->normal);
+    free(s->rows);
+    free(s->forces);
+    free(s->normals);
+    free(s->sum);
+    bt_panel_blocks_free(&s->blocks);
+    *s = (bt_impact_store){0};
+}

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// Collisions and panel loads in result.h5: /impacts row by row as they end, /panels (private to the recorder). On rank 0.
+#ifndef BT_IMPACT_STORE_H
+#define BT_IMPACT_STORE_H
+
+#include "loads/impact.h"
+#include "base/h5read.h"
+#include "base/h5util.h"
+#include "loads/impact_count.h"
+#include "loads/panel_blocks.h"
+#include "base/snapshot.h"
+
+enum { BT_IMPACT_COLUMNS = 13 };
+
+typedef struct bt_impact_store {
+    bt_h5 *h;                         ///< NULL: nothing is stored
+    const bt_impacts *from;           ///< what is stored
+    double earliest;                  ///< the window of the statistics begins there or later, s
+    hid_t column[BT_IMPACT_COLUMNS];  ///< [collisions] each
+    bt_impact *rows;                  ///< [n_rows] not yet written
+    int64_t n_rows, cap_rows, written;
+    bt_panel_blocks blocks;
+    // series of panel loads, if asked for
+    hid_t force, normal;              ///< [samples][panels][2] N, [samples][panels] N; −1 = none
+    int n_panels;
+    double *forces, *normals;         ///< [n_samples] of these: mean of the steps of a sample
+    double *sum;                      ///< [3 n_panels] of the present sample
+    int64_t n_merged, n_samples, cap_samples, samples_written;
+} bt_impact_store;
+
+/// Make the groups of case c. With output.panels the panel loads of every sample are in them.
+void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c);
+/// Collisions that ended in the last step, and its panel loads; time: its end, s.
+void bt_impact_store_take(bt_impact_store *s, double time);
+/// Collisions alone: those that the end of the run has closed.
+void bt_impact_store_take_closed(bt_impact_store *s);
+/// The present sample is complete.
+void bt_impact_store_end_sample(bt_impact_store *s);
+/// What is kept into the file.
+void bt_impact_store_write(bt_impact_store *s);
+/// Everything is written: the collisions of the file, one after the other, into c.
+void bt_impact_store_count(bt_impact_store *s, bt_impact_count *c);
+/// Means and maxima by panel, over the window w and before it.
+void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const bt_steady *w);
+/// Where it stands, after bt_impact_store_write.
+void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to);
+/// Go on from there: what had been written by then comes from `old`, the result file of that run.
+void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *old);
+void bt_impact_store_close(bt_impact_store *s);
+
+#endif

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// Forces on the towed body and balances of one step.
+//
+// Momentum balance of the towed body, along the tow direction d:
+//     J_tow = M ΔU·d + (J_ice + J_drag + J_Coriolis + J_tilt)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt)
+// On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
+// the balance leaves; the check is then the resistance found without the rows of the body: from the
+// momentum that everything else has gained (ice_resistance_budget).
+#include "output/observe.h"
+
+#include <math.h>
+
+#include "bergtow/forces.h"
+#include "loads/impact.h"
+#include "solve/solver.h"
+#include "bergtow/sum.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "step/window.h"
+#include "partition/domain.h"
+#include "space/phases.h"
+
+enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
+
+/// One tile's share of the sums over contacts and floes.
+static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_tile *tile = &w->tiles->tile[k];
+    const bt_idx towed = bt_world_towed(w);
+    const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
+    const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
+    for (bt_idx i = tile->first; i < tile->end; i++) {
+        if (b->motion[i] != BT_DYNAMIC || i == towed) continue;
+        const bt_vel *v = &b->vel[i];
+        if (v->x * v->x + v->y * v->y > slow2) bt_sum_add(&t->sum[MOVING], 1);
+        const double ux = v->x - b->vel_free[i].x, uy = v->y - b->vel_free[i].y;
+        if (prescribed && (ux != 0 || uy != 0)) bt_sum_add(&t->sum[BUDGET], -(ux * dx + uy * dy) / b->inv[i].m);
+    }
+    if (towed < 0) return;
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        const bt_unit *u = &tile->units[j];
+        const double normal = u->ln[0] + u->ln[1];
+        if (normal == 0) continue;
+        const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
+        if (u->a == towed || u->b == towed) {
+            const bool is_b = u->b == towed;
+            const double sign = is_b ? 1 : -1;
+            const double *arm = is_b ? u->rbn : u->ran;
+            bt_sum_add(&t->sum[ICE_X], sign * jx);
+            bt_sum_add(&t->sum[ICE_Y], sign * jy);
+            bt_sum_add(&t->sum[ICE_TURN], sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
+            bt_sum_add(&t->sum[TOUCHING], (u->ln[0] > 0) + (u->ln[1] > 0));
+        } else if (prescribed) { // impulses that came from the other bodies of infinite mass
+            const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
+            if (sign != 0) bt_sum_add(&t->sum[BUDGET], sign * (jx * dx + jy * dy));
+        }
+    }
+}
+
+static bt_totals observe_tiles(const bt_world *w, double slow2)
+{
+    const bt_tiles *ts = w->tiles;
+    bt_totals all = {.n_sums = N_SEEN};
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+    {
+        bt_totals t = {.n_sums = N_SEEN};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx j = 0; j < ts->n_busy; j++) {
+            const bt_idx k = ts->busy[j];
+            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || ts->tile[k].n_units > 0 || !ts->still)) observe_tile(w, k, slow2, &t);
+        }
+#pragma omp critical
+        bt_totals_merge(&all, &t);
+    }
+    bt_domain_reduce(w, &all);
+    return all;
+}
+
+/// Contact impulse on the towed body along (dx, dy) without using its rows.
+static double budget_impulse(const bt_world *w, const bt_totals *seen, double dx, double dy)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_idx t = bt_world_towed(w);
+    if (b->motion[t] != BT_DYNAMIC) return bt_sum_value(&seen->sum[BUDGET]);
+    double jx = (b->vel[t].x - b->vel_free[t].x) / b->inv[t].m, jy = (b->vel[t].y - b->vel_free[t].y) / b->inv[t].m;
+    for (int k = 0; bt_tow_has_line(w->tow) && k < w->tow->n_branches; k++) {
+        jx -= w->tow->branch[k].lambda * w->tow->branch[k].lx;
+        jy -= w->tow->branch[k].lambda * w->tow->branch[k].ly;
+    }
+    return jx * dx + jy * dy;
+}
+
+/// Tension, length and end of the line; the body's share along the course.
+static void observe_line(const bt_tow *tow, bt_sample *s)
+{
+    const bt_branch *b = &tow->branch[0];
+    s->line_tension = bt_tow_tension(tow, 0);
+    s->line_length = b->length;
+    s->carriage_x = tow->carriage_x;
+    s->carriage_y = tow->carriage_y;
+    s->tow_force = s->line_tension * (b->lx * tow->ux + b->ly * tow->uy);
+    for (int k = 1; k < tow->n_branches; k++) {
+        const double t = bt_tow_tension(tow, k);
+        s->tow_force += t * (tow->branch[k].lx * tow->ux + tow->branch[k].ly * tow->uy);
+        s->line_tension = bt_max(s->line_tension, t);
+    }
+    s->line_tension_1 = bt_tow_tension(tow, 0);
+    if (tow->n_branches > 1) s->line_tension_2 = bt_tow_tension(tow, 1);
+    if (tow->mode != BT_TOW_THRUST) return;
+    const bt_vessel *v = &tow->vessel;
+    s->vessel_x = tow->carriage_x;
+    s->vessel_y = tow->carriage_y;
+    s->vessel_speed = v->vd2;
+    s->vessel_thrust = v->thrust / tow->dt;
+    s->vessel_drag = v->kd * (v->vd2 - v->ud);
+    s->vessel_inertia = v->mass * (v->vd2 - v->vd1) / tow->dt;
+    s->vessel_line = s->tow_force; // both along the course
+}
+
+static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_idx t = bt_world_towed(w);
+    const bt_tow *tow = w->tow;
+    const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
+    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
+    const bt_external e = bt_forces_external(w, t);
+    s->ice_force_x = ice[0] / dt;
+    s->ice_force_y = ice[1] / dt;
+    s->ice_moment = ice[2] / dt;
+    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
+    s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
+    s->drag_force = 0.0 - (e.drag[0] * dx + e.drag[1] * dy) / dt;
+    s->coriolis_force = 0.0 - (e.coriolis[0] * dx + e.coriolis[1] * dy) / dt;
+    s->tilt_force = 0.0 - (e.tilt[0] * dx + e.tilt[1] * dy) / dt;
+    s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
+    s->body_x = tow->travel_x;
+    s->body_y = tow->travel_y;
+    s->body_yaw = b->pose[t].yaw;
+    s->body_vx = b->vel[t].x;
+    s->body_vy = b->vel[t].y;
+    s->body_yaw_rate = b->vel[t].w;
+    if (bt_tow_has_line(tow)) {
+        observe_line(tow, s);
+    } else if (tow->mode == BT_TOW_SPEED) {
+        s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
+    } else {
+        s->tow_force = 0;
+    }
+    s->contacts_body = bt_sum_value(&seen->sum[TOUCHING]);
+}
+
+/// Collisions of the towed body; on rank 0, which records.
+static void observe_impacts(const bt_world *w, bt_sample *s)
+{
+    const bt_impacts *m = w->impacts;
+    s->collision_resistance = 0.0 - (m->collision_x * w->tow->ux + m->collision_y * w->tow->uy) / w->par.dt;
+    s->collisions = (double)m->n_closed;
+    s->largest_push = m->largest_push;
+    s->impact_peak = 0;
+    for (int64_t i = 0; i < m->n_closed; i++) s->impact_peak = bt_max(s->impact_peak, m->closed[i].peak);
+}
+
+unsigned bt_observe_applies(const bt_world *w)
+{
+    const bool body = w->towed >= 0, line = body && bt_tow_has_line(w->tow);
+    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE | (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
+           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL | (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
+           (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
+}
+
+void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
+{
+    const bt_step_stats *st = &w->stats;
+    *s = (bt_sample){
+        .time = (double)w->step * w->par.dt,
+        .contacts = (double)st->n_points,
+        .sweeps = (double)st->sweeps,
+        .unit_updates = (double)st->unit_updates,
+        .momentum_moves = (double)st->unit_moves,
+        .position_sweeps = (double)st->position_sweeps,
+        .unprojected = !st->projected,
+        .residual = st->residual,
+        .residual_rms = st->residual_rms,
+        .active = (double)st->n_active,
+        .unconverged = !st->converged,
+        .overlap = st->overlap,
+        .momentum_residual = st->momentum_residual,
+        .kinetic_energy = st->kinetic_energy,
+        .contact_work = st->contact_work,
+        .repeats = (double)st->repeats,
+        .outrun = st->outrun,
+        .restitution_cut = st->restitution_cut,
+        .crushing = (double)st->n_crushing,
+        .crushed_work = st->crushed_work,
+        .crushed_depth = st->crushed_depth,
+        .current_x = w->par.water_u,
+        .current_y = w->par.water_v,
+        .wind_x = w->par.air_u,
+        .wind_y = w->par.air_v,
+    };
+    const double slow2 = 1e-4 * reference_speed * reference_speed;
+    const bt_totals seen = observe_tiles(w, slow2);
+    s->moving = bt_sum_value(&seen.sum[MOVING]);
+    const unsigned has = bt_observe_applies(w);
+    if (has & 1u << BT_APPLIES_BODY) observe_body(w, &seen, s);
+    if (has & 1u << BT_APPLIES_IMPACTS) observe_impacts(w, s);
+    if (w->window) {
+        s->window_x = bt_window_low(w->window);
+        s->window_renewed = (double)w->window->renewed_now;
+        s->window_waiting = (double)w->window->waiting;
+    }
+    for (int k = 0; k < bt_n_series_fields; k++)
+        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
+}
+
+void bt_observe_contact_force(const bt_world *w, double *force)
+{
+    for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
+            const bt_unit *u = &w->tiles->tile[k].units[j];
+            const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
+            force[u->a] = bt_max(force[u->a], f);
+            force[u->b] = bt_max(force[u->b], f);
+        }
+    bt_domain_largest(w, force);
+}

@@ -1,0 +1,335 @@
+// SPDX-License-Identifier: MIT
+// What a run leaves behind: result.h5 while it runs, case.resolved.yml before, summary.json and frames.xdmf after it.
+//
+// result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to then, so that a
+// calculation can be watched; killed within a flush, some series have its length and some that of the last, all rows whole (h5driver.c). Under its
+// final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint (record_resume.c), and at the end the
+// file itself (attribute "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and renamed.
+#include "output/record.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fileio.h"
+#include "base/provenance.h"
+#include "output/record_parts.h"
+#include "base/seal.h"
+#include "output/xdmf.h"
+
+#define FLUSH_SECONDS 5.0 // wall time between flushes
+
+static void create_series(bt_record *r)
+{
+    static const char *const merge[] = {[BT_KEEP_LAST] = "last step", [BT_KEEP_MEAN] = "mean of the steps",
+                                        [BT_KEEP_MAX] = "largest of the steps", [BT_KEEP_SUM] = "sum of the steps"};
+    bt_h5_group(&r->h5, "/series");
+    const int64_t every = r->c->output.sample_every;
+    bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
+    for (int k = 0; k < bt_n_series_fields; k++) {
+        const bt_series_field *f = &bt_series_fields[k];
+        char *name = bt_file_join("/series", f->name);
+        r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
+        bt_h5_attr_text(&r->h5, name, "units", f->units);
+        bt_h5_attr_text(&r->h5, name, "description", f->description);
+        bt_h5_attr_text(&r->h5, name, "merge", merge[f->keep]);
+        bt_h5_attr_text(&r->h5, name, "applies", bt_applies_names[f->applies]);
+        free(name);
+    }
+}
+
+static void create_events(bt_record *r)
+{
+    static const char *const names[4] = {"/events/time", "/events/kind", "/events/subject", "/events/value"};
+    static const char *const units[4] = {"s", "", "", "see kind"};
+    static const char *const texts[4] = {"end of the step", "index into kind_names", "which branch (line_broken) or way-point (waypoint), from 1",
+                                         "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"};
+    bt_h5_group(&r->h5, "/events");
+    for (int k = 0; k < 4; k++) {
+        r->events[k] = bt_h5_growing(&r->h5, names[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){64, 1}, false);
+        bt_h5_attr_text(&r->h5, names[k], "units", units[k]);
+        bt_h5_attr_text(&r->h5, names[k], "description", texts[k]);
+    }
+    bt_h5_write_names(&r->h5, "/events/kind_names", BT_EVENT_KINDS, bt_event_names);
+}
+
+bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err)
+{
+    if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
+    r->h5.err = err;
+    for (; r->n_events < e->n; r->n_events++) {
+        const bt_event *v = &e->event[r->n_events];
+        const void *const column[4] = {&v->time, &v->kind, &v->subject, &v->value};
+        for (int k = 0; k < 4; k++) bt_h5_append(&r->h5, r->events[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, (hsize_t)r->n_events, 1, column[k]);
+    }
+    return r->h5.status;
+}
+
+static void record_free(bt_record *r)
+{
+    bt_summary_free(&r->summary);
+    bt_impact_count_free(&r->count);
+    bt_history_free(&r->history);
+    free(r->dir);
+    free(r->series);
+    free(r->buffer);
+    free(r);
+}
+
+/// Close datasets and file; returns the status of everything that went to the file.
+static bt_status close_file(bt_record *r)
+{
+    for (int k = 0; k < bt_n_series_fields; k++)
+        if (r->series[k] >= 0) H5Dclose(r->series[k]);
+    for (int k = 0; k < 4; k++)
+        if (r->events[k] >= 0) H5Dclose(r->events[k]);
+    bt_frames_close(&r->frames);
+    bt_impact_store_close(&r->impacts);
+    return bt_h5_close(&r->h5);
+}
+
+bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err)
+{
+    char *path = bt_file_join(r->dir, name);
+    const bt_status status = bt_file_write(path, text, err);
+    free(path);
+    return status;
+}
+
+/// The folder, without what an earlier run left there, and the resolved case in it.
+/// A fresh run leaves nothing of an earlier one; one that goes on only takes the summary away, which is of its end.
+static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
+{
+    bt_status status = bt_file_make_dir(r->dir, err);
+    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", "checkpoint.h5.tmp", BT_RESULT_FILE, "frames.xdmf", "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5", "stop"};
+    for (size_t k = 0; k < (fresh ? sizeof stale / sizeof *stale : 3) && status == BT_OK; k++) {
+        char *path = bt_file_join(r->dir, stale[k]);
+        status = bt_file_remove(path, err);
+        free(path);
+    }
+    return status == BT_OK && fresh ? bt_record_write_text(r, "case.resolved.yml", resolved, err) : status;
+}
+
+static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bool fresh,
+                             bt_errors *err)
+{
+    *out = NULL;
+    bt_record *r = bt_alloc(1, sizeof *r);
+    r->dir = strdup(dir);
+    r->c = c;
+    r->comm = comm;
+    r->n_floes = b->n_floes;
+    r->towed = b->towed;
+    r->last_flush = bt_clock();
+    bt_history_init(&r->history);
+    r->buffer = bt_alloc((size_t)bt_n_series_fields * BT_RECORD_BUFFER, sizeof *r->buffer);
+    r->series = bt_alloc((size_t)bt_n_series_fields, sizeof *r->series);
+    for (int k = 0; k < bt_n_series_fields; k++) r->series[k] = -1;
+    for (int k = 0; k < 4; k++) r->events[k] = -1;
+
+    char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
+    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? prepare_dir(r, resolved, fresh, err) : BT_OK);
+    if (status == BT_OK) status = bt_h5_create_shared(&r->h5, comm, path, err);
+    if (status == BT_OK) {
+        bt_h5_attr_int(&r->h5, "/", "complete", 0);
+        bt_provenance_write(&r->h5, command_line);
+        bt_h5_write_text(&r->h5, "/case", resolved);
+        bt_h5_write_text(&r->h5, "/case_as_given", c->text ? c->text : "");
+        create_series(r);
+        create_events(r);
+        bt_frames_create(&r->frames, &r->h5, comm, b);
+        status = bt_comm_agree(comm, r->h5.status); // what the others wrote is in the file: now it may be told
+        if (status == BT_OK) {
+            bt_h5_flush(&r->h5);
+            status = bt_comm_agree(comm, r->h5.status);
+        }
+        if (status != BT_OK) {
+            bt_h5_give_up(&r->h5, status);
+            close_file(r);
+        }
+    }
+    free(resolved);
+    free(path);
+    if (status != BT_OK) {
+        record_free(r);
+        return status;
+    }
+    *out = r;
+    return BT_OK;
+}
+
+bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+{
+    return open_record(r, comm, dir, c, b, command_line, true, err);
+}
+
+bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+{
+    return open_record(r, comm, dir, c, b, command_line, false, err);
+}
+
+bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err)
+{
+    if (r->comm->rank != 0) return BT_OK;
+    r->h5.err = err;
+    bt_impact_store_create(&r->impacts, &r->h5, m, r->c);
+    return r->h5.status;
+}
+
+static double *member(bt_sample *s, int k) { return (double *)(void *)((char *)s + bt_series_fields[k].offset); }
+
+void bt_record_flush(bt_record *r)
+{
+    for (int k = 0; k < bt_n_series_fields; k++)
+        bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, (hsize_t)r->written, (hsize_t)r->buffered,
+                     r->buffer + (size_t)k * BT_RECORD_BUFFER);
+    r->written += r->buffered;
+    r->buffered = 0;
+    bt_impact_store_write(&r->impacts);
+    bt_h5_flush(&r->h5);
+    r->last_flush = bt_clock();
+}
+
+/// Move the merged steps to the buffer as one entry.
+static void end_entry(bt_record *r)
+{
+    for (int k = 0; k < bt_n_series_fields; k++) {
+        double value = *member(&r->merged, k);
+        if (bt_series_fields[k].keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
+        r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
+    }
+    r->buffered++;
+    r->n_merged = 0;
+    bt_impact_store_end_sample(&r->impacts);
+}
+
+bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
+{
+    if (r->h5.status != BT_OK || r->comm->rank != 0) return r->h5.status;
+    r->h5.err = err;
+    bt_history_add(&r->history, s);
+    bt_impact_store_take(&r->impacts, s->time);
+    for (int k = 0; k < bt_n_series_fields; k++) {
+        double *m = member(&r->merged, k);
+        const double x = bt_sample_value(s, &bt_series_fields[k]);
+        switch (r->n_merged ? bt_series_fields[k].keep : BT_KEEP_LAST) {
+        case BT_KEEP_LAST: *m = x; break;
+        case BT_KEEP_MEAN:
+        case BT_KEEP_SUM: *m += x; break;
+        case BT_KEEP_MAX: *m = bt_max_seen(*m, x); break;
+        }
+    }
+    if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
+    if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS)) bt_record_flush(r);
+    return r->h5.status;
+}
+
+void bt_record_overlap(bt_record *r, double overlap)
+{
+    if (r->comm->rank == 0) r->history.max_overlap = bt_max_seen(r->history.max_overlap, overlap);
+}
+
+bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err)
+{
+    r->h5.err = err;
+    const bt_status status = bt_frames_add(&r->frames, time, rows);
+    if (status != BT_OK) return status;
+    bt_record_flush(r);
+    return bt_comm_agree(r->comm, r->h5.status);
+}
+
+static void write_totals(bt_record *r, const bt_run_totals *t)
+{
+    bt_h5_attr_int(&r->h5, "/", "ranks", t->ranks);
+    bt_h5_attr_int(&r->h5, "/", "threads", t->threads);
+    bt_h5_attr_int(&r->h5, "/", "n_steps", t->n_steps);
+    bt_h5_attr_double(&r->h5, "/", "wall_time", t->wall_time);
+    bt_h5_attr_text(&r->h5, "/", "stopped", t->stopped ? t->stopped : "");
+    bt_h5_flush(&r->h5);
+    bt_h5_attr_int(&r->h5, "/", "complete", 1);
+}
+
+char *bt_record_xdmf(const bt_record *r)
+{
+    const bt_frames *f = &r->frames;
+    return bt_xdmf_text(&(bt_xdmf){.n_floes = f->n_floes, .n_bodies = f->n_others, .floe_vertices = f->floe_vertices,
+                                   .body_vertices = f->other_vertices, .time = f->times, .n_frames = f->n});
+}
+
+/// What is still on its way goes to the file, and the numbers of the whole run are made: once, on rank 0.
+static void conclude(bt_record *r, const bt_run_totals *t)
+{
+    if (r->concluded) return;
+    r->concluded = true;
+    if (r->n_merged > 0) end_entry(r);
+    bt_impact_store_take_closed(&r->impacts);
+    bt_record_flush(r);
+    bt_summary_make(&r->summary, &r->history, r->c, t, r->n_floes, r->towed >= 0);
+    if (!r->impacts.h) return;
+    bt_impact_count_init(&r->count, r->impacts.from, &r->history, &r->summary.window);
+    bt_impact_store_count(&r->impacts, &r->count);
+    bt_impact_store_totals(&r->impacts, &r->count, &r->summary.window);
+    r->summary.impacts = &r->count;
+}
+
+static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_errors *err)
+{
+    char *text = bt_summary_json(&r->summary, &r->history, r->c, t, r->n_floes);
+    const bt_status status = bt_record_write_text(r, "summary.json", text, err);
+    free(text);
+    return status;
+}
+
+/// The file that was written, now closed, under its final name.
+static bt_status hand_in(const bt_record *r, bt_errors *err)
+{
+    char *part = bt_file_join(r->dir, BT_RESULT_PART), *path = bt_file_join(r->dir, BT_RESULT_FILE);
+    bt_status status = bt_seal_write(part, BT_SEAL_RESULT, err);
+    if (status == BT_OK) status = bt_file_rename(part, path, err);
+    free(part);
+    free(path);
+    return status;
+}
+
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
+{
+    const bool first = r->comm->rank == 0;
+    char *xdmf = first ? bt_record_xdmf(r) : NULL;
+    r->h5.err = err;
+    if (first && t) {
+        conclude(r, t);
+        write_totals(r, t);
+    } else if (first) {
+        if (r->n_merged > 0) end_entry(r);
+        bt_record_flush(r);
+    }
+    bt_h5_sync_raw(&r->h5);
+    bt_status status = bt_comm_agree(r->comm, close_file(r));
+    // The summary comes last: where there is one, the rest is complete.
+    if (first && status == BT_OK) status = hand_in(r, err);
+    if (first && status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
+    if (first && status == BT_OK && t) status = write_summary(r, t, err);
+    status = bt_comm_agree(r->comm, status);
+    free(xdmf);
+    record_free(r);
+    return status;
+}
+
+void bt_record_abandon(bt_record *r)
+{
+    bt_h5_give_up(&r->h5, BT_ERR_IO);
+    close_file(r);
+    char *part = bt_file_join(r->dir, BT_RESULT_PART);
+    if (r->comm->rank == 0) unlink(part);
+    free(part);
+    record_free(r);
+}
+
+void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err)
+{
+    r->h5.err = err;
+    conclude(r, t);
+    bt_summary_print(&r->summary, &r->history, r->c, t, r->n_floes);
+}

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// The struct behind output/record.h (private to the recorder).
+#ifndef BT_RECORD_PARTS_H
+#define BT_RECORD_PARTS_H
+
+#include "output/frames.h"
+#include "base/h5util.h"
+#include "output/impact_store.h"
+#include "output/summary.h"
+
+enum { BT_RECORD_BUFFER = 256 }; ///< entries of the series between flushes, and in a chunk
+
+#define BT_RESULT_FILE "result.h5"
+#define BT_RESULT_PART "result.part.h5" // the file that is being written
+
+struct bt_record {
+    bt_h5 h5;
+    char *dir;
+    const bt_case *c;
+    const bt_comm *comm;
+    bt_idx n_floes, towed; ///< of all ranks
+    bt_history history;
+    // series
+    hid_t *series;         ///< [bt_n_series_fields]
+    double *buffer;        ///< [bt_n_series_fields][BT_RECORD_BUFFER]
+    int64_t written, buffered;
+    bt_sample merged;      ///< of the steps of the present entry
+    int64_t n_merged;
+    double last_flush;     ///< bt_clock
+    hid_t events[4];       ///< time, kind, subject, value
+    int64_t n_events;      ///< written
+    bt_frames frames;
+    bt_impact_store impacts;
+    // of the end of the run
+    bool concluded;
+    bt_summary summary;
+    bt_impact_count count; ///< collisions over the window
+};
+
+/// What is buffered into the file, and the file to the system.
+void bt_record_flush(bt_record *r);
+
+/// frames.xdmf for the frames there are; the caller frees it.
+char *bt_record_xdmf(const bt_record *r);
+
+/// A text file of the folder.
+bt_status bt_record_write_text(const bt_record *r, const char *name, const char *text, bt_errors *err);
+
+#endif

@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: MIT
+// The state of a world as named arrays: bodies by id, tiles, contacts, tow, window, collisions, events.
+#include "output/state.h"
+
+#include <assert.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact/contacts.h"
+#include "loads/impact.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "step/window.h"
+#include "partition/domain.h"
+#include "output/state_check.h"
+
+#define MEMBER(struct_, label, type_, width_, member) {label, BT_ITEM_##type_, width_, offsetof(struct_, member)}
+#define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
+
+// --- the tables ------------------------------------------------------------------------------------------------------
+
+#define WORLD(type, member) MEMBER(bt_world, #member, type, 1, member)
+static const bt_state_row world_rows[] = {WORLD(I64, step), WORLD(F64, drift_x), WORLD(F64, drift_y)};
+
+#define PAR(member) MEMBER(bt_params, #member, F64, 1, member)
+/// Of the last step where they change with time; the others show that the case is the one of the checkpoint.
+static const bt_state_row par_rows[] = {
+    PAR(dt), PAR(x0), PAR(y0), PAR(period_x), PAR(period_y), PAR(tolerance), PAR(slop), PAR(size), PAR(water_u), PAR(water_v), PAR(air_u), PAR(air_v),
+    PAR(coriolis), PAR(balance_u), PAR(balance_v), PAR(tilt_ax), PAR(tilt_ay),
+};
+
+#define TILES(type, member) MEMBER(bt_tiles, #member, type, 1, member)
+static const bt_state_row tiles_rows[] = {
+    TILES(F64, x0), TILES(F64, y0), TILES(F64, side_x), TILES(F64, side_y), TILES(F64, allowance), TILES(F64, reach), TILES(F64, heaviest), TILES(U8, rebounds),
+    TILES(F64, margin_max), TILES(I32, low_x), TILES(I32, low_y), TILES(I32, n_x), TILES(I32, n_y), TILES(I32, wrap_x), TILES(I32, wrap_y), TILES(U8, relabel),
+    TILES(I64, n_labellings),
+};
+
+#define TOW(type, member) MEMBER(bt_tow, #member, type, 1, member)
+#define BRANCH(label, type, k, member) MEMBER(bt_tow, label, type, 1, branch[k].member)
+static const bt_state_row tow_rows[] = {
+    TOW(F64, time), TOW(F64, carriage_x), TOW(F64, carriage_y), TOW(F64, travel_x), TOW(F64, travel_y), TOW(F64, way), TOW(I32, mark), TOW(F64, ux), TOW(F64, uy),
+    BRANCH("impulse_1", F64, 0, lambda), BRANCH("taut_1", U8, 0, taut), BRANCH("broken_1", U8, 0, broken),
+    BRANCH("impulse_2", F64, 1, lambda), BRANCH("taut_2", U8, 1, taut), BRANCH("broken_2", U8, 1, broken),
+    MEMBER(bt_tow, "vessel_vx", F64, 1, vessel.vx), MEMBER(bt_tow, "vessel_vy", F64, 1, vessel.vy), MEMBER(bt_tow, "vessel_way", F64, 1, vessel.way),
+};
+
+#define WINDOW(type, width, member) MEMBER(bt_window, #member, type, width, member)
+static const bt_state_row window_rows[] = {
+    WINDOW(F64, 1, start), WINDOW(F64, 1, rear), WINDOW(F64, 1, drift_x), WINDOW(F64, 1, drift_y), WINDOW(F64, 4, vel), WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),
+    WINDOW(I64, 1, missed), WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
+};
+
+enum { IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double), OPEN_WIDTH = sizeof(bt_impact_open) / sizeof(double), PANEL_WIDTH = sizeof(bt_panel) / sizeof(double) };
+
+#define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
+static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time), STALL(F64, asked), STALL(F64, spent), STALL(F64, from_x), STALL(F64, from_y), STALL(U8, begun)};
+
+#define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
+static const bt_state_row lead_rows[] = {
+    LEAD(I32, mode), LEAD(F64, width), LEAD(F64, length), LEAD(I64, taken), LEAD(F64, area_taken), LEAD(I64, pieces), LEAD(F64, mean_piece), LEAD(F64, concentration_before),
+    LEAD(F64, concentration_after),
+};
+
+#define FIELD(type, label, member) MEMBER(bt_field, label, type, 1, member)
+static const bt_state_row field_rows[] = {
+    FIELD(F64, "ice_area", ice_area), FIELD(F64, "concentration", concentration), FIELD(I64, "read", outlines.read), FIELD(I64, "turned", outlines.turned),
+    FIELD(I64, "dropped", outlines.dropped), FIELD(I64, "hulled", outlines.hulled), FIELD(F64, "hull_area", outlines.hull_area), FIELD(I64, "split", outlines.split),
+    FIELD(I64, "parts", outlines.parts), FIELD(F64, "lon", outlines.lon), FIELD(F64, "lat", outlines.lat),
+};
+
+/// Not in checkpoints of before, whose fields had none of this.
+static const bt_state_row map_rows[] = {
+    FIELD(I64, "rounded", outlines.rounded),
+    FIELD(I64, "rounded_corners", outlines.rounded_corners),
+    FIELD(F64, "rounded_area", outlines.rounded_area),
+    FIELD(F64, "east", outlines.east),
+    FIELD(F64, "north", outlines.north),
+    FIELD(I64, "unnamed", outlines.unnamed),
+};
+
+_Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
+
+void bt_state_save_stall(const bt_stall *t, bt_snapshot *s) { bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
+void bt_state_load_stall(bt_stall *t, bt_snapshot *s) { bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
+void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s) { bt_snapshot_add_rows(s, "lead", lead_rows, N_OF(lead_rows), l); }
+void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
+{
+    int32_t mode = 0;
+    bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
+    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead"); // before it is taken as one
+    if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
+}
+
+// --- bodies ----------------------------------------------------------------------------------------------------------
+
+/// What a body carries from step to step, as it travels to rank 0. Everything else about it follows from the case and the field.
+typedef struct {
+    double pose[3], vel[3], path;
+    int32_t tile[2], copy, lap;
+    int64_t stirred;
+} body_row;
+enum { BODY_WIDTH = sizeof(body_row) / sizeof(double) };
+_Static_assert(sizeof(body_row) % sizeof(double) == 0, "a body is a row of doubles");
+
+/// Its columns in the file.
+static const bt_state_row body_columns[] = {
+    MEMBER(body_row, "pose", F64, 3, pose), MEMBER(body_row, "velocity", F64, 3, vel), MEMBER(body_row, "path", F64, 1, path), MEMBER(body_row, "tile", I32, 2, tile),
+    MEMBER(body_row, "copy", I32, 1, copy), MEMBER(body_row, "lap", I32, 1, lap), MEMBER(body_row, "stirred", I64, 1, stirred),
+};
+
+static body_row row_of(const bt_bodies *b, bt_idx i)
+{
+    return (body_row){
+        .pose = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw},
+        .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
+        .path = b->path[i],
+        .tile = {b->tile[i][0], b->tile[i][1]},
+        .copy = b->home[i].copy,
+        .lap = b->home[i].lap,
+        .stirred = b->stirred[i],
+    };
+}
+
+static void put_row(bt_world *w, bt_idx i, const body_row *r)
+{
+    bt_bodies *b = &w->bodies;
+    b->pose[i] = (bt_pose){.x = r->pose[0], .y = r->pose[1], .yaw = r->pose[2]};
+    bt_world_turn_outline(w, i);
+    b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
+    b->path[i] = r->path;
+    b->tile[i][0] = r->tile[0];
+    b->tile[i][1] = r->tile[1];
+    b->home[i].copy = r->copy;
+    b->home[i].lap = r->lap;
+    b->stirred[i] = r->stirred != 0;
+}
+
+/// A column of rows of `size` bytes, to or from an array of its own.
+static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, char *array, bool out)
+{
+    const size_t bytes = bt_item_size(c->type) * (size_t)c->width;
+    for (int64_t i = 0; i < n; i++) {
+        char *in_row = rows + (size_t)i * size + c->offset, *in_array = array + (size_t)i * bytes;
+        memcpy(out ? in_array : in_row, out ? in_row : in_array, bytes);
+    }
+}
+
+static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows, size_t size, int64_t n)
+{
+    for (int k = 0; k < n_columns; k++) {
+        char name[64];
+        snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
+        column(&columns[k], rows, size, n, bt_snapshot_add(s, name, columns[k].type, n, columns[k].width, NULL), true);
+    }
+}
+
+/// n < 0: as many rows as there are. The rows in new memory.
+static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, size_t size, int64_t *n)
+{
+    char name[64];
+    snprintf(name, sizeof name, "%s/%s", group, columns[0].name);
+    if (*n < 0) *n = bt_snapshot_rows(s, name);
+    char *rows = bt_alloc((size_t)*n, size);
+    for (int k = 0; k < n_columns; k++) {
+        snprintf(name, sizeof name, "%s/%s", group, columns[k].name);
+        char *array = bt_alloc((size_t)*n * (size_t)columns[k].width, bt_item_size(columns[k].type));
+        bt_snapshot_take(s, name, columns[k].type, *n, columns[k].width, array);
+        column(&columns[k], rows, size, *n, array, false);
+        free(array);
+    }
+    return rows;
+}
+
+static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_idx n = 0;
+    bt_gid *gid = bt_alloc((size_t)b->n, sizeof *gid);
+    body_row *mine = bt_alloc((size_t)b->n, sizeof *mine);
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!bt_domain_owns(w, i)) continue;
+        gid[n] = b->gid[i];
+        mine[n++] = row_of(b, i);
+    }
+    int64_t *first = bt_alloc((size_t)c->size + 1, sizeof *first);
+    for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
+    const int64_t count = c->rank == 0 ? b->n_global : 0;
+    body_row *all = bt_alloc((size_t)count, sizeof *all);
+    const bt_status status = bt_comm_rows_by_gid(c, first, n, gid, BODY_WIDTH, (const double *)(const void *)mine, (double *)(void *)all, err);
+    if (status == BT_OK && c->rank == 0) save_columns(s, "bodies", body_columns, N_OF(body_columns), all, sizeof *all, count);
+    free(all);
+    free(first);
+    free(mine);
+    free(gid);
+    return status;
+}
+
+static void load_bodies(bt_world *w, bt_snapshot *s)
+{
+    int64_t n = w->bodies.n_global;
+    assert(w->bodies.n == n); // nothing is dealt yet
+    body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
+    for (bt_gid g = 0; g < n && !s->faulty; g++) {
+        bt_snapshot_want(s, rows[g].stirred == 0 || rows[g].stirred == 1, "bodies/stirred", g, "is neither 0 nor 1");
+        put_row(w, bt_world_index(w, g), &rows[g]);
+    }
+    free(rows);
+}
+
+// --- contacts --------------------------------------------------------------------------------------------------------
+
+enum { TRACE_WIDTH = sizeof(bt_trace) / sizeof(double) };
+_Static_assert(sizeof(bt_trace) % sizeof(double) == 0, "a trace is a row of doubles");
+
+static const bt_state_row trace_columns[] = {
+    MEMBER(bt_trace, "a", I64, 1, a), MEMBER(bt_trace, "b", I64, 1, b), MEMBER(bt_trace, "part", U16, 2, part), MEMBER(bt_trace, "points", I32, 1, n_points),
+    MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "impulse", F64, 2, ln), MEMBER(bt_trace, "friction", F64, 1, lt), MEMBER(bt_trace, "crushed", U8, 1, scar),
+};
+
+int bt_trace_by_names(const void *p, const void *q)
+{
+    const bt_trace *a = p, *b = q;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
+    return a->scar - b->scar;
+}
+
+/// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
+static void blank(bt_trace *t)
+{
+    if (t->n_points < 2) t->feature[1] = 0, t->ln[1] = 0;
+}
+
+static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
+{
+    int64_t n, all;
+    bt_trace *mine = bt_tiles_take_traces(w, &n);
+    bt_trace *trace = (bt_trace *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
+    free(mine);
+    if (c->rank == 0) {
+        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_trace_by_names);
+        for (int64_t k = 0; k < all; k++) blank(&trace[k]);
+        save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
+    }
+    free(trace);
+}
+
+// --- collisions, events ----------------------------------------------------------------------------------------------
+
+static const bt_state_row event_columns[] = {MEMBER(bt_event, "time", F64, 1, time), MEMBER(bt_event, "kind", I64, 1, kind), MEMBER(bt_event, "subject", I64, 1, subject),
+                                             MEMBER(bt_event, "value", F64, 1, value)};
+
+// --- the whole -------------------------------------------------------------------------------------------------------
+
+bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    const uint64_t hash = bt_world_hash(w);
+    const bt_status status = save_bodies(w, c, s, err);
+    save_contacts(w, c, s);
+    if (c->rank != 0) return status;
+    bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
+    bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
+    bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
+    bt_snapshot_add_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
+    if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
+    save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event, w->events.n);
+    return status;
+}
+
+static bool all_finite(const double *x, int64_t n)
+{
+    for (int64_t k = 0; k < n; k++)
+        if (!isfinite(x[k])) return false;
+    return true;
+}
+
+/// The first row that is no number.
+static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base, char name[64])
+{
+    for (int k = 0; base && k < n_rows; k++) {
+        if (row[k].type != BT_ITEM_F64 || all_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width)) continue;
+        snprintf(name, 64, "%s/%s", group, row[k].name);
+        return name;
+    }
+    return NULL;
+}
+
+/// What a collision under way is made of; its corner is NaN where there is none.
+static bool open_finite(const bt_impact_open *o)
+{
+    const double real[] = {o->so_far.time, o->so_far.x, o->so_far.y, o->so_far.impulse, o->so_far.approach, o->so_far.mass, o->so_far.thickness, o->rest, o->largest};
+    return all_finite(real, N_OF(real));
+}
+
+const char *bt_state_not_finite(const bt_world *w, char name[64])
+{
+    const char *found = rows_not_finite("world", world_rows, N_OF(world_rows), w, name);
+    if (!found) found = rows_not_finite("step", par_rows, N_OF(par_rows), &w->par, name);
+    if (!found) found = rows_not_finite("tow", tow_rows, N_OF(tow_rows), w->tow, name);
+    if (!found) found = rows_not_finite("window", window_rows, N_OF(window_rows), w->window, name);
+    const bt_impacts *m = w->impacts;
+    if (found || !m) return found;
+    if (!all_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
+    for (int64_t k = 0; k < m->n_open; k++)
+        if (!open_finite(&m->open[k])) return "impacts/open";
+    return all_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL : "impacts/panels";
+}
+
+/// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are constants, too.
+static bool same_constants(const bt_params *now, const bt_params *then, bool steady)
+{
+    const bool fluid = now->water_u == then->water_u && now->water_v == then->water_v && now->air_u == then->air_u && now->air_v == then->air_v &&
+                       now->balance_u == then->balance_u && now->balance_v == then->balance_v && now->tilt_ax == then->tilt_ax && now->tilt_ay == then->tilt_ay;
+    return (fluid || !steady) && now->dt == then->dt && now->x0 == then->x0 && now->y0 == then->y0 && now->period_x == then->period_x && now->period_y == then->period_y &&
+           now->tolerance == then->tolerance && now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
+}
+
+bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
+{
+    const bt_params made = w->par;
+    if (!s->path) s->path = "checkpoint";
+    bt_snapshot_take_rows(s, "world", world_rows, N_OF(world_rows), w);
+    const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
+    bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
+    load_bodies(w, s);
+    bt_snapshot_take_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
+    if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
+    if (w->impacts && c->rank == 0) {
+        free(w->impacts->open);
+        w->impacts->open = bt_snapshot_copy(s, "impacts/open", BT_ITEM_F64, OPEN_WIDTH, &w->impacts->n_open);
+    }
+    bt_events_free(&w->events);
+    w->events.n = -1;
+    w->events.event = load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
+    w->events.cap = w->events.n;
+    int64_t n = -1;
+    bt_trace *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
+    if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
+    bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
+    if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
+        bt_errors_add(err, "%s: the case it holds makes other constants of the step now; it was written by another version of the program: go on with that one", s->path);
+        status = BT_ERR_CASE;
+    }
+    if (status != BT_OK) {
+        free(trace);
+        return status;
+    }
+    bt_domain_create(w, c);
+    bt_tiles_restore(w, trace, n);
+    if (bt_world_hash(w) == hash) return BT_OK;
+    bt_errors_add(err, "%s: the state that was read does not have the hash it was saved with, %016" PRIx64 "; go on with the program that wrote it", s->path, hash);
+    return BT_ERR_NUMERIC;
+}
+
+// --- the field -------------------------------------------------------------------------------------------------------
+
+void bt_state_save_field(const bt_field *f, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "field", field_rows, N_OF(field_rows), f);
+    bt_snapshot_add_rows(s, "map", map_rows, N_OF(map_rows), f);
+    bt_snapshot_add_text(s, "map/crs", f->outlines.crs);
+    bt_snapshot_add_text(s, "map/nearly", f->outlines.nearly);
+    bt_snapshot_add(s, "field/offsets", BT_ITEM_I64, f->n + 1, 1, f->offsets);
+    bt_snapshot_add(s, "field/vertices", BT_ITEM_F64, f->offsets[f->n], 2, f->vertices);
+    bt_snapshot_add(s, "field/pose", BT_ITEM_F64, f->n, 3, f->pose);
+    bt_snapshot_add(s, "field/thickness", BT_ITEM_F64, f->n, 1, f->thickness);
+    bt_snapshot_add(s, "field/area", BT_ITEM_F64, f->n, 1, f->area);
+}
+
+void bt_state_load_field(bt_field *f, bt_snapshot *s)
+{
+    bt_field_free(f);
+    bt_field_init(f);
+    int64_t n = 0, n_vertices = 0;
+    bt_snapshot_take_rows(s, "field", field_rows, N_OF(field_rows), f);
+    if (bt_snapshot_find(s, "map/crs")) {
+        bt_snapshot_take_rows(s, "map", map_rows, N_OF(map_rows), f);
+        snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", bt_snapshot_text(s, "map/crs"));
+        snprintf(f->outlines.nearly, sizeof f->outlines.nearly, "%s", bt_snapshot_text(s, "map/nearly"));
+    } else {
+        f->outlines.east = f->outlines.north = NAN;
+        if (f->outlines.read)
+            snprintf(f->outlines.crs, sizeof f->outlines.crs, "%s", isnan(f->outlines.lon) ? "local" : "OGC:CRS84");
+    }
+    free(f->offsets);
+    f->offsets = bt_snapshot_copy(s, "field/offsets", BT_ITEM_I64, 1, &n);
+    f->vertices = bt_snapshot_copy(s, "field/vertices", BT_ITEM_F64, 2, &n_vertices);
+    double **const arrays[] = {&f->pose, &f->thickness, &f->area};
+    static const char *const names[] = {"field/pose", "field/thickness", "field/area"};
+    for (int k = 0; k < 3; k++) {
+        int64_t rows = 0;
+        *arrays[k] = bt_snapshot_copy(s, names[k], BT_ITEM_F64, k == 0 ? 3 : 1, &rows);
+        bt_snapshot_want(s, rows == n - 1, names[k], -1, "has not a row for each floe");
+    }
+    if (!s->faulty) f->n = f->cap = (bt_idx)(n - 1);
+    f->cap_vertices = n_vertices;
+    bt_state_check_field(f, n, n_vertices, s);
+    if (!s->faulty) return;
+    bt_field_free(f); // nothing of it is to be trusted
+    bt_field_init(f);
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// The state of a world as named arrays; what belongs to it, and what does not, is listed in bergtow/checkpoint.h.
+#ifndef BT_STATE_H
+#define BT_STATE_H
+
+#include "bergtow/field.h"
+#include "field/lead.h"
+#include "output/stall.h"
+#include "bergtow/world.h"
+#include "base/snapshot.h"
+
+/// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors: BT_ERR_NUMERIC (bodies lost).
+bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
+
+/// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every rank; it is dealt to the ranks
+/// here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of another version), BT_ERR_NUMERIC (the state does not have
+/// the hash it was saved with).
+bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
+
+/// The first number of world, step, tow, window and collisions that is none, by its name in a checkpoint ("tow/vessel_vx"); NULL = all are numbers.
+/// Those of the bodies are not looked at.
+const char *bt_state_not_finite(const bt_world *w, char name[64]);
+
+/// The ice field at time zero; on rank 0.
+void bt_state_save_field(const bt_field *f, bt_snapshot *s);
+void bt_state_load_field(bt_field *f, bt_snapshot *s);
+
+/// Structs of the run beside the world, by their tables.
+void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s);
+void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s);
+void bt_state_save_stall(const bt_stall *t, bt_snapshot *s);
+void bt_state_load_stall(bt_stall *t, bt_snapshot *s);
+
+#endif

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+// One window of a run for all its reported series, and a verdict on whether their means are those of a steady tow.
+//
+//     | ramp |  start-up  |  window: means, intervals, percentiles, peaks  |
+//     0    earliest     start                                             end
+//
+// Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that MSER-5 finds, and of these the
+// latest: the ice resistance may be steady long before the tension of the line is.
+// Verdict:
+//     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within the window, or the contacts
+//                  were not solved: the mean is that of this stretch of time, and says nothing of a longer tow
+//     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load
+//     steady       none of these was found
+#ifndef BT_STEADY_H
+#define BT_STEADY_H
+
+#include "bergtow/stats.h"
+#include "base/history.h"
+
+#define BT_STEADY_INDEPENDENT 20    ///< below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
+#define BT_STEADY_MATERIAL 0.02     ///< change over the window / mean below which a trend does not matter, assumed
+#define BT_STEADY_UNCONVERGED 0.01  ///< largest share of unconverged steps in the window, assumed
+#define BT_STEADY_RESIDUAL 0.1      ///< largest residual of a step in the window / reference speed, assumed
+#define BT_STEADY_STALLED 0.05      ///< largest share of the run in which the body stood still, assumed
+#define BT_STEADY_MISSED 0.05       ///< largest share of the places ahead of a moving window that stayed empty, assumed
+
+typedef enum bt_verdict { BT_STEADY, BT_NOT_STEADY, BT_TOO_SHORT } bt_verdict;
+
+/// "steady", "not steady", "too short".
+extern const char *const bt_verdict_names[];
+
+/// Series whose means are reported.
+typedef enum bt_reported_series {
+    BT_REPORTED_ICE, BT_REPORTED_TOW, BT_REPORTED_DRAG, BT_REPORTED_TENSION_1, BT_REPORTED_TENSION_2, BT_REPORTED_THRUST, BT_N_REPORTED
+} bt_reported_series;
+
+/// A series whose mean is reported, over the window.
+typedef struct bt_reported {
+    const char *name, *key; ///< in a sentence; in summary.json
+    bool present;           ///< the run has it
+    bt_mean mean;           ///< N
+    bt_trend trend;         ///< N
+    double quarter[4];      ///< means of the window's quarters, N
+    double peak;            ///< largest step mean in the window, N
+    double start_peak;      ///< largest before it, N; NaN without a step there
+} bt_reported;
+
+typedef struct bt_steady {
+    bt_verdict verdict;
+    char reason[1200];            ///< of a verdict other than steady, else empty
+    double earliest, start, end;  ///< s; start and end NaN without a window
+    double correlation_time;      ///< of the ice resistance, s
+    double unconverged;           ///< share of the steps in the window that did not converge
+    double residual;              ///< largest of them, m/s
+    bool given;                   ///< by output.window_start, not found
+    int64_t first, n;             ///< steps
+    int64_t put_off;              ///< steps from the earliest possible start to the first
+    bt_reported series[BT_N_REPORTED];
+} bt_steady;
+
+/// The window of a run with a towed body.
+void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t);
+
+#endif

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// The numbers of a whole run: reduced over one window (steady.h), with a warning for each doubt.
+//
+// Forces are means over a step, F = impulse / Δt. Over the steady window:
+//     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
+//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
+// and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
+#include "output/summary.h"
+#include "case/arch.h"
+#include "case/case_check.h"
+#include "estimate/packing.h"
+#include "output/summary_window.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CLOSURE_LIMIT 1e-6
+#define MOMENTUM_LIMIT 1e-9
+/// Overlap above this fraction of the mean floe size is told.
+#define OVERLAP_LIMIT 0.01
+/// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other part sideways.
+#define CRUSH_LIMIT 0.3
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/// Percentile by linear interpolation between order statistics (numpy's default) of sorted x[n].
+static double percentile(const double *x, int64_t n, double percent)
+{
+    if (n < 1) return NAN;
+    const double at = percent / 100 * (double)(n - 1);
+    const int64_t i = (int64_t)at, next = i + 1 < n ? i + 1 : i;
+    return x[i] + (at - (double)i) * (x[next] - x[i]);
+}
+
+static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k) { return bt_stats_mean(h->column[k] + s->window.first, s->window.n); }
+
+static void reduce_window(bt_summary *s, const bt_history *h)
+{
+    const int64_t n = s->window.n;
+    s->ice = s->window.series[BT_REPORTED_ICE].mean;
+    s->tow = s->window.series[BT_REPORTED_TOW].mean;
+    s->drag = mean_over(s, h, BT_COL_DRAG);
+    s->coriolis = mean_over(s, h, BT_COL_CORIOLIS);
+    s->tilt = mean_over(s, h, BT_COL_TILT);
+    s->inertia = mean_over(s, h, BT_COL_INERTIA);
+    s->budget = mean_over(s, h, BT_COL_BUDGET);
+
+    double *sorted = bt_alloc((size_t)n, sizeof *sorted);
+    if (n > 0) memcpy(sorted, h->column[BT_COL_ICE] + s->window.first, (size_t)n * sizeof *sorted);
+    qsort(sorted, (size_t)n, sizeof *sorted, ascending);
+    s->p95 = percentile(sorted, n, 95);
+    s->p99 = percentile(sorted, n, 99);
+    s->peak = percentile(sorted, n, 100);
+    free(sorted);
+
+    double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
+    largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
+    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean - s->inertia.mean;
+    s->closure = s->ice.mean - s->balance;
+    s->closure_relative = largest > 0 ? s->closure / largest : s->closure == 0 ? 0 : NAN;
+    const double other = s->ice.mean - s->budget.mean;
+    s->budget_closure_relative = largest > 0 ? other / largest : other == 0 ? 0 : NAN;
+    if (n == 0) return;
+
+    if (fabs(s->closure_relative) > CLOSURE_LIMIT)
+        bt_errors_add(&s->warnings, "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the largest of them; "
+                      "the momentum balance of the towed body does not close", fabs(s->closure_relative));
+    if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
+        bt_errors_add(&s->warnings, "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
+                      "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
+}
+
+/// A line that broke changes what the means stand for.
+static void warn_of_events(bt_summary *s, const bt_events *e)
+{
+    for (int64_t i = 0; e && i < e->n; i++) {
+        if (e->event[i].kind != BT_EVENT_LINE_BROKEN && e->event[i].kind != BT_EVENT_ADRIFT) continue;
+        char text[160];
+        bt_event_describe(&e->event[i], text);
+        bt_errors_add(&s->warnings, "at %g s %s", e->event[i].time, text);
+    }
+}
+
+/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start, its width and its length.
+static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals *t)
+{
+    if (s->window.verdict != BT_STEADY) bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
+    bt_case_warn_start(c, &s->warnings);
+    const bt_arch arch = bt_arch_of(c, t->concentration, t->mean_size);
+    bt_arch_warn(&arch, &s->warnings);
+    const bt_packing packing = bt_packing_of(c, t->concentration);
+    bt_packing_warn(&packing, s->sim_time, &s->warnings); // where its window ends, too
+}
+
+void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
+                     bool body)
+{
+    const double nan = NAN;
+    *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
+    if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
+
+    const bt_mean none = bt_stats_mean(NULL, 0);
+    s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
+    s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
+    s->window.start = s->window.end = s->window.correlation_time = nan;
+    if (body) {
+        bt_steady_find(&s->window, h, c, t);
+        reduce_window(s, h);
+        warn_of_window(s, c, t);
+        s->reference_ratio = s->ice.mean / c->reference.mean_force;
+        bt_estimate_conditions(c, &s->estimate);
+        s->estimate.concentration = t->concentration;
+        if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
+        if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;
+    }
+
+    s->contacts = h->n ? h->sum_contacts / (double)h->n : nan;
+    s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
+    s->updates = h->n ? h->sum_updates / (double)h->n : nan;
+    s->moves = h->n ? h->sum_moves / (double)h->n : nan;
+    s->ns_per_floe_step = n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
+
+    if (c->solver.turn_rows != BT_TURN_ROWS) bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
+    if (h->unconverged)
+        bt_errors_add(&s->warnings, "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
+                      "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",
+                      (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance);
+    if (h->outrun)
+        bt_errors_add(&s->warnings, "in %lld of %lld steps, mostly unconverged ones, a floe moved farther than the contact detection looks "
+                      "ahead: a contact may have been met a step late, as overlap; lower run.dt", (long long)h->outrun, (long long)h->n);
+    if (h->restitution_cut)
+        bt_errors_add(&s->warnings, "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
+                      (long long)h->restitution_cut, (long long)h->n);
+    if (h->positive_work)
+        bt_errors_add(&s->warnings, "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
+                      (long long)h->positive_work, (long long)h->n);
+    if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
+        bt_errors_add(&s->warnings, "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
+                      "solver.position_sweeps", h->max_overlap, 100 * h->max_overlap / t->mean_size);
+    if (!(h->max_crushed_depth <= CRUSH_LIMIT * t->mean_size))
+        bt_errors_add(&s->warnings, "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they were, "
+                      "which is no model of that", h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
+    if (t->stall.windows)
+        bt_errors_add(&s->warnings, "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a path of a "
+                      "mean floe size: a jam%s", t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
+                      c->ice.crushing_pressure > 0 ? "" : "; rigid contact has no largest force: consider ice.crushing.pressure");
+    if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
+        bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
+                      h->max_momentum_residual);
+    bt_outline_warn(&t->outlines, c, &s->warnings);
+    warn_of_events(s, t->events);
+    bt_summary_window_warn(&s->warnings, t->window);
+    if (t->floes_outside)
+        bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
+                      "matters", (long long)t->floes_outside);
+}
+
+void bt_summary_free(bt_summary *s)
+{
+    bt_errors_free(&s->warnings);
+    *s = (bt_summary){0};
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT
+// The numbers of a whole run: reduced over one window, written as JSON and as a table.
+#ifndef BT_SUMMARY_H
+#define BT_SUMMARY_H
+
+#include "bergtow/estimate.h"
+#include "output/record.h"
+#include "bergtow/stats.h"
+#include "output/steady.h"
+
+typedef struct bt_summary {
+    bool body;                        ///< there is a towed body: the forces have a meaning
+    double sim_time;                  ///< s
+    bt_steady window;
+    bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
+    double p95, p99, peak;            ///< N, of the step means of the ice resistance
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
+    double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
+    double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
+    double contacts, sweeps, updates, moves; ///< means over all steps
+    double ns_per_floe_step;
+    bt_estimate_input estimate;       ///< conditions of the estimates: the case's, with the ice as made
+    double reference_ratio;           ///< mean ice / measured mean, NaN without a reference
+    const struct bt_impact_count *impacts; ///< collisions over the window, NULL = none told apart
+    bt_errors warnings;
+} bt_summary;
+
+void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
+                     bool body);
+/// summary.json as text; the caller frees it.
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+/// A force with a prefix that keeps three digits before the point; returns out.
+const char *bt_force_text(char out[32], double newton);
+void bt_summary_free(bt_summary *s);
+
+#endif

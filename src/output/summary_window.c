@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// What the moving window did, and when its ice is not that of a long domain.
+#include "output/summary_window.h"
+
+#include <stdio.h>
+
+#define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is told
+
+void bt_summary_window_json(bt_json *j, const bt_window *v)
+{
+    if (!v) {
+        bt_json_string(j, "moving_window", NULL);
+        return;
+    }
+    static const char *const dropped[] = {"dropped_momentum_x_n_s", "dropped_momentum_y_n_s", "dropped_energy_j"};
+    static const char *const brought[] = {"brought_momentum_x_n_s", "brought_momentum_y_n_s", "brought_energy_j"};
+    bt_json_open(j, "moving_window", '{');
+    bt_json_number(j, "length_m", v->length);
+    bt_json_number(j, "ahead_m", v->ahead);
+    bt_json_number(j, "x_m", bt_window_low(v));
+    bt_json_number(j, "laps", bt_window_laps(v));
+    bt_json_int(j, "renewed", v->renewed);
+    bt_json_int(j, "waiting", v->waiting);
+    bt_json_int(j, "kept", v->kept);
+    bt_json_int(j, "missed", v->missed);
+    bt_json_number(j, "ice_drift_x_m", v->drift_x);
+    bt_json_number(j, "ice_drift_y_m", v->drift_y);
+    for (int k = 0; k < 3; k++) bt_json_number(j, dropped[k], v->dropped[k]);
+    for (int k = 0; k < 3; k++) bt_json_number(j, brought[k], v->brought[k]);
+    bt_json_close(j, '}');
+}
+
+void bt_summary_window_print(const bt_window *v)
+{
+    if (!v) return;
+    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept, %lld places missed, %lld floes wait\n",
+           bt_window_laps(v), (long long)v->renewed, (long long)v->kept, (long long)v->missed, (long long)v->waiting);
+}
+
+void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
+{
+    if (!v) return;
+    const double laps = bt_window_laps(v), places = (double)(v->renewed + v->missed), floes = (double)(v->renewed + v->kept);
+    if (laps > 1)
+        bt_errors_add(warnings, "the moving window has gone %.2f times its length: the body meets the same field again after "
+                      "each, with the hole in which it stood at time zero; samples a length apart are not independent, and the standard "
+                      "error may be too small; take a longer domain, or several values of ice.seed", laps);
+    if (places > 0 && (double)v->missed > SHARE_LIMIT * places)
+        bt_errors_add(warnings, "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
+                      "along, or pushes them far ahead; the ice that it meets is thinner by that; take a longer domain",
+                      100 * (double)v->missed / places);
+    if (floes > 0 && (double)v->kept > SHARE_LIMIT * floes)
+        bt_errors_add(warnings, "%.1f %% of the floes behind the moving window came back ahead as they were, their places not being "
+                      "free: disturbed ice enters; take a longer domain, and more of it behind the body",
+                      100 * (double)v->kept / floes);
+}

@@ -1,0 +1,549 @@
+// SPDX-License-Identifier: MIT
+// The members of a study, dealt to groups of ranks; reasons in bergtow/ensemble.h.
+#include "bergtow/ensemble.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "bergtow/checkpoint.h"
+#include "bergtow/run.h"
+#include "case/cost.h"
+#include "run/ensemble_member.h"
+#include "run/ensemble_record.h"
+#include "base/fileio.h"
+#include "base/json.h"
+
+// Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
+#define GATHER_SECONDS 1.0
+#define GATHER_SHARE 0.05
+enum { MOST_TOLD = 10 };    // failed members that are told one by one
+
+typedef struct {
+    bt_member m;
+    int64_t index; ///< among the members of the study
+    char *folder;
+    double cost;   ///< estimated, s of one core
+    bool settled;  ///< finished or failed, as far as this process knows
+    int attempts;  ///< starts without an end
+} entry;
+
+typedef struct {
+    const bt_comm *world, *group;
+    const bt_study *s;
+    const bt_ensemble_options *o;
+    entry *list;        ///< [n] in the order in which they are taken
+    int64_t n, before;  ///< members; settled when this call began
+    double cost_before; ///< of those
+    int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
+    int alone;          ///< descriptor held by the one group that may work on members that look hopeless, −1 = not this one
+    int64_t lost;       ///< members whose failure could not be recorded
+    bt_member_records records;
+    double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
+    bt_errors *err;
+} ensemble;
+
+// A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
+static volatile sig_atomic_t told;
+static void on_signal(int number) { told = number; }
+static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
+enum { N_CAUGHT = sizeof caught / sizeof *caught };
+
+/// One line of the journal, in one write: lines of several processes do not mix.
+static void journal(const ensemble *e, const char *event, const bt_member *m, double wall, int code)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_REALTIME, &now);
+    char line[256];
+    const int n = snprintf(line, sizeof line, "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": %.3f, \"exit_code\": %d}\n",
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), wall, code);
+    const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
+    if (fd < 0) return;
+    if (write(fd, line, (size_t)n) == n) fsync(fd);
+    close(fd);
+}
+
+// --- the list --------------------------------------------------------------------------------------------------------
+
+static bool suspect(const entry *x) { return x->attempts >= BT_SUSPECT_ATTEMPTS; }
+
+static int by_cost(const void *a, const void *b)
+{
+    const entry *p = a, *q = b;
+    const int doubt[2] = {(p->attempts > 0) + suspect(p), (q->attempts > 0) + suspect(q)};
+    if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // those whose process died come last
+    if (p->cost != q->cost) return p->cost > q->cost ? -1 : 1;
+    return strcmp(p->m.name, q->m.name);
+}
+
+static void look(entry *x)
+{
+    if (!x->settled) x->settled = bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_WAITING;
+}
+
+// --- soundness -------------------------------------------------------------------------------------------------------
+
+enum { SOUND, DAMAGED, UNREADABLE };
+
+/// Check a member that says it has finished. What is damaged is taken away, unless somebody is at it already.
+static int check_member(ensemble *e, entry *x, bt_errors *told_of)
+{
+    bt_errors why = {0};
+    bt_status status = bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &why);
+    if (status == BT_ERR_CASE) {
+        const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
+        bt_errors again = {0};
+        if (fd < 0 || !bt_member_take_lock(fd, false) || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+            bt_errors_free(&why); // another process has found it out, too
+        } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
+            bt_errors_free(&why); // and made it good meanwhile
+            status = BT_OK;
+        } else {
+            status = bt_member_record_forget(x->folder, &why) == BT_OK ? BT_ERR_CASE : BT_ERR_IO;
+            journal(e, "unsound", &x->m, 0, (int)status);
+        }
+        bt_errors_free(&again);
+        if (fd >= 0) close(fd);
+    }
+    for (size_t k = 0; k < why.n && k < 1; k++)
+        bt_errors_add(told_of, "warning: member %s is not sound%s: %s%s", x->m.name, status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k], why.n > 1 ? ", ..." : "");
+    bt_errors_free(&why);
+    return status == BT_OK ? SOUND : status == BT_ERR_CASE ? DAMAGED : UNREADABLE;
+}
+
+static void print_warnings(bt_errors *list)
+{
+    const size_t more = list->n > MOST_TOLD ? list->n - MOST_TOLD : 0;
+    for (size_t k = 0; k < list->n - more; k++) fprintf(stderr, "bergtow: %s\n", list->text[k]);
+    if (more) fprintf(stderr, "bergtow: warning: and %zu more members that are not sound; see journal.jsonl\n", more);
+}
+
+/// Collective. Each rank makes what it knows of sound files known to the others, so that none reads them again.
+static void share_records(ensemble *e)
+{
+    bt_comm_reduce(e->world, NULL, 0, NULL, 0, e->records.seen, (int)e->records.n);
+}
+
+/// Collective. Every finished member is read once, by one of the ranks; the list is still in the order of the study.
+static void check_members(ensemble *e)
+{
+    enum { PER_WORD = 32 }; // two bits each
+    const int n = (int)(e->n / PER_WORD + 1);
+    uint64_t *found = bt_alloc((size_t)n, sizeof *found);
+    memset(found, 0, (size_t)n * sizeof *found);
+    bt_errors told_of = {0};
+    for (int64_t i = e->world->rank; i < e->n; i += e->world->size) {
+        entry *x = &e->list[i];
+        if (bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
+        found[i / PER_WORD] |= (uint64_t)check_member(e, x, &told_of) << 2 * (i % PER_WORD);
+    }
+    bt_comm_reduce(e->world, NULL, 0, NULL, 0, found, n);
+    share_records(e);
+    for (int64_t i = 0; i < e->n; i++) {
+        const int how = (int)(found[i / PER_WORD] >> 2 * (i % PER_WORD) & 3);
+        if (how == DAMAGED) e->list[i].settled = false;
+        if (how == UNREADABLE) e->list[i].settled = true; // nothing can be done about it here
+    }
+    bt_comm_errors(e->world, &told_of);
+    if (e->world->rank == 0) print_warnings(&told_of);
+    bt_errors_free(&told_of);
+    free(found);
+}
+
+/// Collective.
+static void make_list(ensemble *e)
+{
+    e->n = bt_study_n_members(e->s);
+    e->list = bt_alloc((size_t)e->n, sizeof *e->list);
+    double cost = 0;
+    int64_t priced = -1;
+    for (int64_t i = 0; i < e->n; i++) {
+        entry *x = &e->list[i];
+        x->index = i;
+        bt_study_member(e->s, i, &x->m);
+        if (asprintf(&x->folder, "%s/members/%s", e->o->dir, x->m.name) < 0) abort();
+        if (x->m.condition != priced) { // fields of one condition cost the same; a case that cannot be read fails when its turn comes
+            bt_case c;
+            bt_errors unheard = {0};
+            priced = x->m.condition;
+            cost = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
+            bt_case_free(&c);
+            bt_errors_free(&unheard);
+        }
+        x->cost = cost;
+        x->attempts = bt_member_attempts(x->folder);
+        look(x);
+    }
+    check_members(e);
+    for (int64_t i = 0; i < e->n; i++) {
+        if (!e->list[i].settled) continue;
+        e->before++;
+        e->cost_before += e->list[i].cost;
+    }
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_cost);
+}
+
+/// Folder, resolved study; refuses a folder of another study. On rank 0.
+static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+{
+    char *text = bt_study_resolved(s, err);
+    if (!text) return BT_ERR_CASE;
+    char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"), *copy = bt_file_join(o->dir, "study.yml");
+    bt_status status = bt_file_make_dir(members, err);
+    const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
+    if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
+    if (status == BT_OK && access(path, F_OK) == 0) {
+        char *before;
+        size_t size;
+        status = bt_file_read(path, "a study", &before, &size, err);
+        if (status == BT_OK && strcmp(before, text)) {
+            bt_errors_add(err, "%s: holds the members of another study (see %s): only `repeats` may change; give another folder with -o, or restore the study and its base case", o->dir, path);
+            status = BT_ERR_CASE;
+        }
+        free(before);
+    } else if (status == BT_OK) {
+        status = bt_file_write(path, text, err);
+    }
+    if (status == BT_OK) status = bt_file_write(copy, s->text, err);
+    if (fd >= 0) close(fd);
+    free(members);
+    free(path);
+    free(copy);
+    free(text);
+    return status;
+}
+
+// --- dealing ---------------------------------------------------------------------------------------------------------
+
+static void say(const ensemble *e, const entry *x, bt_status status, double wall)
+{
+    if (e->o->quiet) return;
+    int64_t done = 0;
+    double cost = 0, all = 0;
+    for (int64_t i = 0; i < e->n; i++) {
+        look(&e->list[i]);
+        all += e->list[i].cost;
+        if (!e->list[i].settled) continue;
+        done++;
+        cost += e->list[i].cost;
+    }
+    const double passed = bt_clock() - e->began, spent = cost - e->cost_before, left = spent > 0 ? passed * (all - cost) / spent : NAN;
+    char line[512];
+    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name, status == BT_OK ? "finished" : "FAILED", wall);
+    for (int p = 0; p < e->s->n_parameters && n < 400; p++) n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
+    if (isfinite(left) && done < e->n) snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left", left < 120 ? left : left / 60);
+    printf("%s\n", line);
+    fflush(stdout);
+}
+
+/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is told of at the end, and is tried again by the next call.
+static void settle_failed(ensemble *e, entry *x, bt_status status, const bt_errors *why)
+{
+    bt_errors unrecorded = {0};
+    x->settled = true;
+    if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < MOST_TOLD)
+        bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again", x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
+    bt_errors_free(&unrecorded);
+}
+
+/// A suspect that is run beside another member takes that with it when it ends the program, and again at every call, until both are given up.
+/// So one at a time is run, once nothing else is left to begin.
+static bool may_take_suspects(ensemble *e)
+{
+    if (e->alone >= 0) return true;
+    const int fd = bt_member_open(e->o->dir, "suspects.lock", O_RDWR | O_CREAT);
+    if (fd < 0) return true; // better than never
+    if (bt_member_take_lock(fd, false)) e->alone = fd;
+    else close(fd);
+    return e->alone >= 0;
+}
+
+/// Make the folder of a member and take its lock; −1: somebody is at it, or it has failed by that.
+static int lock_member(ensemble *e, entry *x)
+{
+    bt_errors why = {0};
+    bt_status status = bt_file_make_dir(x->folder, &why);
+    const int fd = status == BT_OK ? bt_member_open(x->folder, "lock", O_RDWR | O_CREAT) : -1;
+    if (status == BT_OK && fd < 0) status = bt_file_fail(x->folder, "make a lock in the folder", errno, &why);
+    if (status != BT_OK) {
+        settle_failed(e, x, status, &why);
+        journal(e, "failed", &x->m, 0, (int)status);
+        say(e, x, status, 0);
+    }
+    bt_errors_free(&why);
+    if (fd < 0 || bt_member_take_lock(fd, false)) return fd;
+    close(fd);
+    return -1;
+}
+
+/// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
+static int64_t claim(ensemble *e)
+{
+    for (int64_t i = 0; i < e->n; i++) {
+        entry *x = &e->list[i];
+        look(x);
+        if (x->settled || (suspect(x) && !may_take_suspects(e))) continue;
+        const int fd = lock_member(e, x);
+        if (fd < 0) continue;
+        look(x); // it may have been finished between the look and the lock
+        if (x->settled) {
+            close(fd);
+            continue;
+        }
+        e->lock = fd;
+        return i;
+    }
+    return -1;
+}
+
+/// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts anew.
+static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_run_options *o, bt_errors *why)
+{
+    int kept = group->rank == 0 && bt_checkpoint_there(o->dir);
+    bt_comm_bcast(group, &kept, sizeof kept);
+    if (kept) {
+        const bt_status status = bt_run_resume(group, o, why);
+        if (status != BT_ERR_CASE) return status;
+        bt_errors_free(why);
+    }
+    return bt_run(group, c, o, why);
+}
+
+/// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as errors, which are told at the end.
+static bt_status gather(ensemble *e, bool wait)
+{
+    bt_status status = BT_OK;
+    bt_errors unheard = {0};
+    const double t0 = bt_clock();
+    const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
+    if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
+    else if (fd >= 0 && bt_member_take_lock(fd, wait)) status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
+    if (fd >= 0) close(fd);
+    bt_errors_free(&unheard);
+    e->gathered = bt_clock();
+    e->gathering = e->gathered - t0;
+    return status;
+}
+
+static bt_status run_member(ensemble *e, entry *x)
+{
+    const bool first = e->group->rank == 0;
+    const double t0 = bt_clock();
+    bt_errors why = {0};
+    bt_status status = BT_OK;
+    if (first && x->attempts >= BT_MAX_ATTEMPTS) {
+        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name, x->attempts);
+        status = BT_ERR_NUMERIC;
+    }
+    if (first) {
+        if (x->attempts == 0) bt_member_forget_attempts(x->folder);
+        if (x->attempts < BT_MAX_ATTEMPTS) bt_member_note_attempt(x->folder);
+        if (x->attempts > 0) gather(e, false); // its process may die again, and the file should say so
+        journal(e, "start", &x->m, 0, 0);
+    }
+    status = bt_comm_agree(e->group, status);
+    if (status == BT_OK) {
+        bt_case c;
+        status = bt_member_case(e->s, &x->m, &c, &why);
+        status = bt_comm_agree(e->group, status);
+        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
+        if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
+        bt_case_free(&c);
+    }
+    bt_comm_errors(e->group, &why);
+    if (first) {
+        const double wall = bt_clock() - t0;
+        bt_member_forget_attempts(x->folder);
+        if (status == BT_OK) {
+            status = bt_member_record_write(&e->records, x->index, x->m.name, x->folder, &why);
+            if (status == BT_OK) bt_checkpoint_remove(x->folder);
+        }
+        if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
+        journal(e, status == BT_OK ? "finished" : status == BT_ERR_SIGNAL ? "stopped" : "failed", &x->m, wall, (int)status);
+        if (status != BT_ERR_SIGNAL) say(e, x, status, wall);
+    }
+    bt_errors_free(&why);
+    return status;
+}
+
+static bt_status work(ensemble *e)
+{
+    for (;;) {
+        const bool stop = bt_comm_any(e->group, told != 0);
+        if (stop) return BT_ERR_SIGNAL;
+        int64_t i = e->group->rank == 0 ? claim(e) : 0;
+        bt_comm_bcast(e->group, &i, sizeof i);
+        if (i == -1) return e->lost > 0 ? BT_ERR_IO : BT_OK;
+        const bt_status status = run_member(e, &e->list[i]);
+        if (e->group->rank == 0) {
+            close(e->lock);
+            if (status != BT_ERR_SIGNAL && bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE)) gather(e, false);
+        }
+        if (status == BT_ERR_SIGNAL) return status;
+    }
+}
+
+typedef struct {
+    int64_t finished, failed, left, at_work, unsound;
+} counts;
+
+/// One member's part in the end: counted, and told where it is a hole.
+static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *err)
+{
+    int code;
+    char *why;
+    bt_errors damage = {0};
+    bt_status status = BT_OK;
+    const bt_member_state state = bt_ensemble_state(x->folder, &code, &why);
+    const bt_status sound = state == BT_MEMBER_FINISHED ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage) : BT_OK;
+    if (sound != BT_OK) {
+        if (n->unsound++ < MOST_TOLD) bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0], sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
+        status = BT_ERR_IO;
+    } else if (state == BT_MEMBER_FINISHED) {
+        n->finished++;
+        if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
+    } else if (state == BT_MEMBER_FAILED) {
+        if (why) why[strcspn(why, "\n")] = 0;
+        if (n->failed++ < MOST_TOLD) bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
+        status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
+    } else {
+        n->left++;
+        n->at_work += bt_member_held(x->folder);
+    }
+    free(why);
+    bt_errors_free(&damage);
+    return status;
+}
+
+static int by_index(const void *a, const void *b) { return ((const entry *)a)->index < ((const entry *)b)->index ? -1 : 1; }
+
+/// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no hole.
+static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
+{
+    counts n = {0};
+    bt_status worst = status;
+    qsort(e->list, (size_t)e->n, sizeof *e->list, by_index);
+    for (int64_t i = 0; i < e->n; i++) {
+        const bt_status of = tell_member(e, &e->list[i], &n, err);
+        if (worst == BT_OK) worst = of;
+    }
+    if (n.failed > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_TOLD, e->o->dir);
+    if (n.unsound > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
+    if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", n.left);
+    else if (n.at_work) bt_errors_add(err, "%" PRId64 " members are being worked on by other processes; the same call takes them in when those have ended", n.at_work);
+    else if (n.left && worst == BT_OK) bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
+    if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
+    if (!e->o->quiet) {
+        printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
+        if (n.unsound) printf(", %" PRId64 " not sound", n.unsound);
+        printf("; %s/ensemble.h5\n", e->o->dir);
+    }
+    return worst;
+}
+
+/// Failed members that are to be tried again.
+static void forget_failures(const ensemble *e)
+{
+    for (int64_t i = 0; i < e->n; i++) {
+        bt_member_forget_failure(e->list[i].folder);
+        e->list[i].settled = false;
+    }
+}
+
+/// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or die. told_of: that has been said.
+static bool wait_for_others(ensemble *e, bool told_of)
+{
+    int64_t n = 0;
+    for (int64_t i = 0; e->world->rank == 0 && i < e->n; i++) {
+        look(&e->list[i]);
+        n += !e->list[i].settled;
+    }
+    bt_comm_bcast(e->world, &n, sizeof n);
+    if (n == 0) return false;
+    if (!told_of && !e->o->quiet && e->world->rank == 0) {
+        printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
+        fflush(stdout);
+    }
+    nanosleep(&(struct timespec){.tv_nsec = 500000000}, NULL);
+    return true;
+}
+
+/// As for a run of the base case.
+static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads, bt_errors *err)
+{
+    bt_case c;
+    const bt_status status = bt_study_base_case(s, &c, err);
+    if (status == BT_OK) *threads = bt_run_threads(comm, &c, o->threads);
+    bt_case_free(&c);
+    return status;
+}
+
+bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
+{
+    bt_status status = BT_OK;
+    if (s->ranks > comm->size) {
+        bt_errors_add(err, "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it", s->path, s->ranks, comm->size);
+        status = BT_ERR_CASE;
+    }
+    bt_member_records records = {0};
+    int threads = 1;
+    if (status == BT_OK) status = choose_threads(comm, s, o, &threads, err);
+    if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
+    if (status == BT_OK) status = bt_member_records_begin(&records, s, err);
+    status = bt_comm_agree(comm, status);
+    if (status != BT_OK) {
+        bt_member_records_end(&records);
+        return status;
+    }
+
+    bt_comm group;
+    bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
+    const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
+    ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks, .alone = -1};
+    e.threads = threads;
+    e.records = records;
+    make_list(&e);
+    if (o->retry && comm->rank == 0) forget_failures(&e);
+    if (o->retry) bt_comm_rest(comm);
+    if (o->retry) for (int64_t i = 0; i < e.n; i++) e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
+    if (comm->rank == 0 && !o->quiet) {
+        printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64 " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
+               e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
+        fflush(stdout);
+    }
+    if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
+    struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal};
+    sigemptyset(&act.sa_mask);
+    told = 0;
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
+    bool others = false;
+    do {
+        if (!idle) status = work(&e);
+        bt_comm_rest(comm);
+        status = bt_comm_agree(comm, status);
+        others = status == BT_OK && !o->leave && wait_for_others(&e, others);
+    } while (others);
+    for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
+    if (e.alone >= 0) close(e.alone);
+    share_records(&e);
+    if (comm->rank == 0) {
+        const bt_status gathered = gather(&e, true);
+        status = tell_end(&e, status, err);
+        if (status == BT_OK) status = gathered;
+    }
+    bt_comm_split_end(&group);
+    for (int64_t i = 0; i < e.n; i++) {
+        bt_member_free(&e.list[i].m);
+        free(e.list[i].folder);
+    }
+    free(e.list);
+    bt_member_records_end(&e.records);
+    return bt_comm_agree(comm, status);
+}

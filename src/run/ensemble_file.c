@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: MIT
+// ensemble.h5: one row a member, gathered from the members' folders.
+//
+//     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
+//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a waiting member's process died, or that its
+//                                                        result is not sound
+//     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the case could not be read
+//     /summary/NAME [M]                                  every number of summary.json that does not depend on time or machine; nested ones as A_B; NaN where
+//                                                        there is none
+//     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
+//     /study, /study_resolved                            texts; attributes of the root: complete, n_members, n_finished, n_failed
+//
+// Made whole each time under a temporary name, sealed and renamed: a reader finds the old or the new one. Only members whose files fit their
+// record (ensemble_record.h) are taken in. Members are written in their order, columns in
+// that of their first appearance, so the file depends on the set of finished members alone.
+#include <errno.h>
+#include <inttypes.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "bergtow/ensemble.h"
+#include "run/ensemble_record.h"
+#include "base/fileio.h"
+#include "base/h5util.h"
+#include "case/schema.h"
+#include "base/seal.h"
+#include "base/units.h"
+#include "case/value.h"
+
+// Of the machine and the moment, not of the result.
+static const char *const left_out[] = {"wall_time_s", "ranks", "threads", "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
+                                       "edge_cut", "halo_share", "memory_per_floe_b", "sweep_bytes_per_contact", "ns_per_floe_step", "phases_s", NULL};
+static const char *const series[] = {"time", "ice_resistance", "tow_force"};
+enum { N_SERIES = sizeof series / sizeof *series };
+
+typedef struct {
+    char *name;
+    double *value; ///< [M]
+} column;
+
+typedef struct {
+    int64_t n;
+    int64_t *id, *condition, *repeat, *seed, *status; ///< [n]
+    char **name, **hash, **reason;
+    column *column;
+    int n_columns;
+} table;
+
+static double *column_of(table *t, const char *name)
+{
+    for (int k = 0; k < t->n_columns; k++)
+        if (!strcmp(t->column[k].name, name)) return t->column[k].value;
+    t->column = bt_realloc(t->column, (size_t)t->n_columns + 1, sizeof *t->column);
+    column *c = &t->column[t->n_columns++];
+    *c = (column){strdup(name), bt_alloc((size_t)t->n, sizeof(double))};
+    for (int64_t m = 0; m < t->n; m++) c->value[m] = NAN;
+    return c->value;
+}
+
+static void take_numbers(table *t, int64_t m, const json_t *object, const char *prefix)
+{
+    const char *key;
+    json_t *value;
+    json_object_foreach((json_t *)object, key, value)
+    {
+        bool skip = false;
+        for (int k = 0; left_out[k] && !skip; k++) skip = !*prefix && !strcmp(left_out[k], key);
+        if (skip) continue;
+        char name[200];
+        snprintf(name, sizeof name, "%s%s%.80s", prefix, *prefix ? "_" : "", key);
+        if (json_is_object(value)) take_numbers(t, m, value, name);
+        else if (json_is_number(value)) column_of(t, name)[m] = json_number_value(value);
+        else if (json_is_boolean(value)) column_of(t, name)[m] = json_is_true(value);
+    }
+}
+
+static bool take_summary(table *t, int64_t m, const char *folder)
+{
+    char *path = bt_file_join(folder, "summary.json");
+    json_error_t why;
+    json_t *root = json_load_file(path, 0, &why);
+    free(path);
+    if (!json_is_object(root)) {
+        json_decref(root);
+        return false;
+    }
+    take_numbers(t, m, root, "");
+    const char *hash = json_string_value(json_object_get(root, "state_hash"));
+    if (hash) {
+        free(t->hash[m]);
+        t->hash[m] = strdup(hash);
+    }
+    json_decref(root);
+    return true;
+}
+
+/// Series of a member; returns its length, 0 when there is none.
+static hsize_t read_series(const char *folder, int which, double **out)
+{
+    *out = NULL;
+    char *path = bt_file_join(folder, "result.h5"), name[64];
+    snprintf(name, sizeof name, "/series/%s", series[which]);
+    hsize_t n = 0;
+    H5E_auto2_t handler;
+    void *data;
+    H5Eget_auto2(H5E_DEFAULT, &handler, &data);
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
+    const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT), set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
+    if (set >= 0) {
+        const hid_t space = H5Dget_space(set);
+        hsize_t dims[H5S_MAX_RANK] = {0};
+        if (H5Sget_simple_extent_dims(space, dims, NULL) == 1) {
+            *out = bt_alloc(dims[0], sizeof **out);
+            if (H5Dread(set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, *out) >= 0) n = dims[0];
+        }
+        H5Sclose(space);
+        H5Dclose(set);
+    }
+    if (file >= 0) H5Fclose(file);
+    H5Eset_auto2(H5E_DEFAULT, handler, data);
+    free(path);
+    return n;
+}
+
+static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
+{
+    hsize_t most = 0;
+    for (int64_t m = 0; m < t->n; m++) {
+        if (t->status[m] != BT_MEMBER_FINISHED) continue;
+        char *folder = NULL;
+        double *x;
+        if (asprintf(&folder, "%s/members/%s", dir, t->name[m]) < 0) abort();
+        const hsize_t n = read_series(folder, 0, &x);
+        if (n > most) most = n;
+        free(x);
+        free(folder);
+    }
+    (void)s;
+    bt_h5_group(h, "/series");
+    for (int k = 0; k < N_SERIES; k++) {
+        char *name = bt_file_join("/series", series[k]);
+        hid_t set = bt_h5_growing(h, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
+        double *row = bt_alloc(most, sizeof *row);
+        for (int64_t m = 0; m < t->n; m++) {
+            char *folder = NULL;
+            double *x;
+            if (asprintf(&folder, "%s/members/%s", dir, t->name[m]) < 0) abort();
+            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_series(folder, k, &x) : (x = NULL, 0);
+            for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
+            bt_h5_append(h, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
+            free(x);
+            free(folder);
+        }
+        free(row);
+        if (set >= 0) H5Dclose(set);
+        bt_h5_attr_text(h, name, "units", k == 0 ? "s" : "N");
+        free(name);
+    }
+}
+
+/// A parameter as numbers, or as texts where it is a choice or a name.
+static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
+{
+    const bt_study_parameter *q = &s->parameter[p];
+    const bt_key *key = q->key >= 0 ? &bt_case_keys[q->key] : NULL;
+    const bool number = key && (key->type == BT_KEY_REAL || key->type == BT_KEY_INT || key->type == BT_KEY_BOOL);
+    char **text = bt_alloc((size_t)n, sizeof *text);
+    double *value = bt_alloc((size_t)n, sizeof *value);
+    bt_member member;
+    for (int64_t m = 0; m < n; m++) {
+        bt_study_member(s, m, &member);
+        text[m] = strdup(member.value[p]);
+        bt_case c;
+        bt_case_defaults(&c);
+        char why[BT_WHY];
+        value[m] = NAN;
+        if (number && bt_value_read(key, &c, text[m], true, why)) {
+            const char *at = (const char *)&c + key->offset;
+            int64_t whole;
+            bool yes;
+            if (key->type == BT_KEY_REAL) memcpy(&value[m], at, sizeof value[m]);
+            else if (key->type == BT_KEY_INT) memcpy(&whole, at, sizeof whole), value[m] = (double)whole;
+            else memcpy(&yes, at, sizeof yes), value[m] = yes;
+        }
+        bt_case_free(&c);
+        bt_member_free(&member);
+    }
+    char *name = bt_file_join("/parameters", q->name);
+    if (number) bt_h5_write(h, name, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, value);
+    else bt_h5_write_names(h, name, (hsize_t)n, (const char *const *)text);
+    const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
+    bt_h5_attr_text(h, name, "units", *unit ? unit : "1");
+    bt_h5_attr_text(h, name, "key", q->name);
+    free(name);
+    for (int64_t m = 0; m < n; m++) free(text[m]);
+    free(text);
+    free(value);
+}
+
+/// Status of a member that says it has finished: it has when its files are sound, and else waits, with the reason.
+static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt_member_records *records)
+{
+    bt_errors why = {0};
+    bt_status status = bt_member_record_check(records, m, t->name[m], folder, &why);
+    if (status == BT_OK && !take_summary(t, m, folder)) {
+        bt_errors_add(&why, "%s/summary.json: cannot be read as JSON", folder);
+        status = BT_ERR_CASE;
+    }
+    if (status != BT_OK) {
+        free(t->reason[m]);
+        t->reason[m] = NULL;
+        if (asprintf(&t->reason[m], "its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again", why.n ? why.text[0] : "no reason given") < 0) abort();
+    }
+    bt_errors_free(&why);
+    return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
+}
+
+static void fill(table *t, const bt_study *s, const char *dir, bt_member_records *records)
+{
+    t->n = bt_study_n_members(s);
+    int64_t **numbers[] = {&t->id, &t->condition, &t->repeat, &t->seed, &t->status};
+    for (size_t k = 0; k < sizeof numbers / sizeof *numbers; k++) *numbers[k] = bt_alloc((size_t)t->n, sizeof(int64_t));
+    char ***texts[] = {&t->name, &t->hash, &t->reason};
+    for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) *texts[k] = bt_alloc((size_t)t->n, sizeof(char *));
+    for (int64_t m = 0; m < t->n; m++) {
+        bt_member member;
+        bt_study_member(s, m, &member);
+        char *folder = NULL;
+        if (asprintf(&folder, "%s/members/%s", dir, member.name) < 0) abort();
+        t->id[m] = m + 1;
+        t->condition[m] = member.condition;
+        t->repeat[m] = member.repeat;
+        t->seed[m] = member.seed;
+        t->name[m] = strdup(member.name);
+        t->hash[m] = strdup("");
+        t->status[m] = bt_ensemble_state(folder, NULL, &t->reason[m]);
+        if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
+        if (!t->reason[m]) t->reason[m] = strdup("");
+        free(folder);
+        bt_member_free(&member);
+    }
+}
+
+static void release(table *t)
+{
+    for (int64_t m = 0; m < t->n; m++) {
+        free(t->name[m]);
+        free(t->hash[m]);
+        free(t->reason[m]);
+    }
+    for (int k = 0; k < t->n_columns; k++) {
+        free(t->column[k].name);
+        free(t->column[k].value);
+    }
+    void *arrays[] = {t->id, t->condition, t->repeat, t->seed, t->status, t->name, t->hash, t->reason, t->column};
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
+}
+
+static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
+{
+    const hsize_t n = (hsize_t)t->n;
+    int64_t finished = 0, failed = 0;
+    for (int64_t m = 0; m < t->n; m++) {
+        finished += t->status[m] == BT_MEMBER_FINISHED;
+        failed += t->status[m] == BT_MEMBER_FAILED;
+    }
+    bt_h5_group(h, "/members");
+    bt_h5_write(h, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
+    bt_h5_write(h, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);
+    bt_h5_write(h, "/members/repeat", H5T_NATIVE_INT64, n, 0, t->repeat);
+    bt_h5_write(h, "/members/seed", H5T_NATIVE_INT64, n, 0, t->seed);
+    bt_h5_write(h, "/members/status", H5T_NATIVE_INT64, n, 0, t->status);
+    bt_h5_attr_text(h, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
+    bt_h5_write_names(h, "/members/name", n, (const char *const *)t->name);
+    bt_h5_write_names(h, "/members/state_hash", n, (const char *const *)t->hash);
+    bt_h5_write_names(h, "/members/reason", n, (const char *const *)t->reason);
+    bt_h5_group(h, "/parameters");
+    for (int p = 0; p < s->n_parameters; p++) write_parameter(h, s, p, t->n);
+    bt_h5_group(h, "/summary");
+    for (int k = 0; k < t->n_columns; k++) {
+        char *name = bt_file_join("/summary", t->column[k].name);
+        bt_h5_write(h, name, H5T_NATIVE_DOUBLE, n, 0, t->column[k].value);
+        free(name);
+    }
+    write_series(h, t, s, dir);
+    bt_h5_write_text(h, "/study", s->text);
+    char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
+    size_t size;
+    bt_errors unheard = {0};
+    if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK) bt_h5_write_text(h, "/study_resolved", resolved);
+    bt_errors_free(&unheard);
+    free(resolved);
+    free(path);
+    bt_h5_attr_text(h, "/", "program", "bergtow " BT_VERSION);
+    if (s->title) bt_h5_attr_text(h, "/", "title", s->title);
+    bt_h5_attr_int(h, "/", "n_members", t->n);
+    bt_h5_attr_int(h, "/", "n_finished", finished);
+    bt_h5_attr_int(h, "/", "n_failed", failed);
+    bt_h5_attr_int(h, "/", "complete", finished + failed == t->n);
+}
+
+bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_records *records, bt_errors *err)
+{
+    table t = {0};
+    fill(&t, s, dir, records);
+    char *path = bt_file_join(dir, "ensemble.h5"), *part = NULL;
+    if (asprintf(&part, "%s.tmp", path) < 0) abort();
+    bt_h5 h;
+    bt_status status = bt_h5_create_with_room(&h, part, err);
+    if (status == BT_OK) {
+        write_all(&h, &t, s, dir);
+        status = bt_h5_close(&h);
+        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_ENSEMBLE, err);
+        if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
+        if (status != BT_OK) unlink(part);
+    }
+    free(part);
+    free(path);
+    release(&t);
+    return status;
+}

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// State of a member of an ensemble, by its files.
+#include "run/ensemble_member.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "bergtow/checkpoint.h"
+#include "bergtow/ensemble.h"
+#include "base/fileio.h"
+
+int bt_member_open(const char *folder, const char *name, int flags)
+{
+    char *path = bt_file_join(folder, name);
+    const int fd = open(path, flags | O_CLOEXEC, 0666);
+    free(path);
+    return fd;
+}
+
+bool bt_member_take_lock(int fd, bool wait)
+{
+    struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
+}
+
+bool bt_member_held(const char *folder)
+{
+    const int fd = bt_member_open(folder, "lock", O_RDWR);
+    if (fd < 0) return false;
+    struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
+    const bool held = fcntl(fd, F_OFD_GETLK, &l) == 0 && l.l_type != F_UNLCK;
+    close(fd);
+    return held;
+}
+
+// --- attempts: one byte each -----------------------------------------------------------------------------------------
+
+int bt_member_attempts(const char *folder)
+{
+    char *path = bt_file_join(folder, "attempts"), *checkpoint = bt_file_join(folder, BT_CHECKPOINT_FILE);
+    struct stat st, last;
+    int n = stat(path, &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
+    if (n > 0 && stat(checkpoint, &last) == 0 &&
+        (last.st_mtim.tv_sec > st.st_mtim.tv_sec || (last.st_mtim.tv_sec == st.st_mtim.tv_sec && last.st_mtim.tv_nsec > st.st_mtim.tv_nsec))) n = 0;
+    free(path);
+    free(checkpoint);
+    return n;
+}
+
+void bt_member_note_attempt(const char *folder)
+{
+    const int fd = bt_member_open(folder, "attempts", O_WRONLY | O_CREAT | O_APPEND);
+    if (fd < 0) return;
+    if (write(fd, ".", 1) == 1) fsync(fd);
+    close(fd);
+}
+
+void bt_member_forget_attempts(const char *folder)
+{
+    char *path = bt_file_join(folder, "attempts");
+    unlink(path);
+    free(path);
+}
+
+// --- failures --------------------------------------------------------------------------------------------------------
+
+/// Names of the record in the folder (0) and beside it (1); the caller frees it.
+static char *record_path(const char *folder, int which)
+{
+    char *path = NULL;
+    if (asprintf(&path, which ? "%s.failed.txt" : "%s/failed.txt", folder) < 0) abort();
+    return path;
+}
+
+bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *out = open_memstream(&text, &size);
+    if (!out) abort();
+    fprintf(out, "%d\n", (int)code);
+    for (size_t i = 0; i < why->n; i++) fprintf(out, "%s\n", why->text[i]);
+    fclose(out);
+    bt_status status = BT_ERR_IO;
+    for (int k = 0; k < 2 && status != BT_OK; k++) {
+        char *path = record_path(folder, k);
+        bt_errors unheard = {0};
+        status = bt_file_write(path, text, k ? err : &unheard);
+        bt_errors_free(&unheard);
+        free(path);
+    }
+    free(text);
+    return status;
+}
+
+void bt_member_forget_failure(const char *folder)
+{
+    for (int k = 0; k < 2; k++) {
+        char *path = record_path(folder, k);
+        unlink(path);
+        free(path);
+    }
+}
+
+static bool read_failure(const char *folder, int which, int *code, char **why)
+{
+    char *path = record_path(folder, which), *text = NULL;
+    size_t size;
+    bt_errors none = {0};
+    const bool there = access(path, F_OK) == 0;
+    if (there && bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
+        char *rest = strchr(text, '\n');
+        if (code) *code = (int)strtol(text, NULL, 10);
+        if (why && rest) *why = strdup(rest + 1);
+    }
+    free(text);
+    free(path);
+    bt_errors_free(&none);
+    return there;
+}
+
+bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
+{
+    if (why) *why = NULL;
+    if (code) *code = 0;
+    if (bt_file_there(folder, "finished")) return BT_MEMBER_FINISHED;
+    if (read_failure(folder, 0, code, why) || read_failure(folder, 1, code, why)) return BT_MEMBER_FAILED;
+    const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n; // the one under way has no end yet
+    if (died > 0 && asprintf(why, "its process died in %d attempt%s without a checkpoint; it is tried again after all others, %d times in all", died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS) < 0) abort();
+    return BT_MEMBER_WAITING;
+}

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// Signals, stop file and limits of wall time; what they ask for is in halt.h.
+#include "run/halt.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+
+#include "base/fileio.h"
+
+#define STOP_FILE "stop"
+#define LOOK_SECONDS 0.25 // wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
+static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50; // below them a bit for each signal
+
+static volatile sig_atomic_t stop_signal, save_signal;
+
+static void on_stop(int number) { stop_signal = number; }
+static void on_save(int number) { save_signal = number; }
+
+static const struct { int number; void (*handler)(int); } caught[BT_N_CAUGHT] = {{SIGINT, on_stop}, {SIGTERM, on_stop}, {SIGUSR2, on_stop}, {SIGUSR1, on_save}};
+
+void bt_halt_begin(bt_halt *h)
+{
+    stop_signal = save_signal = 0;
+    h->last = bt_clock();
+    h->looked = 0;
+    for (int k = 0; k < BT_N_CAUGHT; k++) {
+        struct sigaction act = {.sa_handler = caught[k].handler};
+        sigemptyset(&act.sa_mask);
+        sigaction(caught[k].number, &act, &h->before[k]);
+    }
+}
+
+void bt_halt_end(bt_halt *h)
+{
+    if (h->told && stop_signal) *h->told = stop_signal;
+    for (int k = 0; k < BT_N_CAUGHT; k++) sigaction(caught[k].number, &h->before[k], NULL);
+}
+
+uint64_t bt_halt_look(bt_halt *h, int64_t step)
+{
+    uint64_t bits = 0;
+    if (stop_signal) bits |= UINT64_C(1) << stop_signal;
+    else if (h->told && *h->told) bits |= UINT64_C(1) << *h->told;
+    if (save_signal) {
+        save_signal = 0;
+        bits |= save;
+    }
+    if (!h->first) return bits;
+    const double now = bt_clock();
+    if (h->steps > 0 && step % h->steps == 0) bits |= save;
+    if (h->wall > 0 && now - h->last >= h->wall) bits |= save;
+    if (h->max_wall > 0 && now - h->started >= h->max_wall) bits |= by_clock;
+    if (now - h->looked >= LOOK_SECONDS) {
+        h->looked = now;
+        if (bt_file_there(h->dir, STOP_FILE)) bits |= by_file;
+    }
+    return bits;
+}
+
+void bt_halt_saved(bt_halt *h) { h->last = bt_clock(); }
+
+void bt_halt_describe(const bt_halt *h, uint64_t bits, int64_t step, char out[96])
+{
+    const uint64_t signals = bits & (by_file - 2);
+    if (signals) snprintf(out, 96, "signal %d after step %" PRId64, __builtin_ctzll(signals), step);
+    else if (bits & by_file) snprintf(out, 96, "the file %s after step %" PRId64, STOP_FILE, step);
+    else snprintf(out, 96, "the limit of %g s of wall time after step %" PRId64, h->max_wall, step);
+    if (!(bits & by_file) || !h->first) return;
+    char *path = bt_file_join(h->dir, STOP_FILE);
+    unlink(path);
+    free(path);
+}
+
+void bt_halt_block(sigset_t *before)
+{
+    sigset_t block;
+    sigemptyset(&block);
+    for (int k = 0; k < BT_N_CAUGHT; k++) sigaddset(&block, caught[k].number);
+    pthread_sigmask(SIG_BLOCK, &block, before);
+}

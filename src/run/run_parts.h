@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: MIT
+// A run as its parts see it (private to run.c and run_state.c).
+#ifndef BT_RUN_PARTS_H
+#define BT_RUN_PARTS_H
+
+#include "bergtow/comm.h"
+#include "bergtow/field.h"
+#include "output/record.h"
+#include "bergtow/run.h"
+#include "bergtow/setup.h"
+#include "bergtow/world.h"
+#include "run/guard.h"
+#include "run/halt.h"
+#include "base/progress.h"
+#include "base/snapshot.h"
+
+typedef struct bt_running {
+    const bt_comm *comm;
+    const bt_case *c;
+    const bt_run_options *o;
+    bt_world *w;
+    bt_field field;          ///< at time zero, with the lead in it; on rank 0, for the checkpoints
+    bt_roster roster;
+    bt_record *record;
+    bt_progress progress;
+    bt_halt halt;
+    bt_guard guard;
+    int64_t until;           ///< the run is only made again up to this step, −1 = it is not
+    bool failed;             ///< a step has not been sound: w->step is its number
+    uint64_t asked;          ///< what some rank has been asked for after the last step (halt.h)
+    int64_t first_step, end_step; ///< of this call
+    double began;            ///< bt_clock when its steps began
+    int64_t frames_due;      ///< frames by the interval, so far
+    int64_t frames;          ///< frames taken, but for one that the end of --steps has added
+    double reference_speed;
+    bt_run_totals totals;
+} bt_running;
+
+/// Collective, between steps. The whole state of the run; complete on rank 0. Errors: BT_ERR_IO, BT_ERR_NUMERIC.
+bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err);
+
+/// Collective. Publish the record and write a checkpoint of this name.
+bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err);
+
+/// Time between frames, s.
+double bt_running_frame_interval(const bt_case *c);
+
+/// The case and the field of a checkpoint. Errors: BT_ERR_CASE.
+bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err);
+bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s);
+
+/// Collective. State of the world and counters of the run, into a world that was set up; deals it to the ranks.
+bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
+
+#endif

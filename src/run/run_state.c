@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+// The state of a run beside that of its world, and the order in which a checkpoint is made and taken up.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "bergtow/checkpoint.h"
+#include "partition/domain.h"
+#include "base/largest.h"
+#include "revision.h"
+#include "run/run_parts.h"
+#include "output/state.h"
+#include "base/table.h"
+
+#define FRAMES_BY_DEFAULT 200
+
+enum { N_PHASES = sizeof(bt_phases) / sizeof(double) };
+
+double bt_running_frame_interval(const bt_case *c) { return c->output.frame_interval > 0 ? c->output.frame_interval : c->run.duration / FRAMES_BY_DEFAULT; }
+
+/// Where the state comes from; for people and for the comparison of programs, not for the run.
+static void save_origin(const bt_running *r, bt_snapshot *s)
+{
+    char text[64] = "unknown";
+    const time_t now = time(NULL);
+    struct tm utc;
+    if (gmtime_r(&now, &utc)) strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+    bt_snapshot_add_text(s, "about/program", "bergtow " BT_VERSION);
+    bt_snapshot_add_text(s, "about/revision", BT_REVISION);
+    bt_snapshot_add_text(s, "about/written", text);
+    bt_snapshot_add_text(s, "about/command_line", r->o->command_line ? r->o->command_line : "");
+    bt_snapshot_add_int(s, "about/ranks", r->comm->size);
+    bt_snapshot_add_int(s, "about/threads", r->totals.threads);
+}
+
+static void save_case(const bt_case *c, bt_snapshot *s)
+{
+    char *text = bt_case_resolved(c);
+    bt_snapshot_add_text(s, "case/resolved", text);
+    bt_snapshot_add_text(s, "about/case_as_given", c->text ? c->text : "");
+    bt_snapshot_add_text(s, "about/case_path", c->path ? c->path : "");
+    bt_snapshot_add(s, "case/current", BT_ITEM_F64, c->water.table.n, 3, c->water.table.row);
+    bt_snapshot_add(s, "case/wind", BT_ITEM_F64, c->air.table.n, 3, c->air.table.row);
+    free(text);
+}
+
+bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err)
+{
+    bt_status status = bt_state_save(r->w, r->comm, s, err);
+    if (r->comm->rank == 0) {
+        save_origin(r, s);
+        save_case(r->c, s);
+        bt_state_save_field(&r->field, s);
+        bt_state_save_lead(&r->totals.lead, s);
+        bt_state_save_stall(&r->totals.stall, s);
+        bt_snapshot_add_int(s, "run/frames_due", r->frames_due);
+        bt_snapshot_add_int(s, "run/unconverged_in_a_row", r->guard.in_a_row);
+        bt_snapshot_add(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
+        bt_snapshot_add_real(s, "clock/wall_time", r->totals.wall_time + bt_clock() - r->began);
+        if (status == BT_OK) status = bt_record_save(r->record, r->frames, s, err);
+    }
+    return bt_comm_agree(r->comm, status);
+}
+
+bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
+{
+    // The result first: it may hold more than the checkpoint counts on, never less.
+    bt_status status = bt_record_publish(r->record, err);
+    if (status != BT_OK) return status;
+    bt_snapshot s = {0};
+    status = bt_running_save(r, &s, err);
+    if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, name, err);
+    bt_snapshot_free(&s);
+    bt_halt_saved(&r->halt);
+    return bt_comm_agree(r->comm, status);
+}
+
+// --- taking up -------------------------------------------------------------------------------------------------------
+
+static void check_table(const bt_table *t, const char *name, bt_snapshot *s)
+{
+    bt_snapshot_want(s, t->n <= BT_MOST_ROWS, name, -1, "has more rows than a table can have");
+    for (int64_t i = 0; i < t->n && !s->faulty; i++) bt_snapshot_want(s, bt_table_row_sound(t, i), name, i, "is not after the one before, or no velocity");
+}
+
+bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err)
+{
+    bt_table current = {0}, wind = {0};
+    current.row = bt_snapshot_copy(s, "case/current", BT_ITEM_F64, 3, &current.n);
+    wind.row = bt_snapshot_copy(s, "case/wind", BT_ITEM_F64, 3, &wind.n);
+    check_table(&current, "case/current", s);
+    check_table(&wind, "case/wind", s);
+    const char *text = bt_snapshot_text(s, "case/resolved"), *given = bt_snapshot_text(s, "about/case_as_given");
+    const char *path = bt_snapshot_text(s, "about/case_path");
+    *c = (bt_case){0};
+    bt_status status = s->faulty ? BT_ERR_CASE : bt_case_read_kept(c, path, text, &current, &wind, err);
+    bt_table_free(&current);
+    bt_table_free(&wind);
+    if (status != BT_OK) return status;
+    const int64_t step = bt_snapshot_int(s, "world/step");
+    bt_snapshot_want(s, step >= 0 && step <= bt_case_steps(c), "world/step", -1, "is no step of its case");
+    free(c->text); // the result shows the case as it was given
+    c->text = strdup(given);
+    return s->faulty ? BT_ERR_CASE : BT_OK;
+}
+
+bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s)
+{
+    bt_state_load_field(f, s);
+    bt_state_load_lead(lead, s);
+    return s->faulty ? BT_ERR_CASE : BT_OK;
+}
+
+/// What the loop of the run goes by.
+static void check_counters(const bt_running *r, bt_snapshot *s)
+{
+    const bt_phases *p = &r->totals.phases;
+    const bt_stall *t = &r->totals.stall;
+    const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12), time = (double)bt_snapshot_int(s, "world/step") * r->c->run.dt, due = (double)r->frames_due;
+    bt_snapshot_want(s, r->frames_due >= 1 && (due - 1) * interval <= time && time < due * interval, "run/frames_due", -1, "is not the number of the next frame");
+    bt_snapshot_want(s, r->frames >= 1 && r->frames <= r->frames_due + 1, "record/frames", -1, "is no number of frames up to here");
+    bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1, "is no number of steps");
+    bt_snapshot_want(s, t->windows >= 0 && t->windows <= BT_MOST_STEPS && isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y), "stall/windows", -1, "and what else tells whether the body stood still are no counts and numbers");
+    bt_snapshot_want(s, isfinite(p->detect + p->colour + p->forces + p->solve + p->advance + p->exchange + p->output), "clock/phases", -1, "are not all finite");
+    bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");
+}
+
+bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err)
+{
+    bt_state_load_stall(&r->totals.stall, s);
+    r->frames_due = bt_snapshot_int(s, "run/frames_due");
+    r->frames = bt_snapshot_int(s, "record/frames");
+    r->guard.in_a_row = bt_snapshot_int(s, "run/unconverged_in_a_row");
+    bt_snapshot_take(s, "clock/phases", BT_ITEM_F64, N_PHASES, 1, &r->totals.phases);
+    r->totals.wall_time = bt_snapshot_real(s, "clock/wall_time");
+    check_counters(r, s);
+    return bt_state_load(r->w, r->comm, s, err);
+}

@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: MIT
+// Builds the world of a case; every derived mass, drag and frame term is formed here and nowhere else.
+#include "bergtow/setup.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact/contacts.h"
+#include "force/drift.h"
+#include "force/environment.h"
+#include "bergtow/forces.h"
+#include "loads/impact.h"
+#include "tow/tow.h"
+#include "step/window.h"
+#include "case/case_check.h"
+#include "run/setup_tow.h"
+
+#define GRAVITY 9.81            // m/s²
+#define EARTH_RATE 7.292115e-5  // Ω, rad/s
+#define LARGE_RATIO 8.0         // a floe with more than this times the mean radius is in no tile: tiles fit the largest of the others
+
+bt_params bt_setup_params(const bt_case *c, double size)
+{
+    const double f = 2 * EARTH_RATE * sin(c->water.latitude);
+    // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
+    // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
+    const double turn = c->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;
+    double water[2], air[2]; // at time zero; where they change, each step sets its own
+    bt_environment_at(c, true, 0, water);
+    bt_environment_at(c, false, 0, air);
+    bt_params p = {
+        .dt = c->run.dt,
+        .x0 = c->domain.x0,
+        .y0 = c->domain.y0,
+        .period_x = bt_bound_wraps(c->domain.ends) ? c->domain.length : 0,
+        .period_y = c->domain.sides == BT_BOUND_PERIODIC ? c->domain.width : 0,
+        .tolerance = c->solver.tolerance * bt_case_reference_speed(c),
+        .max_sweeps = c->solver.max_sweeps,
+        .warm_start = c->solver.warm_start,
+        .plain_sweeps = c->solver.plain,
+        .inner_sweeps = c->solver.inner_sweeps,
+        .tile = c->solver.tile,
+        .slop = c->solver.slop * size,
+        .position_sweeps = c->solver.position_sweeps,
+        .rest_speed = c->solver.rest_speed,
+        .size = size,
+        .crush_pressure = c->ice.crushing_pressure,
+        .crush_least = c->ice.crushing_least,
+        .water_u = water[0],
+        .water_v = water[1],
+        .air_u = air[0],
+        .air_v = air[1],
+        .coriolis = turn,
+        .tilt_moves_water = c->water.tilt == BT_TILT_DYNAMIC,
+    };
+    if (c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC) {
+        p.balance_u = water[0];
+        p.balance_v = water[1];
+    } else if (c->water.tilt == BT_TILT_SLOPE) {
+        p.tilt_ax = -GRAVITY * c->water.slope_x;
+        p.tilt_ay = -GRAVITY * c->water.slope_y;
+    }
+    return p;
+}
+
+/// A floe of uniform thickness, floating: draft = h ρ_i/ρ_w.
+static void floe_def(const bt_case *c, int n, const double *v, double h, bt_body_def *d)
+{
+    const bt_moments m = bt_shape_moments(n, v);
+    const double sheet = c->ice.density * h, draft = h * c->ice.density / c->water.density;
+    d->n_vertices = n;
+    d->vertices = v;
+    d->mass = sheet * m.area * (1 + c->ice.added_mass);
+    d->added = sheet * m.area * c->ice.added_mass;
+    d->inertia = sheet * m.polar * (1 + c->ice.added_inertia);
+    d->friction = c->ice.friction;
+    d->restitution = c->ice.restitution;
+    d->thickness = h;
+    d->drag = bt_forces_drag(&m, draft, h - draft, c->water.density, c->air.density, c->ice.drag.water_form,
+                             c->ice.drag.water_skin, c->ice.drag.air_form, c->ice.drag.air_skin);
+}
+
+static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roster *r)
+{
+    for (bt_idx i = 0; i < f->n; i++) {
+        const int64_t first = f->offsets[i];
+        const double *pose = f->pose + 3 * (size_t)i;
+        bt_body_def d = {.motion = BT_DYNAMIC, .x = pose[0], .y = pose[1], .yaw = pose[2]};
+        const int n = (int)(f->offsets[i + 1] - first);
+        floe_def(c, n, f->vertices + 2 * first, f->thickness[i], &d);
+        // The parts follow from the outline alone: the same on every rank, and nothing that a field file need hold.
+        bt_parts parts;
+        if (f->outlines.split && !bt_outline_convex(n, d.vertices) && bt_outline_split(n, d.vertices, &parts)) d.parts = &parts;
+        d.large = sqrt(f->area[i] / BT_PI) > 0.5 * LARGE_RATIO * r->mean_size;
+        r->thickness[bt_world_add(w, &d)] = f->thickness[i];
+    }
+}
+
+static void add_floes_by_hand(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    for (bt_idx i = 0; i < c->n_floes; i++) {
+        const bt_floe_def *g = &c->floes[i];
+        double v[2 * BT_MAX_VERTICES];
+        int n = bt_case_floe_outline(g, v);
+        bt_body_def d = {.motion = g->fixed ? BT_STATIC : BT_DYNAMIC, .x = g->x, .y = g->y, .yaw = g->yaw,
+                         .vx = bt_case_start(g->vx), .vy = bt_case_start(g->vy), .yaw_rate = g->yaw_rate};
+        floe_def(c, n, v, g->thickness, &d);
+        d.large = bt_shape_extent(n, v).radius > 0.5 * LARGE_RATIO * r->mean_size;
+        r->thickness[bt_world_add(w, &d)] = g->thickness;
+    }
+}
+
+static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
+{
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(c, v);
+    const bt_moments m = bt_shape_moments(n, v);
+    const double mass = bt_case_body_mass(c);
+    const bool prescribed = c->tow.mode == BT_TOW_SPEED;
+    bt_body_def d = {
+        .motion = prescribed ? BT_KINEMATIC : BT_DYNAMIC,
+        .large = true,
+        .n_vertices = n,
+        .vertices = v,
+        .x = c->body.x,
+        .y = c->body.y,
+        .yaw = c->body.yaw,
+        .vx = bt_case_start(c->body.vx),
+        .vy = bt_case_start(c->body.vy),
+        .yaw_rate = c->body.yaw_rate,
+        .mass = mass * (1 + c->body.added_mass),
+        .added = mass * c->body.added_mass,
+        // Uniform over the waterline plane, as a prism.
+        .inertia = mass * m.polar / m.area * (1 + c->body.added_inertia),
+        .friction = c->body.friction,
+        .restitution = c->body.restitution,
+        .drag = bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
+                               c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
+    };
+    bt_tow *t = w->tow = bt_setup_tow(c);
+    if (prescribed) {
+        const double s = bt_tow_speed(t, 0);
+        d.vx = s * t->ux;
+        d.vy = s * t->uy;
+        d.yaw_rate = 0;
+    }
+    w->towed = bt_world_add(w, &d);
+    r->thickness[w->towed] = c->body.draft + c->body.sail;
+}
+
+static void add_wall(const bt_case *c, bt_world *w, double x, double y, double half_x, double half_y, double vx, double vy)
+{
+    const double v[8] = {-half_x, -half_y, half_x, -half_y, half_x, half_y, -half_x, half_y};
+    bt_body_def d = {.motion = vx != 0 || vy != 0 ? BT_KINEMATIC : BT_STATIC, .large = true, .n_vertices = 4, .vertices = v,
+                     .x = x, .y = y, .vx = vx, .vy = vy, .friction = c->domain.wall_friction,
+                     .restitution = c->domain.wall_restitution};
+    bt_world_add(w, &d);
+}
+
+/// Does body i begin with its free drift?
+static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, bt_idx n_field)
+{
+    if (c->ice.start != BT_START_DRIFT || w->bodies.motion[i] != BT_DYNAMIC) return false;
+    return i < n_field || (i == w->towed ? isnan(c->body.vx) : isnan(c->floes[i - n_field].vx));
+}
+
+/// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given. Ice between walls has nowhere to
+/// drift across them: it has been there for long, and lies against one of them. False when it was not found.
+static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors *err)
+{
+    bt_bodies *b = &w->bodies;
+    const bool hold[2] = {c->domain.ends == BT_BOUND_WALL, c->domain.sides == BT_BOUND_WALL};
+    bt_idx lost = 0;
+#pragma omp parallel for schedule(dynamic, 64) reduction(+ : lost) if (BT_MANY(b->n, 2000))
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!begins_adrift(c, w, i, n_field)) continue;
+        double u[2];
+        if (!bt_drift_velocity(w, i, hold, u)) lost++;
+        b->vel[i] = b->vel_start[i] = b->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = b->vel[i].w};
+    }
+    if (lost > 0)
+        bt_errors_add(err, "%s: ice.start: for %d bodies no velocity was found at which wind, water, Coriolis and slope balance; set it to rest, or check drag, current and wind",
+                      c->path ? c->path : "case", (int)lost);
+    return lost == 0;
+}
+
+void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2])
+{
+    floe[0] = floe[1] = body[0] = body[1] = NAN;
+    if (c->ice.start != BT_START_DRIFT) return;
+    bt_params p = bt_setup_params(c, size);
+    bt_world *w = bt_world_create(&p);
+    double v[2 * BT_MAX_VERTICES], thicknesses[2];
+    bt_shape_regular(24, BT_PI / 4 * size * size, v);
+    bt_body_def d = {.motion = BT_DYNAMIC};
+    floe_def(c, 24, v, thickness, &d);
+    bt_world_add(w, &d);
+    bt_errors unfound = {0}; // NaN says it
+    if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
+    if (begin_drift(c, w, 1, &unfound)) {
+        floe[0] = w->bodies.vel[0].x, floe[1] = w->bodies.vel[0].y;
+        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1)) body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
+    }
+    bt_errors_free(&unfound);
+    bt_world_free(w);
+}
+
+static const char *const wall_names[4] = {"wall x low", "wall x high", "wall y low", "wall y high"};
+
+/// Walls are slabs outside the domain, thick enough that nothing can pass and overlapping at the corners.
+static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
+{
+    const double thick = bt_max(0.1 * bt_max(c->domain.length, c->domain.width), 5 * w->par.size);
+    const double x0 = c->domain.x0, x1 = x0 + c->domain.length, y0 = c->domain.y0, y1 = y0 + c->domain.width;
+    const double mid_x = 0.5 * (x0 + x1), mid_y = 0.5 * (y0 + y1), h = 0.5 * thick;
+    int n = 0;
+    if (c->domain.ends == BT_BOUND_WALL) {
+        const double half = 0.5 * c->domain.width + thick, s = c->domain.ends_closing;
+        add_wall(c, w, x0 - h, mid_y, h, half, s, 0);
+        add_wall(c, w, x1 + h, mid_y, h, half, -s, 0);
+        names[n++] = wall_names[0];
+        names[n++] = wall_names[1];
+    }
+    if (c->domain.sides == BT_BOUND_WALL) {
+        const double half = 0.5 * c->domain.length + thick, s = c->domain.sides_closing;
+        add_wall(c, w, mid_x, y0 - h, half, h, 0, s);
+        add_wall(c, w, mid_x, y1 + h, half, h, 0, -s);
+        names[n++] = wall_names[2];
+        names[n++] = wall_names[3];
+    }
+    return n;
+}
+
+/// Are a, displaced by from, and b apart, also while a moves on by (dx, dy) relative to b? Separating axes of the convex hull of both ends of the
+/// path: edge normals of a and of b, and the normal of the path.
+static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
+{
+    const bt_bodies *bd = &w->bodies;
+    double d[2];
+    bt_world_offset(w, a, b, d);
+    d[0] -= from[0], d[1] -= from[1];
+    const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
+    for (int64_t k = 0; k <= na + nb; k++) {
+        double nx = -dy, ny = dx;
+        if (k < na + nb) {
+            const int64_t first = k < na ? bd->offset[a] : bd->offset[b], m = k < na ? na : nb, at = k < na ? k : k - na;
+            const double *p = bd->outline + 2 * (first + at), *q = bd->outline + 2 * (first + (at + 1) % m);
+            nx = q[1] - p[1], ny = p[0] - q[0];
+        }
+        double low_a = INFINITY, high_a = -INFINITY, low_b = INFINITY, high_b = -INFINITY;
+        const double along = nx * dx + ny * dy, offset = nx * d[0] + ny * d[1];
+        for (int64_t i = bd->offset[a]; i < bd->offset[a + 1]; i++) {
+            const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1];
+            low_a = bt_min(low_a, p + bt_min(along, 0));
+            high_a = bt_max(high_a, p + bt_max(along, 0));
+        }
+        for (int64_t i = bd->offset[b]; i < bd->offset[b + 1]; i++) {
+            const double p = nx * bd->outline[2 * i] + ny * bd->outline[2 * i + 1] + offset;
+            low_b = bt_min(low_b, p);
+            high_b = bt_max(high_b, p);
+        }
+        if (low_b >= high_a || low_a >= high_b) return true;
+    }
+    return false;
+}
+
+/// Displacement of body m, of prescribed velocity, from the start until time t.
+static void displacement(const bt_case *c, const bt_world *w, bt_idx m, double t, double d[2])
+{
+    d[0] = w->bodies.vel[m].x * t, d[1] = w->bodies.vel[m].y * t;
+    if (m == w->towed) bt_setup_tow_displacement(c, w->tow, t, d);
+}
+
+/// Does j, on its way relative to i, meet it? On a course that changes in pieces of the run, each of them straight.
+static bool meet(const bt_case *c, const bt_world *w, bt_idx i, bt_idx j, bool wall)
+{
+    const bool bent = c->tow.n_waypoints > 0 && (i == w->towed || j == w->towed);
+    const int pieces = bent ? 500 : 1;
+    double from[2] = {0, 0};
+    for (int k = 1; k <= pieces; k++) {
+        double di[2], dj[2];
+        displacement(c, w, i, c->run.duration * k / pieces, di);
+        displacement(c, w, j, c->run.duration * k / pieces, dj);
+        const double to[2] = {dj[0] - di[0], dj[1] - di[1]};
+        if (wall && (w->bodies.motion[j] == BT_STATIC || (to[0] == 0 && to[1] == 0))) return false;
+        if (!apart_on_path(w, j, i, from, to[0] - from[0], to[1] - from[1])) return true;
+        from[0] = to[0], from[1] = to[1];
+    }
+    return false;
+}
+
+/// Two bodies of infinite mass pass through each other without a contact: no prescribed path may cross such a body.
+static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roster *r, bt_idx first_wall, bt_errors *err)
+{
+    const bt_bodies *b = &w->bodies;
+    bool sound = true;
+    for (bt_idx i = 0; i < b->n; i++)
+        for (bt_idx j = i + 1; j < b->n; j++) {
+            if (b->motion[i] == BT_DYNAMIC) break;
+            if (b->motion[j] == BT_DYNAMIC || i >= first_wall) continue;
+            const bool towed = i == w->towed || j == w->towed;
+            if (j == w->towed || j >= first_wall) {
+                // Walls that stand may hold fixed bodies (piers) and were checked with the tow.
+                if (!meet(c, w, i, j, j >= first_wall)) continue;
+                bt_errors_add(err, "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
+                              "fixed floe, or tow on a line", c->path ? c->path : "case", r->names[j - r->n_floes],
+                              towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");
+                sound = false;
+            }
+        }
+    return sound;
+}
+
+/// A pair has one contact, with the nearest image: across a period there must be room for both images apart.
+static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall, bt_errors *err)
+{
+    double first = 0, second = 0; // the two largest radii
+    for (bt_idx i = 0; i < first_wall; i++) {
+        const double r = w->bodies.radius[i];
+        if (r > first) second = first, first = r;
+        else if (r > second) second = r;
+    }
+    const double need = 2 * (first + second);
+    const double periods[2] = {w->par.period_x, w->par.period_y};
+    bool sound = true;
+    for (int k = 0; k < 2; k++)
+        if (periods[k] > 0 && need >= periods[k]) {
+            bt_errors_add(err, "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
+                          "turn, %.4g m; enlarge it or take smaller bodies", c->path ? c->path : "case", k ? "width" : "length",
+                          periods[k], need);
+            sound = false;
+        }
+    return sound;
+}
+
+/// Floes of a field that was read may belong to another domain.
+static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
+{
+    // A managed lead may cut a floe that reaches over an open edge, and leave a piece beyond it.
+    const bool over_x = c->lead.mode == BT_LEAD_MANAGED && c->domain.ends == BT_BOUND_OPEN, over_y = c->lead.mode == BT_LEAD_MANAGED && c->domain.sides == BT_BOUND_OPEN;
+    for (bt_idx i = 0; i < f->n; i++) {
+        const double x = f->pose[3 * (size_t)i], y = f->pose[3 * (size_t)i + 1];
+        if ((over_x || (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length)) && (over_y || (y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width))) continue;
+        bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
+                      c->ice.field ? c->ice.field : c->path ? c->path : "case", (int)i, x, y);
+        return false;
+    }
+    return true;
+}
+
+/// What a body is to the user.
+static void name_body(const bt_field *f, const bt_roster *r, bt_gid gid, char out[64])
+{
+    if (gid < f->n) snprintf(out, 64, "floe %lld of the ice", (long long)gid);
+    else if (gid < r->n_floes) snprintf(out, 64, "floes[%lld]", (long long)(gid - f->n));
+    else snprintf(out, 64, "%s", r->names[gid - r->n_floes]);
+}
+
+/// Nothing lies in anything else by more than the position projection takes out.
+static bool check_apart(const bt_case *c, const bt_field *f, bt_world *w, const bt_roster *r, bt_errors *err)
+{
+    const double allowed = bt_max(w->par.slop, 1e-9 * r->mean_size);
+    const bt_overlaps o = bt_world_overlaps(w, allowed);
+    if (o.pairs == 0) return true;
+    char a[64], b[64];
+    name_body(f, r, o.a < o.b ? o.a : o.b, a);
+    name_body(f, r, o.a < o.b ? o.b : o.a, b);
+    bt_errors_add(err,
+                  "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g m), deepest %s and %s; move or "
+                  "shrink the floes given by hand, or make the field for this body and domain",
+                  c->path ? c->path : "case", (long long)o.pairs, o.pairs == 1 ? "" : "s", o.deepest, allowed, a, b);
+    return false;
+}
+
+bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt_roster *r, bt_errors *err)
+{
+    double sum = 0, v[2 * BT_MAX_VERTICES];
+    for (bt_idx i = 0; i < f->n; i++) sum += sqrt(4 * f->area[i] / BT_PI);
+    double size = f->n ? sum / f->n : c->ice.size;
+    if (!f->n && c->n_floes) {
+        for (bt_idx i = 0; i < c->n_floes; i++)
+            sum += sqrt(4 * bt_shape_moments(bt_case_floe_outline(&c->floes[i], v), v).area / BT_PI);
+        size = sum / c->n_floes;
+    }
+    if (!check_inside(c, f, err)) return BT_ERR_CASE;
+    bt_params p = bt_setup_params(c, size);
+    bt_world *w = bt_world_create(&p);
+    w->environment = bt_environment_create(c);
+    const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
+    bt_world_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
+    const bool with_body = c->body.shape != BT_BODY_ABSENT;
+    *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size};
+    r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);
+    r->names = bt_alloc(5, sizeof *r->names);
+    add_field(c, f, w, r);
+    add_floes_by_hand(c, w, r);
+    int n = 0;
+    if (with_body) {
+        add_towed_body(c, w, r);
+        r->names[n++] = "towed body";
+    }
+    const bool drifts = begin_drift(c, w, f->n, err);
+    w->impacts = bt_impacts_create(c, w);
+    const bt_idx first_wall = w->bodies.n;
+    add_walls(c, w, r->names + n);
+    if (c->domain.ends == BT_BOUND_MOVING && with_body)
+        bt_window_create(w, bt_case_tow_sign(c), c->domain.ahead, r->n_floes, c->domain.sides == BT_BOUND_WALL);
+    *out = w;
+    if (!drifts) return BT_ERR_CASE;
+    const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
+    if (!paths || !periods) return BT_ERR_CASE;
+
+    // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls may not be.
+    if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
+    memset(w->bodies.stirred, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
+    return BT_OK;
+}
+
+void bt_roster_free(bt_roster *r)
+{
+    free(r->thickness);
+    free(r->names);
+    *r = (bt_roster){0};
+}

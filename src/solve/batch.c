@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: MIT
+// Batches of four units; what for, in batch.h. The arithmetic is that of bt_update_unit (kernel.h), four at a time.
+#include "solve/batch.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "solve/kernel.h"
+
+enum { LANES = 4, OPEN = 8 }; // OPEN: batches that wait for more units, when a tile is packed
+
+typedef double vec __attribute__((vector_size(LANES * sizeof(double))));
+typedef int64_t mask __attribute__((vector_size(LANES * sizeof(int64_t))));
+
+/// Names as in bt_unit; lanes without a unit are zero.
+typedef struct bt_batch {
+    vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2], mu;
+    vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
+    vec x[3], before[3], y[3]; // impulses: now, before the last sweep, after the move
+    bt_idx a[LANES], b[LANES], unit[LANES];
+    bool moves_a[LANES], moves_b[LANES];
+    int n;
+} bt_batch;
+
+// One copy for each instruction set that the program is built for, chosen when it starts.
+#if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
+#define FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
+#else
+#define FOR_EACH_CPU
+#endif
+#define INLINE static inline __attribute__((always_inline))
+
+bool bt_batch_is_for(const bt_tile *tile) { return !tile->limits && tile->phase != BT_COLOURS; }
+
+// --- packing ---------------------------------------------------------------------------------------------------------
+
+static bool holds(const bt_batch *o, bt_idx body)
+{
+    for (int l = 0; l < o->n; l++)
+        if ((o->moves_a[l] && o->a[l] == body) || (o->moves_b[l] && o->b[l] == body)) return true;
+    return false;
+}
+
+static void put(bt_batch *o, const bt_tile *tile, bt_idx i, const bt_inv *inv)
+{
+    const bt_unit *u = &tile->units[i];
+    const int l = o->n++;
+    o->nx[l] = u->nx, o->ny[l] = u->ny;
+    for (int c = 0; c < 2; c++) {
+        o->ran[c][l] = u->ran[c], o->rbn[c][l] = u->rbn[c];
+        o->w[c][l] = u->w[c], o->mn[c][l] = u->mn[c], o->bias[c][l] = u->bias[c];
+        o->x[c][l] = u->ln[c];
+    }
+    o->rat[l] = u->rat, o->rbt[l] = u->rbt;
+    o->w12[l] = u->w12, o->per_det[l] = u->per_det;
+    o->wt[l] = u->wt, o->mt[l] = u->mt, o->mu[l] = u->mu;
+    o->x[2][l] = u->lt;
+    for (int c = 0; c < 3; c++) o->before[c][l] = tile->before[i][c];
+    o->ma[l] = inv[u->a].m, o->ia[l] = inv[u->a].i, o->mb[l] = inv[u->b].m, o->ib[l] = inv[u->b].i;
+    o->a[l] = u->a, o->b[l] = u->b, o->unit[l] = i;
+    o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
+}
+
+static bt_batch *begin_batch(bt_tile *tile, const bt_unit *u)
+{
+    if (tile->n_batches == tile->cap_batches) {
+        const bt_idx cap = bt_max(LANES, 2 * tile->cap_batches);
+        bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
+        if (tile->n_batches > 0) memcpy(more, tile->batch, (size_t)tile->n_batches * sizeof *more);
+        free(tile->batch);
+        tile->batch = more;
+        tile->cap_batches = cap;
+    }
+    bt_batch *o = &tile->batch[tile->n_batches++];
+    memset(o, 0, sizeof *o);
+    for (int l = 0; l < LANES; l++) o->a[l] = u->a, o->b[l] = u->b; // of lanes that stay empty: read, never written
+    return o;
+}
+
+/// Each unit goes into the first of the last OPEN batches that is not full and has none of its bodies. Those that filled up leave the window.
+static void pack(bt_tile *tile, const bt_inv *inv)
+{
+    bt_idx open[OPEN];
+    int n_open = 0;
+    tile->n_batches = 0;
+    tile->packed = true;
+    for (bt_idx j = 0; j < tile->n_list; j++) {
+        const bt_unit *u = &tile->units[tile->list[j]];
+        int k = 0;
+        while (k < n_open && ((inv[u->a].m > 0 && holds(&tile->batch[open[k]], u->a)) || (inv[u->b].m > 0 && holds(&tile->batch[open[k]], u->b)))) k++;
+        if (k == n_open) {
+            if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
+            begin_batch(tile, u);
+            open[n_open++] = tile->n_batches - 1;
+        }
+        bt_batch *o = &tile->batch[open[k]];
+        put(o, tile, tile->list[j], inv);
+        if (o->n < LANES) continue;
+        n_open--;
+        memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
+    }
+}
+
+void bt_batch_order(const bt_tile *tile, bt_idx *unit)
+{
+    for (bt_idx k = 0; k < tile->n_batches; k++)
+        for (int l = 0; l < tile->batch[k].n; l++) *unit++ = tile->batch[k].unit[l];
+}
+
+void bt_batch_unpack(bt_tile *tile)
+{
+    if (!tile->packed) return;
+    tile->packed = false;
+    for (bt_idx k = 0; k < tile->n_batches; k++) {
+        const bt_batch *o = &tile->batch[k];
+        for (int l = 0; l < o->n; l++) {
+            bt_unit *u = &tile->units[o->unit[l]];
+            u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
+            for (int c = 0; c < 3; c++) tile->before[o->unit[l]][c] = o->before[c][l];
+        }
+    }
+}
+
+// --- arithmetic ------------------------------------------------------------------------------------------------------
+
+INLINE vec choose(mask m, vec yes, vec no) { return (vec)(((mask)yes & m) | ((mask)no & ~m)); }
+INLINE vec larger(vec a, vec b) { return choose(a > b, a, b); }
+INLINE vec smaller(vec a, vec b) { return choose(a < b, a, b); }
+INLINE vec size_of(vec a) { return (vec)((mask)a & ~(mask)(vec){-0.0, -0.0, -0.0, -0.0}); }
+
+/// Velocities of four bodies, component by component.
+typedef struct {
+    vec x, y, w, unused;
+} motion;
+
+/// Rows to columns; its own inverse.
+INLINE void transpose(motion *m)
+{
+    const vec a = __builtin_shufflevector(m->x, m->y, 0, 4, 2, 6), b = __builtin_shufflevector(m->x, m->y, 1, 5, 3, 7);
+    const vec c = __builtin_shufflevector(m->w, m->unused, 0, 4, 2, 6), d = __builtin_shufflevector(m->w, m->unused, 1, 5, 3, 7);
+    m->x = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+    m->y = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+    m->w = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+    m->unused = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+INLINE motion load(const bt_vel *v, const bt_idx *body)
+{
+    motion m;
+    memcpy(&m.x, &v[body[0]], sizeof m.x);
+    memcpy(&m.y, &v[body[1]], sizeof m.y);
+    memcpy(&m.w, &v[body[2]], sizeof m.w);
+    memcpy(&m.unused, &v[body[3]], sizeof m.unused);
+    transpose(&m);
+    return m;
+}
+
+INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
+{
+    transpose(&m);
+    if (moves[0]) memcpy(&v[body[0]], &m.x, sizeof m.x);
+    if (moves[1]) memcpy(&v[body[1]], &m.y, sizeof m.y);
+    if (moves[2]) memcpy(&v[body[2]], &m.w, sizeof m.w);
+    if (moves[3]) memcpy(&v[body[3]], &m.unused, sizeof m.unused);
+}
+
+/// As bt_solve_normals.
+INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b, vec *l1, vec *l2)
+{
+    const vec zero = {0}, un = o->nx * (b->x - a->x) + o->ny * (b->y - a->y);
+    const vec u1 = un + o->rbn[0] * b->w - o->ran[0] * a->w + o->bias[0], u2 = un + o->rbn[1] * b->w - o->ran[1] * a->w + o->bias[1];
+    const vec b1 = u1 - o->w[0] * o->x[0] - o->w12 * o->x[1], b2 = u2 - o->w12 * o->x[0] - o->w[1] * o->x[1];
+    const vec both1 = (o->w12 * b2 - o->w[1] * b1) * o->per_det, both2 = (o->w12 * b1 - o->w[0] * b2) * o->per_det;
+    const vec only1 = larger(zero, -b1 * o->mn[0]), only2 = larger(zero, -b2 * o->mn[1]);
+    const mask both = (o->per_det > zero) & (both1 >= zero) & (both2 >= zero), first = (b2 + o->w12 * only1 >= zero) | (only2 == zero);
+    *l1 = choose(both, both1, choose(first, only1, zero));
+    *l2 = choose(both, both2, choose(first, zero, only2));
+}
+
+/// As bt_update_unit; the largest corrections, m/s.
+INLINE vec update(bt_batch *o, bt_vel *v)
+{
+    motion a = load(v, o->a), b = load(v, o->b);
+    vec l1, l2;
+    solve_normals(o, &a, &b, &l1, &l2);
+    const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
+    a.x -= o->ma * jx;
+    a.y -= o->ma * jy;
+    a.w -= o->ia * (d1 * o->ran[0] + d2 * o->ran[1]);
+    b.x += o->mb * jx;
+    b.y += o->mb * jy;
+    b.w += o->ib * (d1 * o->rbn[0] + d2 * o->rbn[1]);
+    const vec ut = o->nx * (b.y - a.y) - o->ny * (b.x - a.x) + o->rbt * b.w - o->rat * a.w, bound = o->mu * (l1 + l2);
+    const vec t = larger(-bound, smaller(bound, o->x[2] - ut * o->mt)), dt = t - o->x[2], tx = dt * o->ny, ty = dt * o->nx;
+    a.x += o->ma * tx;
+    a.y -= o->ma * ty;
+    a.w -= o->ia * (dt * o->rat);
+    b.x -= o->mb * tx;
+    b.y += o->mb * ty;
+    b.w += o->ib * (dt * o->rbt);
+    o->x[0] = l1, o->x[1] = l2, o->x[2] = t;
+    store(v, o->a, o->moves_a, a);
+    store(v, o->b, o->moves_b, b);
+    return larger(larger(size_of(d1) * o->w[0], size_of(d2) * o->w[1]), size_of(dt) * o->wt);
+}
+
+INLINE double largest_lane(vec a) { return bt_max(bt_max(a[0], a[1]), bt_max(a[2], a[3])); }
+
+FOR_EACH_CPU
+static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
+{
+    vec most = {0};
+    for (bt_idx k = 0; k < n; k++) most = larger(most, update(&batch[k], v));
+    return largest_lane(most);
+}
+
+FOR_EACH_CPU
+static void move(bt_batch *batch, bt_idx n, double beta)
+{
+    for (bt_idx k = 0; k < n; k++) {
+        bt_batch *o = &batch[k];
+        for (int c = 0; c < 3; c++) {
+            const vec now = o->x[c];
+            if (beta > 0) o->x[c] = now + beta * (now - o->before[c]);
+            o->before[c] = now;
+            o->y[c] = o->x[c];
+        }
+    }
+}
+
+FOR_EACH_CPU
+static double against(const bt_batch *batch, bt_idx n)
+{
+    vec sum = {0};
+    for (bt_idx k = 0; k < n; k++) {
+        const bt_batch *o = &batch[k];
+        for (int c = 0; c < 3; c++) sum += (c < 2 ? o->w[c] : o->wt) * (o->y[c] - o->x[c]) * (o->x[c] - o->before[c]);
+    }
+    return sum[0] + sum[1] + sum[2] + sum[3];
+}
+
+double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough, int64_t *done, double *most)
+{
+    if (!tile->packed) pack(tile, inv);
+    if (s->moves) move(tile->batch, tile->n_batches, s->beta);
+    double last = INFINITY;
+    for (int n = 0; n == 0 || (n < times && last > enough); n++) {
+        last = pass(tile->batch, tile->n_batches, v);
+        if (n == 0) *most = last;
+        *done += tile->n_list;
+    }
+    return s->moves ? against(tile->batch, tile->n_batches) : 0;
+}

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+// Looks, sweeps over lists, momentum and its cap; method and reasons in rounds.h.
+#include "solve/rounds.h"
+
+#include <limits.h>
+#include <math.h>
+#include <stdlib.h>
+
+#include "solve/solver.h"
+#include "partition/domain.h"
+
+#define GAIN 0.8        // of the sum of squares, that ROUNDS rounds must take it below
+#define MOST_CAP 0.98
+#define NARROWER 1.25   // of the distance of the cap from 1, and of the length of a round
+#define WIDER 1.5
+#define LEAST_CAP 0.3   // less is none
+#define CALM 0.1         // of the limit of work, beyond it
+#define LEAST_SWEEP 0.01 // of the units, that a sweep counts for against the limit of work at least
+enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
+
+// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
+// at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one unit
+// at convergence, so that 10²⁷ times that still fits.
+void bt_rounds_scale(bt_problem *p, double heaviest)
+{
+    const double energy = heaviest * p->tolerance * p->tolerance;
+    p->per_square = p->tolerance > 0 ? exp2(20 - ceil(2 * log2(p->tolerance))) : 0x1p60;
+    p->per_energy = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
+}
+
+// --- looks -----------------------------------------------------------------------------------------------------------
+
+void bt_rounds_list(bt_tile *tile)
+{
+    tile->n_list = 0;
+    tile->bad = false;
+    if (tile->n_units <= tile->cap_list) return;
+    tile->cap_list = tile->n_units + tile->n_units / 4;
+    free(tile->list);
+    free(tile->before);
+    tile->list = bt_alloc((size_t)tile->cap_list, sizeof *tile->list);
+    tile->before = bt_alloc((size_t)tile->cap_list, sizeof *tile->before);
+}
+
+void bt_rounds_found(const bt_problem *p, bt_tile *tile, double squares, int64_t rows, int64_t bad, bt_totals *t)
+{
+    tile->bad = bad > 0;
+    bt_sum_add(&t->sum[BT_LOOK_SQUARES], bt_min(squares * p->per_square, 0x1p45));
+    bt_sum_add(&t->sum[BT_LOOK_ROWS], (double)rows);
+    bt_sum_add(&t->sum[BT_LOOK_UNITS], tile->n_units);
+    bt_sum_add(&t->sum[BT_LOOK_LISTED], tile->n_list);
+    bt_sum_add(&t->sum[BT_LOOK_BAD], (double)bad);
+}
+
+/// The bodies of the tile of body i may be moved.
+static void mark_tile_of(bt_world *w, bt_idx i)
+{
+    const int32_t *at = w->bodies.tile[i];
+    if (!w->bodies.large[i]) w->tiles->tile[bt_tiles_at(w->tiles, at[0], at[1])].swept = true;
+}
+
+/// Bodies of the block of tile (x, y) may be moved.
+static void mark_block(bt_tiles *t, int32_t x, int32_t y, double listed)
+{
+    for (int j = 0; listed > 0 && j < 4; j++) {
+        const bt_idx k = bt_tiles_at(t, x + (j & 1), y + (j >> 1));
+        if (k >= 0) t->tile[k].swept = true;
+    }
+}
+
+/// Tell the value of each tile that has work, 1 or 0, to `take`, which spreads it to the tiles around; on all ranks. Collective.
+static void spread(bt_world *w, double (*value_of)(const bt_tile *tile), bt_take_tile *take)
+{
+    bt_tiles *t = w->tiles;
+    double *value = w->domain ? bt_alloc((size_t)t->n, sizeof *value) : NULL;
+    for (bt_idx i = 0; i < t->n_order; i++) {
+        const bt_idx k = t->order[i];
+        const double x = value_of(&t->tile[k]);
+        if (value) value[k] = x;
+        if (k < t->n - 1) take(t, t->tile[k].x, t->tile[k].y, x);
+    }
+    if (value) bt_domain_tell_tiles(w, value, take);
+    free(value);
+}
+
+static double has_list(const bt_tile *tile) { return tile->n_list > 0; }
+static double is_bad(const bt_tile *tile) { return tile->bad; }
+
+/// Mark the tiles whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body always. Exactly
+/// these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the marks must not depend on ranks. Collective.
+static void mark_swept(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    const bt_idx last = t->n - 1;
+    const bt_tile *large = &t->tile[last];
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        if (k == last) continue;
+        t->tile[k].still = !t->tile[k].swept;
+        t->tile[k].swept = false;
+    }
+    spread(w, has_list, mark_block);
+    t->tile[last].swept = large->own;
+    for (bt_idx j = 0; large->own && j < large->n_units; j++) {
+        mark_tile_of(w, large->units[j].a);
+        mark_tile_of(w, large->units[j].b);
+    }
+    bt_domain_beside_large(w, mark_tile_of);
+}
+
+static void lists_are_new(bt_world *w)
+{
+    mark_swept(w);
+    bt_phases_deal(w);
+}
+
+void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work)
+{
+    bt_totals t = {.n_sums = BT_LOOK_N};
+    if (settle && p->settle) p->settle(w);
+    bt_phases_any_order(w, p->look, p, &t);
+    bt_domain_reduce(w, &t);
+    work->residual = t.most;
+    work->squares = bt_sum_value(&t.sum[BT_LOOK_SQUARES]) / p->per_square;
+    work->rows = (int64_t)bt_sum_value(&t.sum[BT_LOOK_ROWS]);
+    work->units = (int64_t)bt_sum_value(&t.sum[BT_LOOK_UNITS]);
+    work->listed = (int64_t)bt_sum_value(&t.sum[BT_LOOK_LISTED]);
+    work->bad = (int64_t)bt_sum_value(&t.sum[BT_LOOK_BAD]);
+    work->looks += (settle && p->settle ? 2 : 1) * work->units;
+    lists_are_new(w);
+}
+
+// --- rounds over a part of the field -------------------------------------------------------------------------------------
+
+/// The tile at (x, y) is bad: its list and those beside it stay.
+static void keep_beside(bt_tiles *t, int32_t x, int32_t y, double bad)
+{
+    for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
+        for (int32_t dx = -1; dx <= 1; dx++) {
+            const bt_idx k = bt_tiles_at(t, x + dx, y + dy);
+            if (k >= 0) t->tile[k].kept = true;
+        }
+}
+
+/// Empty the lists of tiles that are neither bad nor beside one that is; the contacts of large bodies reach anywhere and stay. Collective.
+static void keep_near_bad(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].kept = t->order[i] == t->n - 1;
+    spread(w, is_bad, keep_beside);
+    for (bt_idx i = 0; i < t->n_order; i++)
+        if (!t->tile[t->order[i]].kept) t->tile[t->order[i]].n_list = 0;
+    lists_are_new(w);
+}
+
+// --- sweeps ----------------------------------------------------------------------------------------------------------
+
+typedef struct {
+    bt_vel *vel, *before;
+    double beta;
+} body_move;
+
+static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)t;
+    const body_move *m = context;
+    bt_tile *tile = &w->tiles->tile[k];
+    if (!tile->swept) return;
+    const double beta = tile->still ? 0 : m->beta;
+    tile->still = false;
+    for (bt_idx i = tile->first; i < tile->end; i++) {
+        const bt_vel now = m->vel[i];
+        if (beta > 0) {
+            const bt_vel *before = &m->before[i];
+            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y), now.w + beta * (now.w - before->w), 0};
+        }
+        m->before[i] = now;
+    }
+}
+
+/// Returns the largest update.
+static double sweep(bt_world *w, const bt_problem *p, bool moves, double beta, bt_work *work, double *against)
+{
+    bt_totals t = {.n_sums = BT_SWEEP_N};
+    const bt_sweep s = {.problem = p, .moves = moves, .beta = beta};
+    bt_phases_run(w, p->sweep, &s, p->vel, &t);
+    bt_domain_reduce(w, &t);
+    work->sweeps++;
+    work->updates += (int64_t)bt_sum_value(&t.sum[BT_SWEEP_UPDATES]);
+    work->moves += (int64_t)bt_sum_value(&t.sum[BT_SWEEP_MOVED]);
+    *against = bt_sum_value(&t.sum[BT_SWEEP_AGAINST]);
+    return t.most;
+}
+
+double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work)
+{
+    double against;
+    return sweep(w, p, false, 0, work, &against);
+}
+
+/// What counts against the limit.
+static double spent(const bt_problem *p, const bt_work *k)
+{
+    if (p->plain) return (double)k->sweeps;
+    return (double)(k->updates + k->looks) + (1 + LEAST_SWEEP * (double)k->units) * (double)k->sweeps;
+}
+
+typedef struct {
+    double theta, beta;
+    double against; ///< of the last sweep
+} momentum;
+
+/// Move on from where the last sweep has come to.
+static void move_on(bt_world *w, const bt_problem *p, double cap, momentum *m)
+{
+    if (!(m->against <= 0)) { // or not a number
+        m->theta = 1, m->beta = 0;
+    } else {
+        const double next = 0.5 * (1 + sqrt(1 + 4 * m->theta * m->theta));
+        m->beta = bt_min(cap, (m->theta - 1) / next);
+        m->theta = next;
+    }
+    bt_phases_everywhere(w, move_bodies, &(body_move){p->vel, w->solver->before, m->beta});
+}
+
+/// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
+static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m, bt_work *work)
+{
+    const double small = p->plain ? p->tolerance : BT_NEAR * p->tolerance;
+    if (!on) *m = (momentum){.theta = 1};
+    for (int n = 0;; n++) {
+        if (!p->plain && (n > 0 || on)) move_on(w, p, cap, m);
+        if (sweep(w, p, !p->plain, m->beta, work, &m->against) <= small) return true;
+        if (n + 1 == length || spent(p, work) >= limit) return false;
+    }
+}
+
+/// The cap and the length of the rounds, by what they bring.
+typedef struct {
+    double cap, mark; ///< mark: sum of squares when last looked at
+    int length;
+} pace;
+
+static void adapt(pace *a, const bt_problem *p, double squares)
+{
+    const bool gained = !(squares > GAIN * a->mark), first = isinf(a->mark);
+    a->mark = squares;
+    if (first || (gained && a->cap == 1)) return;
+    if (gained) {
+        a->cap = bt_min(MOST_CAP, 1 - (1 - a->cap) / NARROWER);
+        a->length = (int)bt_min(MOST_LENGTH, NARROWER * a->length);
+        return;
+    }
+    a->length = p->length;
+    if (a->cap == 0) a->cap = 1, a->length = FREE_LENGTH;
+    else if (a->cap == 1) a->cap = p->cap;
+    else a->cap = 1 - WIDER * (1 - a->cap);
+    if (a->cap < LEAST_CAP) a->cap = 0;
+}
+
+void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
+{
+    bt_solver *s = w->solver;
+    if (w->bodies.n > s->cap_before) {
+        s->cap_before = w->bodies.n;
+        free(s->before);
+        s->before = bt_alloc_aligned((size_t)s->cap_before, sizeof *s->before);
+    }
+    pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
+    momentum m = {.theta = 1};
+    const double all_work = p->limit * (p->plain ? 1 : (double)(work->units + 1));
+    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work); // between them no momentum
+    bool settled = true; // velocities, and the residual, are those of the impulses
+    bool all = false;    // the last round was over the whole field
+    for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
+        const bool last = !p->plain && spent(p, work) >= calm;
+        if (last) a.cap = 0, a.length = p->length;
+        else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
+        const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
+        if (part) keep_near_bad(w);
+        settled = run_round(w, p, a.length, a.cap, on, last ? limit : calm, &m, work) && !part;
+        all = !part;
+        bt_rounds_look(w, p, settled, work);
+        if (settled || work->residual > p->tolerance) continue;
+        bt_rounds_look(w, p, true, work);
+        settled = true;
+    }
+    if (!settled) bt_rounds_look(w, p, true, work);
+}

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT
+// Signorini–Coulomb contact problem of one step, by projected Gauss–Seidel.
+//
+//     w = J U2 + b,   M (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
+//
+// A sweep updates units one after the other (a unit is a manifold: the normals of its two points are solved together, and their friction as
+// one), tile by tile in the order of tiles.h, with the velocities as they stand. Contacts with large movable bodies (the berg on a line has
+// hundreds) follow in sequence, and the tow line after them.
+//
+// Data flow of a step. units (bt_tile.units, with the impulses of the last step) and vel_free -> vel -> look -> lists -> sweeps -> vel, units:
+//   look     reads all units and vel; writes bt_tile.list (units that bear load or close), the residual, and what is bad;
+//   sweep    goes over the lists only, inner_sweeps times a tile before the next has its turn: its data are then in the first-level cache, and
+//            between ranks nothing need be exchanged. The listed units are packed for it, four a batch, and their impulses put back
+//            before the next look (src/solve/batch.h); those of large bodies and with bounds are swept where they are;
+//   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
+//   settle   at the end: vel anew from vel_free and the impulses, then a look: the residual that is reported.
+// Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the same, with displacements in
+// place of velocities.
+//
+// Why momentum: a plain sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and ~m_berg/m_floe where a heavy
+// berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over all units, as the reference; both end
+// on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
+//
+// With ice.crushing.pressure the normal impulses have an upper bound, too, λ_n <= L(w_n) (contact/crush.h, src/contact/limit.h): the sweep over a tile
+// is another one then, and in the natural map the projection is on [0, L].
+//
+// Convergence is judged on the natural map of (1): the largest of
+//     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
+// which is zero exactly at a solution. The sweep's own largest update is the same quantity seen while velocities
+// still change; it only says when the true map is worth its price. Its root mean square over all rows is reported beside it.
+#ifndef BERGTOW_SOLVER_H
+#define BERGTOW_SOLVER_H
+
+#include "contact/contacts.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "bergtow/world.h"
+
+typedef struct bt_solver {
+    bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
+    bt_idx cap_before;
+    double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s
+    bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
+    bt_idx cap_bodies;
+    bool shifted;                ///< the projection did something this step
+    bool rebounds;               ///< some contact of this step has a restitution
+    struct bt_islands *islands;  ///< bodies that touch, while `rebounds`
+    double prepare_s;            ///< wall time of islands and biases in this step, s
+} bt_solver;
+
+bt_solver *bt_solver_create(void);
+void bt_solver_free(bt_solver *s);
+
+/// Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
+/// U2, units and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
+/// touch each other) come out with positive work, the step is solved again with the restitution of that island
+/// halved, and again, at last with none, where the work is never positive.
+void bt_solver_solve(bt_world *w);
+
+/// Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the same
+/// rows without friction; they move poses and never touch velocities.
+void bt_solver_project(bt_world *w);
+
+/// Natural-map residual at the present velocities and impulses: largest, and root mean square (or NULL), m/s. Collective.
+double bt_solver_residual(bt_world *w, double *rms);
+
+/// Work of the impulses of unit u in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
+/// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of two impulses that
+/// act at once the line's comes first, or the pull of the line into the ice would count as work of the ice.
+double bt_solver_work(const bt_world *w, const bt_unit *u);
+
+/// The part of it of the normal impulse of point i, J.
+double bt_solver_normal_work(const bt_world *w, const bt_unit *u, int i);
+
+/// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
+bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);
+
+#endif

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: MIT
+// Passes over the active tiles by threads, with the exchange between ranks under way.
+#include "space/phases.h"
+
+#include <omp.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "partition/domain.h"
+
+void bt_totals_merge(bt_totals *into, const bt_totals *from)
+{
+    for (int k = 0; k < into->n_sums; k++) bt_sum_join(&into->sum[k], &from->sum[k]);
+    into->most = bt_max(into->most, from->most);
+}
+
+// --- who does what ---------------------------------------------------------------------------------------------------
+
+/// Has this rank work in tile k?
+static bool has_work(const bt_world *w, bt_idx k)
+{
+    const bt_tiles *t = w->tiles;
+    return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
+}
+
+/// Stretches of tiles [begin, end) of the order with equal parts of the listed units, one a share. A tile itself costs something, too.
+static void deal_stretch(bt_tiles *t, bt_idx begin, bt_idx end, bt_share *share)
+{
+    enum { TILE = 4 }; // units
+    int64_t all = 0, before = 0;
+    for (bt_idx i = begin; i < end; i++) all += TILE + t->tile[t->order[i]].n_list;
+    bt_idx i = begin;
+    for (bt_idx s = 0; s < t->n_shares; s++) {
+        share[s].begin = i;
+        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += TILE + t->tile[t->order[i]].n_list;
+        share[s].end = i;
+    }
+    share[t->n_shares - 1].end = end;
+}
+
+void bt_phases_deal(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    int64_t listed = 0;
+    for (bt_idx i = 0; i < t->n_order; i++) listed += t->tile[t->order[i]].n_list;
+    const bt_idx n = BT_MANY(listed, BT_FEW_UNITS) ? omp_get_max_threads() : 1;
+    if (n > t->cap_shares) {
+        free(t->share);
+        t->share = bt_alloc_aligned(BT_STRETCHES * (size_t)n, sizeof *t->share);
+        t->cap_shares = n;
+    }
+    t->n_shares = n;
+    for (int p = 0; p < BT_PHASES; p++) {
+        const bt_idx middle = t->start[p] + t->n_border[p];
+        deal_stretch(t, t->start[p], middle, &t->share[2 * p * n]);
+        deal_stretch(t, middle, t->start[p + 1], &t->share[(2 * p + 1) * n]);
+    }
+}
+
+/// Stretch of the order that tile k belongs to: of each phase first the tiles at the border of the rank.
+static int stretch_of(const bt_world *w, bt_idx k)
+{
+    const bt_tile *tile = &w->tiles->tile[k];
+    return 2 * tile->phase + !(w->domain && tile->border);
+}
+
+void bt_phases_order(bt_world *w)
+{
+    bt_tiles *t = w->tiles;
+    bt_idx at[BT_STRETCHES + 1] = {0};
+    t->n_units = 0;
+    for (bt_idx j = 0; j < t->n_busy; j++) at[stretch_of(w, t->busy[j]) + 1] += has_work(w, t->busy[j]);
+    for (int s = 0; s < BT_STRETCHES; s++) at[s + 1] += at[s];
+    for (int p = 0; p < BT_PHASES; p++) {
+        t->start[p] = at[2 * p];
+        t->n_border[p] = at[2 * p + 1] - at[2 * p];
+    }
+    t->start[BT_PHASES] = t->n_order = at[BT_STRETCHES];
+    for (bt_idx j = 0; j < t->n_busy; j++) {
+        const bt_idx k = t->busy[j];
+        if (!has_work(w, k)) continue;
+        t->order[at[stretch_of(w, k)]++] = k;
+        t->n_units += t->tile[k].n_units;
+        t->tile[k].n_list = t->tile[k].n_units; // until they are listed
+    }
+    bt_phases_deal(w);
+}
+
+// --- passes ----------------------------------------------------------------------------------------------------------
+
+/// A pass, as each thread sees it.
+typedef struct {
+    bt_world *w;
+    bt_visit *visit;
+    const void *context;
+    bt_totals own;
+} pass;
+
+static void open_shares(bt_tiles *t)
+{
+    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++) atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
+}
+
+/// Tiles of one stretch of the order, which share no body: first those of this thread's share, then what others have not yet taken.
+static void visit_stretch(pass *o, int stretch)
+{
+    bt_tiles *t = o->w->tiles;
+    bt_share *share = &t->share[stretch * t->n_shares];
+    const bt_idx me = omp_get_thread_num();
+    for (bt_idx n = 0; n < t->n_shares; n++) {
+        bt_share *s = &share[(me + n) % t->n_shares];
+        for (;;) {
+            if (atomic_load_explicit(&s->next, memory_order_relaxed) >= s->end) break;
+            const bt_idx i = atomic_fetch_add_explicit(&s->next, 1, memory_order_relaxed);
+            if (i >= s->end) break;
+            o->visit(o->w, t->order[i], o->context, &o->own);
+        }
+    }
+}
+
+static void run_phases(pass *o, bt_vel *exchanged)
+{
+    bt_world *w = o->w;
+    const bool among = w->domain != NULL;
+    const bt_tiles *t = w->tiles;
+    for (int p = 0; p < BT_PHASES; p++) {
+        if (among) {
+            visit_stretch(o, 2 * p);
+#pragma omp barrier
+            if (exchanged) {
+#pragma omp master
+                bt_domain_send(w, p, exchanged);
+            }
+        }
+        if (t->start[p] + t->n_border[p] < t->start[p + 1]) visit_stretch(o, 2 * p + 1);
+        else if (!among) continue; // nobody was here
+        if (among && exchanged) {
+#pragma omp master
+            bt_domain_receive(w, p, exchanged);
+        }
+#pragma omp barrier
+    }
+}
+
+void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
+{
+    open_shares(w->tiles);
+#pragma omp parallel num_threads(w->tiles->n_shares)
+    {
+        pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
+        run_phases(&o, exchanged);
+#pragma omp critical
+        bt_totals_merge(t, &o.own);
+    }
+}
+
+void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
+{
+    open_shares(w->tiles);
+#pragma omp parallel num_threads(w->tiles->n_shares)
+    {
+        pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
+        for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(&o, s);
+#pragma omp critical
+        bt_totals_merge(t, &o.own);
+    }
+}
+
+void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
+{
+    const bt_tiles *ts = w->tiles;
+#pragma omp parallel for schedule(static) num_threads(ts->n_shares)
+    for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
+}

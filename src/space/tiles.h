@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: MIT
+// Tiles: the division of space that orders the contacts, colours them, and is dealt to threads and ranks.
+//
+// Space is cut into square tiles, some floe diameters wide. A floe carries the coordinates (tx, ty) of the tile that its
+// centroid was in when labels were last renewed. A contact of bodies a and b belongs to tile
+//     T = (min(tx_a, tx_b), min(ty_a, ty_b)),
+// so T touches only bodies of the 2×2 block {T, T+x, T+y, T+xy}, provided that bodies within reach of each other are in
+// adjacent tiles. This holds while side >= 2 r + margin + 2 a: r the largest radius, a how far a centroid may stand outside its
+// tile. When some floe stands farther out, all labels are renewed (and floes sorted, and moved to their ranks).
+//
+// Tiles whose coordinates have the same parity touch disjoint blocks: four colours, always, whatever the contacts.
+// A Gauss–Seidel sweep goes through the colours; the tiles of a colour are done at once by threads and ranks, the contacts of a
+// tile one after the other, in an order that follows from gids. So the sequence of updates as any body sees it is the
+// same for every division among threads and ranks. Why not a colouring of the contact graph (first tried): 8 to 12
+// colours and as many barriers and exchanges a sweep, tail colours of a few contacts, rows of one colour scattered
+// over all memory, and colours that depend on each other through all ranks. A tile's floes and rows stay in the first-level
+// cache while it is swept, may be swept more than once at that price, and its partial sums are formed in a fixed order.
+//
+// Contacts with a large movable body (the berg on a line has hundreds) belong to one last tile, done in sequence after the
+// four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on every rank.
+//
+// Rest. A tile T is idle, and costs nothing, when every floe in its block and in a ring of tiles around it has exactly the
+// velocity of the water, there is no other force (bt_tiles_calm), no large body that moves is near, and the position projection
+// moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
+// never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
+// caught after the solve (step.c).
+//
+// A step goes over the list of busy tiles alone: those that are not at rest, those that are not idle, and those whose bodies may be moved by a
+// contact that was found. Tiles enter the list where they are woken (something moves near, forces have changed, labels are new) and leave it when they are
+// none of these. Everything in the others is as it was, and their part of every sum is zero. Floes that drift with moving water are
+// moved in every step: then all tiles are busy.
+#ifndef BERGTOW_TILES_H
+#define BERGTOW_TILES_H
+
+#include <stdint.h>
+
+#include "bergtow/sum.h"
+#include "bergtow/world.h"
+
+enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES }; ///< the fifth phase is the tile of the large movable bodies
+
+/// A pair near enough to be looked at, and what its contact was in the last step.
+typedef struct bt_pair {
+    bt_idx a, b;         ///< gid[a] < gid[b]
+    uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
+    int32_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
+    int32_t n_points;    ///< contact points in the last solution
+    uint32_t feature[2]; ///< of those
+    double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
+    double reach;        ///< gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
+} bt_pair;
+
+/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line along the tangent, so both have the
+/// same tangential row.
+typedef struct bt_unit {
+    bt_idx a, b;
+    double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
+    double ran[2], rbn[2]; ///< ra×n, rb×n of each point, m
+    double rat, rbt;       ///< ra×t, rb×t, m
+    double w[2], w12;      ///< W of the normals and their coupling, 1/kg
+    double mn[2];          ///< 1/W, kg; 0 for the second of one point
+    double per_det;        ///< 1/(W1 W2 − W12²), kg²; 0 when singular or one point
+    double wt, mt;         ///< W of the tangent and its inverse
+    double bias[2];        ///< b of the normals, m/s
+    double mu;
+    double ln[2], lt;      ///< impulse on b, N s
+    int32_t n, spare;      ///< points, 1 or 2
+} bt_unit;
+_Static_assert(sizeof(bt_unit) == 192, "three cache lines");
+
+/// What the sweep does not see of it.
+typedef struct bt_gaps {
+    double gap[2];         ///< m
+    double after[2];       ///< gaps that U2 leaves at the end of the step, m
+    double push[2];        ///< multipliers of the position projection, kg m
+    int32_t pair;          ///< its pair in the tile
+} bt_gaps;
+
+typedef struct bt_tile {
+    int32_t x, y;                   ///< coordinates
+    bt_idx first, end;              ///< its bodies in storage
+    bt_idx right, above, diagonal;  ///< tiles +x, +y, +xy: index, −1 = none
+    bool own;                       ///< this rank solves its contacts and answers for its bodies
+    bool border;                    ///< some body of its block is held by other ranks too
+    int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
+    bool active;                    ///< its contacts are looked at in this step
+    double margin;                  ///< m, of this step's detection
+    // pair list
+    bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b, parts)
+    bt_idx n_pairs, cap_pairs;
+    bool listed;                    ///< the list is valid for margin_listed
+    double margin_listed;           ///< m
+    double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
+    bt_idx *near;                   ///< [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    bt_idx n_near, cap_near;
+    bool near_known;                ///< they are those of the list
+    double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
+    // contacts of this step
+    bt_unit *units;                 ///< [n_units]
+    bt_gaps *gaps;                  ///< [n_units] of the units
+    bt_idx n_units, cap_units;
+    int64_t n_points;
+    double overlap;                 ///< deepest, m
+    // crushing (crush.h); NULL in rigid contact
+    struct bt_limit *limits;        ///< [n_units] bounds of the units
+    struct bt_scar *scars;          ///< [n_scars] what pairs of this tile have crushed
+    bt_idx cap_limits, n_scars, cap_scars;
+    // units that are swept (src/solve/rounds.h)
+    bt_idx *list;                   ///< [n_list] ascending
+    double (*before)[3];            ///< [n_units] unknowns before the last sweep
+    bt_idx n_list, cap_list;
+    struct bt_batch *batch;         ///< [n_batches] the listed units again (src/solve/batch.h)
+    bt_idx n_batches, cap_batches;
+    bool packed;                    ///< their impulses are there, and not in the units
+    int64_t updates;                ///< of units, since the balance of the ranks was last noted
+    bool bad;                       ///< some unit is not yet near the tolerance
+    bool kept;                      ///< swept in a round over a part of the field
+    bool still;                     ///< they could not in the round before: nothing of theirs moves on
+    bool swept;                     ///< listed units, here or on another rank, may move its bodies
+} bt_tile;
+
+/// What one thread is to do of one stretch of the order (src/space/phases.h).
+typedef struct bt_share {
+    _Atomic bt_idx next;            ///< the next tile to be taken, a place in the order
+    bt_idx begin, end;
+    char apart[64 - 3 * sizeof(bt_idx)]; ///< a cache line each
+} bt_share;
+
+enum { BT_FEW_TILES = 64 }; ///< fewer are done by one thread: a team costs microseconds
+
+enum { BT_REST_NO, BT_REST_NEW, BT_REST_KNOWN }; ///< at rest since the last step; and forces have been told
+
+typedef struct bt_tiles {
+    bool labelled;                  ///< labels and storage order are valid
+    double x0, y0;                  ///< corner of tile (0, 0) m, moving with the water
+    double side_x, side_y;          ///< m
+    double allowance;               ///< m, how far a centroid may stand outside its tile
+    double reach;                   ///< largest radius of a floe in a tile, over all ranks, m
+    double heaviest;                ///< largest mass, kg
+    bool rebounds;                  ///< some body has a restitution
+    double margin_max;              ///< largest margin that these tiles allow, m
+    int32_t low_x, low_y, n_x, n_y; ///< the box of tiles that hold floes
+    int32_t wrap_x, wrap_y;         ///< tiles around a periodic direction, 0 = open; 1 = one tile, its own neighbour nowhere
+    bt_tile *tile;                  ///< [n] last: the large bodies
+    bt_idx n, cap;
+    bt_idx *at;                     ///< [n_y][n_x] index of a tile, −1 = not on this rank
+    int64_t cap_at;
+    bt_idx n_tiled;                 ///< bodies in tiles: storage [0, n_tiled); large and everywhere after them
+    // every step
+    double *speed;                  ///< [n] largest speed of the tile's bodies through the water's frame, m/s; 0 = all at rest
+    double *bound;                  ///< [n] speed that the margin of tile T is made for, m/s
+    double *moved;                  ///< [n] path length that no body of the tile exceeds, m; grows only
+    double moved_any;               ///< the same for any body in a tile
+    uint8_t *rest;                  ///< [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
+    uint8_t *awake;                 ///< [n] contacts of this step may move the tile's bodies
+    bt_idx *busy;                   ///< [n_busy] tiles that a step looks at, ascending; the last tile is always one
+    bt_idx n_busy;
+    uint8_t *is_busy;               ///< [n]
+    bool busy_sorted;
+    bt_idx *order;                  ///< [n_order] tiles of this rank with work, by phase, in each those at the border of the rank first
+    bt_idx n_order;
+    bt_idx start[BT_PHASES + 1];    ///< first tile of each phase in the order
+    bt_idx n_border[BT_PHASES];     ///< tiles at the border among those of each phase
+    bt_share *share;                ///< [BT_STRETCHES][n_shares] at the border and not, of every phase
+    bt_idx n_shares, cap_shares;    ///< threads
+    bt_idx n_units;                 ///< on this rank
+    bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
+    bool calm;                      ///< nothing but contacts moves a floe that drifts with the water
+    bool still;                     ///< the water is at rest
+    int64_t n_labellings, n_listings;
+} bt_tiles;
+
+bt_tiles *bt_tiles_create(void);
+void bt_tiles_free(bt_tiles *t);
+
+/// At the start of a step: renew labels, storage and tiles if some floe has left its tile too far. Collective.
+void bt_tiles_begin(bt_world *w);
+
+/// The same if the tiles are too small for this margin, m. True when renewed: every index of a body has changed. Collective.
+bool bt_tiles_update(bt_world *w, double margin);
+
+/// Tile k, or every tile, is looked at from now on.
+void bt_tiles_wake(bt_tiles *t, bt_idx k);
+void bt_tiles_wake_all(bt_tiles *t);
+/// The list of busy tiles in its order, after some have been woken.
+void bt_tiles_sort_busy(bt_tiles *t);
+/// Leave out of the list what is at rest, idle, and not moved by contacts.
+void bt_tiles_leave(bt_tiles *t);
+
+/// How far the centroid of body i stands outside its tile, m.
+double bt_tiles_outside(const bt_world *w, bt_idx i);
+
+/// Coordinates of the tile that owns the contacts between bodies of tiles p and q.
+void bt_tiles_owner(const bt_tiles *t, const int32_t p[2], const int32_t q[2], int32_t out[2]);
+
+/// Are tiles p and q the same or side by side, around periods too?
+bool bt_tiles_adjacent(const bt_tiles *t, const int32_t p[2], const int32_t q[2]);
+
+/// Index of the tile at (x, y), −1 = not here.
+bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y);
+
+/// May the bodies of tile k have another velocity, or pose, than by drifting with the water?
+static inline bool bt_tiles_moves(const bt_tiles *t, bt_idx k) { return !t->rest[k] || t->awake[k]; }
+
+/// What the last step left in a pair, by the names that last.
+typedef struct bt_trace {
+    bt_gid a, b;
+    uint16_t part[2];
+    int32_t n_points;
+    uint32_t feature[2];
+    double ln[2], lt;
+    bool scar;           ///< not a contact but what the pair has crushed (crush.h): ln are the depths, m
+} bt_trace;
+
+/// Traces of the pairs in contact, and of those that have crushed each other, that this rank owns, [*n]; the caller frees.
+bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n);
+/// Collective. Tiles as another run left them: their geometry and the labels of all bodies, which every rank holds, have been set, and the
+/// traces [n], which are released, are those of all ranks. A domain has been created, but nothing is dealt yet.
+void bt_tiles_restore(bt_world *w, bt_trace *trace, int64_t n);
+/// Put traces, in any order, into the pair lists of empty tiles.
+void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n);
+
+/// Tile that owns the contacts of bodies a and b, −1 = not here.
+bt_idx bt_tiles_of_pair(const bt_world *w, bt_idx a, bt_idx b);
+
+/// True when only contacts can move a floe that has the velocity of the water: no wind of another velocity, no Coriolis force
+/// or tilt out of balance.
+bool bt_tiles_calm(const bt_world *w);
+
+#endif

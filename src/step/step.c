@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: MIT
+// One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
+#include <math.h>
+
+#include "contact/contacts.h"
+#include "contact/crush.h"
+#include "force/environment.h"
+#include "bergtow/forces.h"
+#include "loads/impact.h"
+#include "solve/solver.h"
+#include "bergtow/sum.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "step/window.h"
+#include "bergtow/world.h"
+#include "partition/domain.h"
+#include "space/phases.h"
+
+/// Into the period; *lap counts the periods that were taken off.
+static double wrap(double x, double low, double period, int32_t *lap)
+{
+    if (period > 0) {
+        if (x < low) return --*lap, x + period;
+        if (x >= low + period) return ++*lap, x - period;
+    }
+    return x;
+}
+
+/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there only for tiles
+/// that contacts may move: for others their array still holds what it held, maybe of other bodies.
+static double move(bt_world *w, bt_idx i, bool shifted)
+{
+    bt_bodies *b = &w->bodies;
+    const bt_solver *s = w->solver;
+    const double dt = w->par.dt, drift_x = w->par.water_u, drift_y = w->par.water_v;
+    double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
+    double x = dt * (b->vel[i].x - drift_x), y = dt * (b->vel[i].y - drift_y);
+    b->stirred[i] = 0;
+    if (shifted) {
+        const bt_vel d = s->shift[i];
+        dx += d.x, dy += d.y, turn += d.w;
+        x += d.x, y += d.y;
+        b->stirred[i] = d.x != 0 || d.y != 0 || d.w != 0;
+    }
+    bt_pose *p = &b->pose[i];
+    if (dx != 0 || dy != 0) {
+        int32_t across = 0;
+        p->x = wrap(p->x + dx, w->par.x0, w->par.period_x, &b->home[i].lap);
+        p->y = wrap(p->y + dy, w->par.y0, w->par.period_y, &across);
+    }
+    if (turn != 0) {
+        p->yaw += turn;
+        bt_world_turn_outline(w, i);
+    }
+    if (w->tow && i >= w->tiles->n_tiled && i == bt_world_towed(w)) {
+        w->tow->travel_x += dx;
+        w->tow->travel_y += dy;
+    }
+    if (x == 0 && y == 0 && turn == 0) return 0;
+    // Rounding of a pose of kilometres must not make the path shorter than the move.
+    const double path = (sqrt(x * x + y * y) + b->radius[i] * fabs(turn)) * (1 + 1e-9);
+    b->path[i] += path;
+    return path;
+}
+
+/// All bodies of tile k drift with the water, and nothing pushed them apart.
+static bool at_rest(const bt_world *w, const bt_tile *t)
+{
+    const bt_bodies *b = &w->bodies;
+    for (bt_idx i = t->first; i < t->end; i++)
+        if (b->stirred[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0) return false;
+    return true;
+}
+
+/// X2 = X1 + U2 Δt + D.
+static void advance(bt_world *w)
+{
+    bt_tiles *ts = w->tiles;
+    // Tiles move with the water where that is not periodic.
+    bt_environment_advance(w);
+    if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
+    if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
+    double farthest = 0, out = 0;
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+    for (bt_idx j = 0; j < ts->n_busy; j++) {
+        const bt_idx k = ts->busy[j];
+        const bt_tile *t = &ts->tile[k];
+        const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
+        if (!moves && ts->still) continue;
+        double path = 0;
+        for (bt_idx i = t->first; i < t->end; i++) {
+            const double way = move(w, i, w->solver->shifted && moves);
+            path = bt_max(path, way);
+            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_tiles_outside(w, i)); // no farther than before
+        }
+        ts->moved[k] += path;
+        if (!last) farthest = bt_max(farthest, path);
+        if (!moves || last) continue;
+        if (!ts->calm || !at_rest(w, t)) ts->rest[k] = BT_REST_NO;
+        else if (!ts->rest[k]) ts->rest[k] = BT_REST_NEW; // where forces have been told, they would find what they found
+    }
+    ts->moved_any += farthest;
+    bt_domain_maxima(w, &out, 1);
+    ts->relabel = out > ts->allowance;
+    bt_tow_advance(w);
+}
+
+enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
+
+/// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
+static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_tile *tile = &w->tiles->tile[k];
+    for (bt_idx i = tile->first; i < tile->end; i++) {
+        if (b->motion[i] != BT_DYNAMIC) continue;
+        const bt_vel *v = &b->vel[i];
+        const double dx = v->x - b->vel_free[i].x, dy = v->y - b->vel_free[i].y;
+        if (dx != 0 || dy != 0) { // also of a floe that its contacts have stopped
+            bt_sum_add(&t->sum[GAINED_X], dx / b->inv[i].m);
+            bt_sum_add(&t->sum[GAINED_Y], dy / b->inv[i].m);
+        }
+        if (v->x == 0 && v->y == 0 && v->w == 0) continue;
+        bt_sum_add(&t->sum[CARRIED], b->mass[i] * (fabs(v->x) + fabs(v->y)));
+        bt_sum_add(&t->sum[ENERGY], 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
+    }
+    for (bt_idx j = 0; j < tile->n_units; j++) {
+        const bt_unit *u = &tile->units[j];
+        const double normal = u->ln[0] + u->ln[1];
+        if (normal == 0) continue;
+        bt_sum_add(&t->sum[EXCHANGED], normal);
+        bt_sum_add(&t->sum[WORK], bt_solver_work(w, u));
+        const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
+        if (sign == 0) continue;
+        bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
+        bt_sum_add(&t->sum[APPLIED_Y], sign * (normal * u->ny + u->lt * u->nx));
+    }
+    bt_sum_add(&t->sum[POINTS], (double)tile->n_points);
+    t->most = bt_max(t->most, tile->overlap);
+}
+
+/// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
+/// line; the difference over the momentum exchanged is the residual. Also work, energy, counts and overlap of the step.
+static void balance(bt_world *w)
+{
+    const bt_tiles *ts = w->tiles;
+    bt_step_stats *st = &w->stats;
+    bt_totals all = {.n_sums = N_BALANCE};
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+    {
+        bt_totals t = {.n_sums = N_BALANCE};
+#pragma omp for schedule(dynamic, 16)
+        for (bt_idx j = 0; j < ts->n_busy; j++) {
+            const bt_idx k = ts->busy[j];
+            const bt_tile *tile = &ts->tile[k];
+            if (!tile->own) continue;
+            if (tile->active) bt_sum_add(&t.sum[ACTIVE], tile->end - tile->first);
+            if (k == ts->n - 1 || bt_tiles_moves(ts, k) || !ts->still) balance_tile(w, k, &t);
+        }
+#pragma omp critical
+        bt_totals_merge(&all, &t);
+    }
+    for (int k = 0; bt_tow_has_line(w->tow) && ts->tile[ts->n - 1].own && k < w->tow->n_branches; k++) {
+        const bt_branch *b = &w->tow->branch[k];
+        bt_sum_add(&all.sum[APPLIED_X], b->lambda * b->lx);
+        bt_sum_add(&all.sum[APPLIED_Y], b->lambda * b->ly);
+        bt_sum_add(&all.sum[EXCHANGED], b->lambda);
+    }
+    bt_domain_reduce(w, &all);
+    double x[N_BALANCE];
+    for (int k = 0; k < N_BALANCE; k++) x[k] = bt_sum_value(&all.sum[k]);
+    const double ex = x[GAINED_X] - x[APPLIED_X], ey = x[GAINED_Y] - x[APPLIED_Y];
+    // A step that exchanges next to nothing is measured against the momentum carried: rounding is relative to that.
+    const double scale = bt_max(x[EXCHANGED], 1e-4 * x[CARRIED]);
+    st->momentum_residual = scale > 0 ? sqrt(ex * ex + ey * ey) / scale : 0;
+    st->contact_work = x[WORK];
+    st->kinetic_energy = x[ENERGY];
+    st->n_points = (int64_t)x[POINTS];
+    st->n_active = (int64_t)x[ACTIVE];
+    st->overlap = all.most;
+}
+
+/// Add to a phase the time since *t0, less what was spent waiting for other ranks, which has its own entry.
+static void clock_phase(bt_world *w, double *phase, double *t0)
+{
+    const double now = bt_clock(), waited = bt_domain_exchange_time(w);
+    *phase += now - *t0 - waited;
+    w->stats.exchange_s += waited;
+    *t0 = now;
+}
+
+/// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
+/// faster (squeezed out of a wedge, spun, rebounding). When the solution outruns the margin, the step is
+/// detected and solved again with the margin that it needs, from the impulses found so far.
+static void solve_contacts(bt_world *w)
+{
+    enum { MAX_REPEATS = 4 };
+    bt_step_stats *st = &w->stats;
+    bt_bodies *b = &w->bodies;
+    double t0 = bt_clock();
+    double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+    if (bt_tiles_update(w, bt_contacts_margin(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+    int64_t sweeps = 0, updates = 0, moves = 0;
+    bool again = false;
+    st->repeats = 0;
+    for (bool done = false; !done;) {
+        bt_contacts_detect(w, again); // gaps and J at X1
+        clock_phase(w, &st->detect_s, &t0);
+        bt_solver_solve(w); // U2 = U* + M⁻¹ Jᵀ λ
+        clock_phase(w, &st->solve_s, &t0);
+        sweeps += st->sweeps;
+        updates += st->unit_updates;
+        moves += st->unit_moves;
+        fastest = bt_max(fastest, bt_contacts_bound(w, b->vel, b->vel, true));
+        st->outrun = bt_contacts_outrun(w);
+        done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
+        if (!done) {
+            st->repeats++;
+            again = !bt_tiles_update(w, bt_contacts_margin(w, fastest));
+            if (!again) {
+                bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+                bt_contacts_bound(w, b->vel, b->vel, true);
+            }
+        }
+        clock_phase(w, &st->detect_s, &t0);
+        st->colour_s += w->solver->prepare_s;
+        st->solve_s -= w->solver->prepare_s;
+    }
+    st->sweeps = sweeps;
+    st->unit_updates = updates;
+    st->unit_moves = moves;
+}
+
+void bt_world_step(bt_world *w)
+{
+    bt_step_stats *st = &w->stats;
+    st->forces_s = st->detect_s = st->colour_s = st->solve_s = st->advance_s = st->exchange_s = 0;
+    double t0 = bt_clock();
+    bt_environment_begin(w); // U_w, U_a
+    bt_window_begin(w);
+    bt_tiles_begin(w);
+    clock_phase(w, &st->detect_s, &t0);
+    bt_forces_predict(w); // U*, effective M
+    bt_tow_begin(w);
+    clock_phase(w, &st->forces_s, &t0);
+    solve_contacts(w); // U2
+    t0 = bt_clock();
+    bt_crush_grow(w);
+    bt_solver_project(w); // D
+    balance(w);
+    clock_phase(w, &st->solve_s, &t0);
+    bt_impacts_take(w); // of the towed body, at X1
+    advance(w); // X2 = X1 + U2 Δt + D
+    bt_window_advance(w);
+    bt_domain_note(w);
+    w->step++;
+#ifdef BT_VALIDATE
+    if (w->step % BT_VALIDATE_STEPS == 0) bt_domain_validate(w);
+#endif
+    clock_phase(w, &st->advance_s, &t0);
+}

@@ -1,0 +1,393 @@
+// SPDX-License-Identifier: MIT
+// The moving window: what step/window.h says, step by step.
+//
+// Ranks. Which floes are due follows from their own state, so owners find them; the list of them, with the places they would take,
+// goes to all ranks, each of which tests the places against the bodies it owns. From there on everything is done alike by every
+// rank that holds a body, so copies stay copies; labels are renewed in the same step, which brings the floes to their new ranks.
+#include "step/window.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "contact/contacts.h"
+#include "bergtow/forces.h"
+#include "space/tiles.h"
+#include "tow/tow.h"
+#include "partition/domain.h"
+#include "field/field_make.h"
+
+#define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
+#define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
+
+/// A floe that could go, and the place it would take.
+typedef struct candidate {
+    bt_gid gid;
+    bt_pose place;
+    double radius, mass, inertia;
+    bt_vel was;
+    int64_t n, first; ///< its vertices at the place, with those of parts, in the list of them all
+    bool stays;
+} candidate;
+
+/// Mean floe: its drag as that of all floes together over their number. Mean width of a convex outline: perimeter / π (Cauchy).
+static void mean_floe(const bt_world *w, bt_window *v)
+{
+    const bt_bodies *b = &w->bodies;
+    double n = 0;
+    for (bt_gid g = 0; g < v->n_floes; g++) {
+        const bt_idx i = bt_world_index(w, g);
+        if (b->motion[i] != BT_DYNAMIC) continue;
+        double perimeter = 0;
+        for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
+        v->mass += b->mass[i];
+        v->share += b->share[i] * b->mass[i];
+        v->water += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
+        v->air += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
+        v->vel.x += b->vel[i].x;
+        v->vel.y += b->vel[i].y;
+        n++;
+    }
+    if (n == 0) return;
+    v->share /= v->mass;
+    v->mass /= n, v->water /= n, v->air /= n;
+    v->vel.x /= n, v->vel.y /= n;
+}
+
+static double body_at(const bt_world *w) { return w->window->sign * w->tow->travel_x; }
+
+void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes, bool held)
+{
+    bt_bodies *b = &w->bodies;
+    const double length = w->par.period_x, zone = ZONE_SHARE * ahead;
+    bt_window *v = w->window = bt_alloc(1, sizeof *v);
+    *v = (bt_window){.sign = sign, .length = length, .ahead = ahead, .zone = zone, .n_floes = n_floes, .held = held};
+    v->stride = bt_min(STRIDE_SIZES * w->par.size, bt_min(0.25 * zone, length / 16));
+    v->start = v->rear = body_at(w) + ahead - length;
+    mean_floe(w, v);
+    if (held) v->vel.y = 0;
+    for (bt_idx i = 0; i < b->n; i++) {
+        const double x = b->pose[i].x;
+        bt_home *h = &b->home[i];
+        *h = (bt_home){.x = x, .y = b->pose[i].y, .yaw = b->pose[i].yaw};
+        if (b->gid[i] >= n_floes) continue;
+        // The copy that lies within [rear, rear + L).
+        h->copy = h->lap = (int32_t)(sign > 0 ? ceil((v->rear - x) / length) : floor((-x - v->rear) / length));
+    }
+}
+
+static bool renewable(const bt_world *w, bt_idx i)
+{
+    return w->bodies.gid[i] < w->window->n_floes && w->bodies.motion[i] == BT_DYNAMIC;
+}
+
+/// σx of the home of floe i, and of the floe itself.
+static double home_at(const bt_world *w, bt_idx i)
+{
+    const bt_home *h = &w->bodies.home[i];
+    return w->window->sign * (h->x + w->window->drift_x + h->copy * w->window->length);
+}
+static double floe_at(const bt_world *w, bt_idx i)
+{
+    return w->window->sign * (w->bodies.pose[i].x + w->bodies.home[i].lap * w->window->length);
+}
+
+/// Has the rear passed the home of floe i, and may the floe be taken from where it is?
+static bool due(const bt_world *w, bt_idx i)
+{
+    const bt_window *v = w->window;
+    const double late = v->rear - home_at(w, i);
+    return late > 0 && floe_at(w, i) < v->rear + bt_min(late, ZONE_SHARE * (v->length - v->ahead));
+}
+
+/// x brought into the period from `low`; *turns: periods it lay above.
+static double into(double x, double low, double period, int32_t *turns)
+{
+    *turns = 0;
+    if (!(period > 0)) return x;
+    *turns = (int32_t)floor((x - low) / period);
+    x -= *turns * period;
+    if (x >= low + period) x -= period, ++*turns; // rounding
+    return x;
+}
+
+/// Place that floe i takes in the mother field around the period; *turns: periods that it lies from there without copies.
+static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
+{
+    const bt_window *v = w->window;
+    const bt_home *h = &w->bodies.home[i];
+    int32_t across;
+    bt_pose p = {.yaw = h->yaw, .c = cos(h->yaw), .s = sin(h->yaw)};
+    p.x = into(h->x + v->drift_x, w->par.x0, v->length, turns);
+    p.y = into(h->y + v->drift_y, w->par.y0, w->par.period_y, &across);
+    return p;
+}
+
+/// Vertices of the candidates, turned as at their places, relative to the centroids.
+typedef struct shapes {
+    double *vertex;  ///< [n][2] m
+    bt_mark *mark;   ///< [n]
+} shapes;
+
+static int by_gid(const void *p, const void *q)
+{
+    const candidate *a = p, *b = q;
+    return (a->gid > b->gid) - (a->gid < b->gid);
+}
+
+/// Collective. All floes that are due, by id, and their shapes.
+static candidate *collect(const bt_world *w, size_t *n, shapes *shape)
+{
+    const bt_bodies *b = &w->bodies;
+    size_t m = 0, n_vertices = 0, all;
+    candidate *mine = NULL;
+    shapes own = {NULL, NULL};
+    for (int pass = 0; pass < 2; pass++) { // to count, to fill
+        if (pass) {
+            mine = bt_alloc(m, sizeof *mine);
+            own = (shapes){bt_alloc(2 * n_vertices, sizeof *own.vertex), bt_alloc(n_vertices, sizeof *own.mark)};
+        }
+        m = n_vertices = 0;
+        for (bt_idx i = 0; i < b->n; i++) {
+            if (!renewable(w, i) || !bt_domain_owns(w, i) || !due(w, i)) continue;
+            int32_t turns;
+            const bt_pose p = place_of(w, i, &turns);
+            const int64_t count = b->offset[i + 1] - b->offset[i];
+            if (pass)
+                mine[m] = (candidate){.gid = b->gid[i], .place = p, .radius = b->radius[i], .mass = b->mass[i],
+                                      .inertia = b->inertia[i], .was = b->vel[i], .n = count};
+            m++;
+            for (int64_t k = 0; pass && k < count; k++) {
+                const double *q = b->vertices + 2 * (b->offset[i] + k);
+                double *to = own.vertex + 2 * (n_vertices + (size_t)k);
+                to[0] = p.c * q[0] - p.s * q[1];
+                to[1] = p.s * q[0] + p.c * q[1];
+                own.mark[n_vertices + (size_t)k] = b->mark[b->offset[i] + k];
+            }
+            n_vertices += (size_t)count;
+        }
+    }
+    candidate *list = bt_domain_gather_all(w, mine, m, sizeof *mine, n);
+    shape->vertex = bt_domain_gather_all(w, own.vertex, n_vertices, 2 * sizeof *own.vertex, &all);
+    shape->mark = bt_domain_gather_all(w, own.mark, n_vertices, sizeof *own.mark, &all);
+    free(mine);
+    free(own.vertex);
+    free(own.mark);
+    int64_t first = 0;
+    for (size_t k = 0; k < *n; k++) {
+        list[k].first = first;
+        first += list[k].n;
+    }
+    if (*n) qsort(list, *n, sizeof *list, by_gid);
+    return list;
+}
+
+static candidate *find(candidate *list, size_t n, bt_gid gid)
+{
+    return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
+}
+
+/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as bt_part_first.
+static int64_t first_polygon(const bt_mark *mark, int64_t n) { return mark[0].count < n ? mark[0].count : 0; }
+static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at) { return at + mark[at].count < n ? at + mark[at].count : -1; }
+
+/// Depth to which candidate c at its place and body i, (dx, dy) from there, overlap, m; <= 0: they do not.
+static double depth(const bt_bodies *b, bt_idx i, const candidate *c, const shapes *s, double dx, double dy)
+{
+    const bt_mark *own = s->mark + c->first, *other = b->mark + b->offset[i];
+    const double *own_vertex = s->vertex + 2 * c->first, *other_vertex = b->outline + 2 * b->offset[i];
+    const int64_t n = b->offset[i + 1] - b->offset[i];
+    double deepest = 0;
+    for (int64_t p = first_polygon(own, c->n); p >= 0; p = next_polygon(own, c->n, p))
+        for (int64_t q = first_polygon(other, n); q >= 0; q = next_polygon(other, n, q))
+            deepest = bt_max(deepest, -bt_apart_of(own[p].count, own_vertex + 2 * p, other[q].count, other_vertex + 2 * q, dx, dy).gap);
+    return deepest;
+}
+
+/// Mark the places that body i, where it is, does not leave free.
+static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t n, const shapes *s, double *blocked)
+{
+    const bt_bodies *b = &w->bodies;
+    const bt_pose *p = &b->pose[i];
+    const double slop = bt_max(w->par.slop, 1e-9 * w->par.size);
+    for (size_t k = 0; k < n; k++) {
+        const candidate *c = &list[k];
+        const double dx = bt_nearest_image(p->x - c->place.x, w->par.period_x), dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
+        const double reach = b->radius[i] + c->radius;
+        if (dx * dx + dy * dy >= reach * reach || c->gid == b->gid[i]) continue;
+        if (depth(b, i, c, s, dx, dy) > slop) blocked[k] = 1;
+    }
+}
+
+/// Collective. Which candidates stay: those whose place is held by a body that is no candidate, then those whose place is held by one of
+/// these, and so on; what is left can go all at once. Each round, all that it can tell: the order of nothing matters.
+static void settle_places(const bt_world *w, candidate *list, size_t n, const shapes *shape)
+{
+    const bt_bodies *b = &w->bodies;
+    double half = 0, widest = 0; // the places lie within this of the first
+    for (size_t k = 0; k < n; k++) {
+        half = bt_max(half, fabs(bt_nearest_image(list[k].place.x - list[0].place.x, w->par.period_x)));
+        widest = bt_max(widest, list[k].radius);
+    }
+    double *blocked = bt_alloc(n, sizeof *blocked);
+    uint8_t *tested = bt_alloc((size_t)b->n, 1);
+    for (bool more = true; more;) {
+        for (bt_idx i = 0; i < b->n; i++) {
+            if (tested[i] || !bt_domain_owns(w, i)) continue;
+            const candidate *c = find(list, n, b->gid[i]);
+            if (c && !c->stays) continue;
+            tested[i] = 1;
+            if (b->motion[i] != BT_DYNAMIC && b->gid[i] != w->towed) continue; // walls leave room for the mother field
+            if (fabs(bt_nearest_image(b->pose[i].x - list[0].place.x, w->par.period_x)) > half + widest + b->radius[i]) continue;
+            obstruct(w, i, list, n, shape, blocked);
+        }
+        bt_domain_maxima(w, blocked, (int)n);
+        more = false;
+        for (size_t k = 0; k < n; k++) {
+            more = more || (blocked[k] > 0 && !list[k].stays);
+            list[k].stays = blocked[k] > 0;
+        }
+    }
+    free(blocked);
+    free(tested);
+}
+
+/// What a contact knew of the last step is of the place the floe has left.
+static void forget_contacts(bt_world *w, const uint8_t *moved)
+{
+    const bt_tiles *t = w->tiles;
+    for (bt_idx k = 0; k < t->n; k++)
+        for (bt_idx j = 0; j < t->tile[k].n_pairs; j++) {
+            bt_pair *p = &t->tile[k].pairs[j];
+            if (moved[p->a] || moved[p->b]) p->n_points = 0;
+        }
+}
+
+static void put(bt_world *w, bt_idx i)
+{
+    bt_bodies *b = &w->bodies;
+    const bt_window *v = w->window;
+    bt_home *h = &b->home[i];
+    int32_t turns;
+    b->pose[i] = place_of(w, i, &turns);
+    h->copy += (int32_t)v->sign;
+    h->lap = turns + h->copy;
+    b->vel[i] = b->vel_start[i] = b->vel_free[i] = v->vel;
+    b->stirred[i] = 1;
+    bt_world_turn_outline(w, i);
+}
+
+/// Every rank adds in the order of ids, all floes, held here or not: the sums are the same everywhere.
+static void account(bt_window *v, const candidate *c)
+{
+    const bt_vel *states[2] = {&c->was, &v->vel};
+    double *sums[2] = {v->dropped, v->brought};
+    for (int k = 0; k < 2; k++) {
+        const bt_vel *u = states[k];
+        sums[k][0] += c->mass * u->x;
+        sums[k][1] += c->mass * u->y;
+        sums[k][2] += 0.5 * (c->mass * (u->x * u->x + u->y * u->y) + c->inertia * u->w * u->w);
+    }
+    v->renewed++;
+    v->renewed_now++;
+}
+
+static void renew(bt_world *w, const candidate *list, size_t n)
+{
+    bt_window *v = w->window;
+    uint8_t *moved = bt_alloc((size_t)w->bodies.n, 1);
+    for (size_t k = 0; k < n; k++) {
+        if (list[k].stays) continue;
+        account(v, &list[k]);
+        const bt_idx i = bt_world_index(w, list[k].gid);
+        if (i < 0) continue;
+        moved[i] = 1;
+        put(w, i);
+    }
+    if (v->renewed_now > 0) {
+        forget_contacts(w, moved);
+        w->tiles->relabel = true;
+    }
+    free(moved);
+}
+
+/// Collective. Floes and places that the front zone has left behind as they are; floes that wait.
+static void let_go(bt_world *w)
+{
+    enum { KEPT, MISSED, WAITING, N };
+    bt_window *v = w->window;
+    bt_bodies *b = &w->bodies;
+    bt_totals t = {.n_sums = N};
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!renewable(w, i)) continue;
+        const bool own = bt_domain_owns(w, i);
+        if (home_at(w, i) < v->rear - v->zone) {
+            b->home[i].copy += (int32_t)v->sign;
+            if (own) bt_sum_add(&t.sum[MISSED], 1);
+        }
+        if (floe_at(w, i) < v->rear - v->zone) {
+            b->home[i].lap += (int32_t)v->sign;
+            if (own) bt_sum_add(&t.sum[KEPT], 1);
+        }
+        if (own && floe_at(w, i) < v->rear) bt_sum_add(&t.sum[WAITING], 1);
+    }
+    bt_domain_reduce(w, &t);
+    v->kept += (int64_t)bt_sum_value(&t.sum[KEPT]);
+    v->missed += (int64_t)bt_sum_value(&t.sum[MISSED]);
+    v->waiting = (int64_t)bt_sum_value(&t.sum[WAITING]);
+}
+
+void bt_window_begin(bt_world *w)
+{
+    bt_window *v = w->window;
+    if (!v) return;
+    v->renewed_now = 0;
+    const double behind = body_at(w) + v->ahead - v->length - v->rear;
+    if (!(behind >= v->stride)) return; // a body that drifts back does not take the window with it
+    v->rear += v->stride * floor(behind / v->stride);
+    size_t n;
+    shapes shape;
+    candidate *list = collect(w, &n, &shape);
+    if (n > 0) {
+        settle_places(w, list, n, &shape);
+        renew(w, list, n);
+    }
+    free(list);
+    free(shape.vertex);
+    free(shape.mark);
+    let_go(w);
+}
+
+/// One step of the free drift of the mean floe, as bt_forces_predict does it for every floe: linearised drag, implicit; so what has the velocity
+/// of the water keeps it to the last bit.
+void bt_window_advance(bt_world *w)
+{
+    bt_window *v = w->window;
+    if (!v) return;
+    const bt_params *p = &w->par;
+    bt_vel u = v->vel;
+    const double water = v->water * hypot(p->water_u - u.x, p->water_v - u.y), air = v->air * hypot(p->air_u - u.x, p->air_v - u.y);
+    const bt_turning r = bt_forces_turning(p, v->share);
+    bt_forces_turn(p, &r, &u);
+    if (water + air > 0) {
+        const double per_mass = 1 / (v->mass + p->dt * (water + air));
+        u.x = (v->mass * u.x + p->dt * (water * p->water_u + air * p->air_u)) * per_mass;
+        u.y = (v->mass * u.y + p->dt * (water * p->water_v + air * p->air_v)) * per_mass;
+    }
+    if (v->held) u.y = 0;
+    v->vel = u;
+    v->drift_x += p->dt * u.x;
+    v->drift_y += p->dt * u.y;
+}
+
+uint64_t bt_window_hash(const bt_window *v)
+{
+    const double state[] = {v->rear, v->drift_x, v->drift_y, v->vel.x, v->vel.y, (double)v->renewed, (double)v->kept, (double)v->missed};
+    uint64_t h = 0, u;
+    for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
+        memcpy(&u, &state[k], sizeof u);
+        h = (h ^ u) * 0x9e3779b97f4a7c15u;
+        h ^= h >> 29;
+    }
+    return h;
+}
