@@ -209,21 +209,6 @@ static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->b
 /// Index of the towed body, −1 = none. Every rank holds it.
 static inline bt_idx bt_world_towed(const bt_world *w) { return w->towed < 0 ? -1 : w->bodies.index_of[w->towed]; }
 
-/// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
-typedef struct bt_body_field {
-    size_t array; ///< offset of the pointer in bt_bodies
-    size_t size;  ///< bytes a body
-} bt_body_field;
-extern const bt_body_field bt_body_fields[];
-extern const int bt_n_body_fields;
-
-/// Arrays over the vertices of the bodies; size: bytes a vertex.
-extern const bt_body_field bt_vertex_fields[];
-extern const int bt_n_vertex_fields;
-
-/// Room for n bodies and n_vertices vertices.
-void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
-
 /// One step Δt: forces, contacts, solve, advance; see src/step/step.c.
 void bt_world_step(bt_world *w);
 

@@ -255,7 +255,7 @@ static void print_environment(const bt_case *c)
     for (int water = 1; water >= 0; water--) {
         double v[2];
         bt_environment_at(c, water, 0, v);
-        const double most = bt_environment_fastest(c, water);
+        const double most = bt_case_fastest_flow(c, water);
         const bt_table *t = water ? &c->water.table : &c->air.table;
         if (most == 0) continue;
         printf("%-20s (%.4g, %.4g) m/s at the start", names[water], v[0], v[1]);

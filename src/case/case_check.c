@@ -567,12 +567,12 @@ double bt_case_reference_speed(const bt_case *c)
     if (c->solver.reference_speed > 0) return c->solver.reference_speed;
     if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
-    u = bt_max(u, bt_environment_fastest(c, true));
+    u = bt_max(u, bt_case_fastest_flow(c, true));
     // A velocity that is not given is that of free drift.
     if (!isnan(c->body.vx)) u = bt_max(u, hypot(c->body.vx, c->body.vy));
     for (bt_idx i = 0; i < c->n_floes; i++)
         if (!isnan(c->floes[i].vx)) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
-    u = bt_max(u, 0.02 * bt_environment_fastest(c, false));
+    u = bt_max(u, 0.02 * bt_case_fastest_flow(c, false));
     return u > 0 ? u : 0.1;
 }

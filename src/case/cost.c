@@ -11,7 +11,7 @@
 #include "bergtow/shape.h"
 #include "bergtow/stats.h"
 #include "case/case_check.h"
-#include "base/history.h"
+#include "output/history.h"
 #include "base/largest.h"
 #include "loads/panel_blocks.h"
 

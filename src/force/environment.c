@@ -70,7 +70,7 @@ void bt_environment_mean(const bt_case *c, bool water, double v[2])
     v[0] = sum[0] / SAMPLES, v[1] = sum[1] / SAMPLES;
 }
 
-double bt_environment_fastest(const bt_case *c, bool water)
+double bt_case_fastest_flow(const bt_case *c, bool water)
 {
     const bt_table *t = water ? &c->water.table : &c->air.table;
     if (t->n > 0) return bt_table_fastest(t);

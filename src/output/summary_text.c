@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "estimate/estimate_text.h"
+#include "output/estimate_text.h"
 #include "output/impact_report.h"
 #include "base/json.h"
 #include "output/summary.h"

@@ -165,7 +165,7 @@ static void choose(bt_world *w, double margin)
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], b->mass[i]);
         most[6] = bt_max(most[6], b->restitution[i]);
-        most[7] = bt_max(most[7], bt_contacts_speed(w, i, &b->vel[i]));
+        most[7] = bt_max(most[7], bt_bodies_speed(w, i, &b->vel[i]));
         if (b->large[i] || !isfinite(b->pose[i].x + b->pose[i].y)) continue;
         most[0] = bt_max(most[0], -b->pose[i].x);
         most[1] = bt_max(most[1], -b->pose[i].y);
@@ -177,7 +177,7 @@ static void choose(bt_world *w, double margin)
     t->reach = most[4];
     t->heaviest = most[5];
     t->rebounds = most[6] > 0;
-    t->margin_max = bt_max(2 * bt_max(margin, bt_contacts_margin(w, most[7])), 0.25 * w->par.size);
+    t->margin_max = bt_max(2 * bt_max(margin, bt_margin_for(w, most[7])), 0.25 * w->par.size);
     const bool any = most[0] + most[2] >= 0;
     t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
     t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The estimates of a case as JSON and as a table.
-#include "estimate/estimate_text.h"
+#include "output/estimate_text.h"
 
 #include <math.h>
 #include <stdio.h>

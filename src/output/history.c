@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Columns and running totals of the steps of a run; what is made of them: steady.h, summary.h.
-#include "base/history.h"
+#include "output/history.h"
 
 #include <math.h>
 #include <stdlib.h>
