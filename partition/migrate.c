@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/bodies.h"
 #include "partition/division.h"
 #include "partition/domain.h"
 

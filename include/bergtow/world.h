@@ -135,6 +135,7 @@ struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
+struct bt_exchange;
 struct bt_window;
 struct bt_impacts;
 struct bt_environment;
@@ -171,6 +172,7 @@ typedef struct bt_world {
     struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
+    const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done

@@ -100,7 +100,7 @@ double bt_cost_member(const bt_case *c, const bt_cost_disk *d)
 /// A run that would take longer than anybody waits, or fill any disk.
 void bt_case_check_cost(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     if (!bt_check_sound(k, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
                            "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels impact.panels")) return;
     const double n = bt_case_expected_floes(c) + c->n_floes, work = bt_cost_seconds(c), result = bt_cost_disk_of(c, n, bt_cost_corners(c, NULL, n), 2).result;

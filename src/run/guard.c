@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "case/case_derived.h"
 #include "force/environment.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"

@@ -15,7 +15,7 @@
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
-#include "field/field_make.h"
+#include "geometry/apart.h"
 
 #define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
 #define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed

@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "case/case_derived.h"
 #include "force/environment.h"
 #include "base/table.h"
 
