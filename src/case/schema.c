@@ -338,13 +338,6 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
     return best;
 }
 
-bt_key bt_schema_column(const bt_key *k, int column)
-{
-    bt_key c = *k;
-    if (column == 0 && k->range_first) c.unit = k->unit_first, c.range = k->range_first;
-    return c;
-}
-
 void bt_schema_preset(const bt_key *keys, int n, void *base)
 {
     char why[BT_WHY];

@@ -221,16 +221,6 @@ static const bt_state_row trace_columns[] = {
     MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "impulse", F64, 2, ln), MEMBER(bt_trace, "friction", F64, 1, lt), MEMBER(bt_trace, "crushed", U8, 1, scar),
 };
 
-int bt_trace_by_names(const void *p, const void *q)
-{
-    const bt_trace *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    if (a->b != b->b) return a->b < b->b ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
-    return a->scar - b->scar;
-}
-
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
 static void blank(bt_trace *t)
 {
