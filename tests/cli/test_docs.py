@@ -31,6 +31,7 @@ def blocks(text):
 
 
 def code(text):
+    text = re.sub(r".*: unknown key; did you mean .*", "", text) # the example of an error
     return " ".join(re.findall(r"`([^`]+)`", text)) + "\n" + "\n".join("\n".join(lines) for _, lines in blocks(text))
 
 
