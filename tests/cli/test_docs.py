@@ -53,7 +53,7 @@ def calls(text):
 def code(text):
     """What stands as code, but for the example of an error message."""
     text = re.sub(r".*: unknown key; did you mean .*", "", text)
-    return " ".join(re.findall(r"`([^`]+)`", text)) + "\n" + "\n".join(commands(text))
+    return " ".join(re.findall(r"`([^`]+)`", without_fences(text))) + "\n" + "\n".join(commands(text))
 
 
 def anchor(heading):
