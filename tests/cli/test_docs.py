@@ -145,6 +145,18 @@ def test_names_of_the_code_exist(path):
     assert not [n for n in names if not re.search(rf"\b{n}\b", source())]
 
 
+@every_doc
+def test_functions_are_defined_where_the_page_says(path):
+    """Written "src/a/b.c `name`", or in a table as `name` | src/a/b.c."""
+    text = path.read_text()
+    said = [(name, file) for file, name in re.findall(r"((?:src|partition)/[\w/]+\.[ch]) `(\w+)`", text)]
+    for names, file in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ((?:src|partition)/[\w/]+\.c) \|", text, re.M):
+        said += [(name, file) for name in re.findall(r"\w+", names)]
+    assert said or path.name != "architecture.md"
+    for name, file in said:
+        assert re.search(rf"^\w[\w *]*\b{name}\(", (ROOT / file).read_text(), re.M), f"{file}: {name}"
+
+
 @every_page
 def test_commands_and_options_are_known(path):
     for line, words in calls(path.read_text()):
