@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parent.parent
 #: from the lowest to the highest: folder of the sources, and what it holds
 LAYERS = {
     "base": "numbers, text, files, JSON, HDF5, MPI",
-    "geometry": "polygons, manifolds, paths",
+    "geometry": "polygons, outlines, paths",
     "case": "keys, reading, checks",
     "body": "arrays of bodies",
     "tow": "line, vessel, speed",
