@@ -4,6 +4,7 @@
 #include "case/cost.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /// Work of the contacts above this fraction of the kinetic energy is no rounding.
@@ -38,11 +39,62 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-void bt_history_init(bt_history *h) { *h = (bt_history){0}; }
+static double added_energy(const bt_sample *s) { return s->contact_work > WORK_ROUNDING * s->kinetic_energy; }
+
+#define TOTAL(type, member, rule_, from) \
+    {.at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)}
+const bt_total bt_history_totals[BT_N_TOTALS] = {
+    TOTAL(F64, sum_contacts, SUM, contacts),
+    TOTAL(F64, sum_sweeps, SUM, sweeps),
+    TOTAL(F64, sum_updates, SUM, unit_updates),
+    TOTAL(F64, sum_moves, SUM, momentum_moves),
+    TOTAL(F64, contact_work, SUM, contact_work),
+    TOTAL(F64, max_overlap, MAX, overlap),
+    TOTAL(F64, max_momentum_residual, MAX, momentum_residual),
+    TOTAL(F64, max_residual, MAX, residual),
+    TOTAL(F64, crushed_work, SUM, crushed_work),
+    TOTAL(F64, max_crushed_depth, MAX, crushed_depth),
+    TOTAL(F64, max_crushing, MAX, crushing),
+    TOTAL(I64, crushing_steps, STEPS, crushing),
+    TOTAL(I64, unconverged, STEPS, unconverged),
+    TOTAL(I64, unprojected, STEPS, unprojected),
+    {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)}, .rule = BT_TOTAL_STEPS, .of = added_energy},
+    TOTAL(I64, restitution_cut, STEPS, restitution_cut),
+    TOTAL(I64, repeats, SUM, repeats),
+    TOTAL(I64, outrun, STEPS, outrun),
+};
+
+/// A step into a total. Counts of whole numbers are exact in a double up to 2⁵³, far beyond any run.
+static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
+{
+    double x = 0, sum = 0;
+    int64_t whole = 0;
+    char *at = (char *)h + t->at.offset;
+    if (t->of) x = t->of(s);
+    else memcpy(&x, (const char *)s + t->offset, sizeof x);
+    if (t->at.type == BT_ITEM_I64) {
+        memcpy(&whole, at, sizeof whole);
+        whole += t->rule == BT_TOTAL_STEPS ? x != 0 : (int64_t)x;
+        memcpy(at, &whole, sizeof whole);
+    } else {
+        memcpy(&sum, at, sizeof sum);
+        sum = t->rule == BT_TOTAL_MAX ? bt_max_seen(sum, x) : sum + x;
+        memcpy(at, &sum, sizeof sum);
+    }
+}
+
+const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
+{
+    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", bt_history_columns[k].name);
+    else snprintf(name, BT_HISTORY_NAME, "history/added/%s", bt_added(k - BT_N_COLUMNS)->name);
+    return name;
+}
+
+void bt_history_init(bt_history *h) { *h = (bt_history){.n_columns = BT_N_COLUMNS + bt_n_added()}; }
 
 void bt_history_free(bt_history *h)
 {
-    for (int k = 0; k < BT_N_COLUMNS; k++) free(h->column[k]);
+    for (int k = 0; k < h->n_columns; k++) free(h->column[k]);
     bt_history_init(h);
 }
 
@@ -50,28 +102,12 @@ void bt_history_add(bt_history *h, const bt_sample *s)
 {
     if (h->n == h->cap) {
         h->cap = h->cap ? 2 * h->cap : 1024;
-        for (int k = 0; k < BT_N_COLUMNS; k++)
+        for (int k = 0; k < h->n_columns; k++)
             h->column[k] = bt_realloc(h->column[k], (size_t)h->cap, sizeof(double));
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
         h->column[k][h->n] = *(const double *)(const void *)((const char *)s + bt_history_columns[k].offset);
+    for (int k = BT_N_COLUMNS; k < h->n_columns; k++) h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
     h->n++;
-    h->sum_contacts += s->contacts;
-    h->sum_sweeps += s->sweeps;
-    h->sum_updates += s->unit_updates;
-    h->sum_moves += s->momentum_moves;
-    h->unprojected += s->unprojected != 0;
-    h->contact_work += s->contact_work;
-    h->max_overlap = bt_max_seen(h->max_overlap, s->overlap);
-    h->max_residual = bt_max_seen(h->max_residual, s->residual);
-    h->max_momentum_residual = bt_max_seen(h->max_momentum_residual, s->momentum_residual);
-    h->crushed_work += s->crushed_work;
-    h->max_crushed_depth = bt_max_seen(h->max_crushed_depth, s->crushed_depth);
-    h->max_crushing = bt_max_seen(h->max_crushing, s->crushing);
-    h->crushing_steps += s->crushing > 0;
-    h->unconverged += s->unconverged != 0;
-    h->repeats += (int64_t)s->repeats;
-    h->outrun += s->outrun != 0;
-    h->restitution_cut += s->restitution_cut != 0;
-    h->positive_work += s->contact_work > WORK_ROUNDING * s->kinetic_energy;
+    for (int k = 0; k < BT_N_TOTALS; k++) add_total(h, &bt_history_totals[k], s);
 }

@@ -3,6 +3,7 @@
 #ifndef BT_HISTORY_H
 #define BT_HISTORY_H
 
+#include "base/snapshot.h"
 #include "output/record.h"
 
 /// Columns of what the summary keeps of every step; names and members of the sample: bt_history_columns.
@@ -21,7 +22,9 @@ extern const bt_column_def bt_history_columns[BT_N_COLUMNS];
 /// What the summary keeps of every step, whatever output.sample_every says: 120 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
-    double *column[BT_N_COLUMNS];    ///< [n] each, units as in bt_sample; NaN where a step has no such number
+    int n_columns;                   ///< the program's own, then one for each registered quantity
+    double *column[BT_N_COLUMNS + BT_MAX_ADDED]; ///< [n] each, units as in bt_sample; NaN where a step has no such number
+    // running totals: bt_history_totals
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, contact_work;
     double max_overlap, max_momentum_residual, max_residual;
     double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
@@ -29,12 +32,27 @@ typedef struct bt_history {
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
+enum { BT_N_TOTALS = 18, BT_HISTORY_NAME = 80 };
+
+/// A running total: its member of bt_history, what it takes of a step, and how.
+typedef struct bt_total {
+    bt_state_row at;                      ///< name in the checkpoint, under history
+    enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS } rule; ///< STEPS: those in which the number is not 0
+    size_t offset;                        ///< of the number in bt_sample
+    double (*of)(const bt_sample *s);     ///< or a function of it
+} bt_total;
+extern const bt_total bt_history_totals[BT_N_TOTALS];
+
+/// Name of a column in the checkpoint; returns name.
+const char *bt_history_name(int k, char name[BT_HISTORY_NAME]);
+
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.
 static inline double bt_max_seen(double a, double b) { return a >= b || a != a ? a : b; }
 
 /// Largest of x[from..to), NaN for none of them.
 double bt_history_largest(const double *x, int64_t from, int64_t to);
 
+/// Empty, with a column for each quantity that has been registered by now.
 void bt_history_init(bt_history *h);
 void bt_history_add(bt_history *h, const bt_sample *s);
 void bt_history_free(bt_history *h);

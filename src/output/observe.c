@@ -170,6 +170,29 @@ unsigned bt_observe_applies(const bt_world *w)
            (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
 }
 
+/// Sum of a quantity over the floes of all ranks. Collective.
+static double sum_of_floes(const bt_world *w, const bt_quantity *q)
+{
+    bt_totals all = {.n_sums = 1};
+    for (bt_idx k = 0; k < w->tiles->n; k++) {
+        const bt_tile *tile = &w->tiles->tile[k];
+        for (bt_idx i = tile->first; tile->own && i < tile->end; i++)
+            if (w->bodies.motion[i] == BT_DYNAMIC && i != bt_world_towed(w)) bt_sum_add(&all.sum[0], q->of_floe(w, i, q->context));
+    }
+    bt_domain_reduce(w, &all);
+    return bt_sum_value(&all.sum[0]);
+}
+
+/// Registered quantities, by one thread: their functions need not know of threads.
+static void observe_added(const bt_world *w, unsigned has, bt_sample *s)
+{
+    for (int k = 0; k < bt_n_added(); k++) {
+        const bt_quantity *q = bt_added(k);
+        if (!(has & 1u << q->applies)) continue; // alike on all ranks
+        bt_sample_set(s, q, q->of_floe ? sum_of_floes(w, q) : q->of_world(w, q->context));
+    }
+}
+
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
 {
     const bt_step_stats *st = &w->stats;
@@ -211,8 +234,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }
-    for (int k = 0; k < bt_n_series_fields; k++)
-        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
+    observe_added(w, has, s);
+    for (int k = 0; k < bt_n_series(); k++)
+        if (!(has & 1u << bt_series(k)->applies)) bt_sample_set(s, bt_series(k), NAN);
 }
 
 void bt_observe_contact_force(const bt_world *w, double *force)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a run leaves behind: series, frames, summary. One table of fields drives result.h5 and its documentation.
+// What a run leaves behind: series, frames, summary. The registry of quantities drives series, their texts and their state.
 #ifndef BERGTOW_RECORD_H
 #define BERGTOW_RECORD_H
 
@@ -10,6 +10,7 @@
 #include "bergtow/comm.h"
 #include "bergtow/event.h"
 #include "bergtow/field.h"
+#include "bergtow/quantity.h"
 #include "field/lead.h"
 #include "output/stall.h"
 
@@ -60,38 +61,32 @@ typedef struct bt_sample {
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
+    double added[BT_MAX_ADDED]; ///< [bt_n_added()] of the quantities that were registered
 } bt_sample;
 
-typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
+/// The program's own series, one for each member of a sample but `added`; with those registered: bt_series.
+extern const bt_quantity bt_own_series[];
+extern const int bt_n_own_series;
 
-/// What a run must have for a number of its series to mean anything. Where it has not, the number is NaN, and nowhere else.
-typedef enum { BT_APPLIES_ALWAYS, BT_APPLIES_BODY, BT_APPLIES_LINE, BT_APPLIES_BRIDLE, BT_APPLIES_VESSEL, BT_APPLIES_IMPACTS, BT_APPLIES_WINDOW, BT_APPLIES_KINDS } bt_applies;
-extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line"
-
-typedef struct bt_series_field {
-    const char *name, *units, *description;
-    size_t offset;  ///< of the double in bt_sample
-    bt_keep keep;
-    bt_applies applies;
-} bt_series_field;
-
-extern const bt_series_field bt_series_fields[];
-extern const int bt_n_series_fields;
-
-/// A number of a sample by its field.
-static inline double bt_sample_value(const bt_sample *s, const bt_series_field *f)
+/// A number of a sample by its quantity.
+static inline double bt_sample_value(const bt_sample *s, const bt_quantity *f)
 {
     double value;
     memcpy(&value, (const char *)s + f->offset, sizeof value);
     return value;
 }
 
+static inline void bt_sample_set(bt_sample *s, const bt_quantity *f, double value)
+{
+    memcpy((char *)s + f->offset, &value, sizeof value);
+}
+
 /// Larger than any quantity of a run, and small enough for the squares that the statistics sum up.
 #define BT_SAMPLE_MOST 1e100
 
-/// The first field that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the sample is sound.
+/// The first quantity that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the sample is sound.
 /// has: bit 1 << k for each bt_applies k of the run.
-const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has);
+const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has);
 
 /// Wall time by phase of the step, s.
 typedef struct bt_phases {

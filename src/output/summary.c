@@ -3,7 +3,7 @@
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
 //     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
-//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
+//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − … − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "output/summary.h"
 #include "case/arch.h"
@@ -39,6 +39,23 @@ static double percentile(const double *x, int64_t n, double percent)
 
 static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k) { return bt_stats_mean(h->column[k] + s->window.first, s->window.n); }
 
+/// A number of steps first to end by the rule of its quantity.
+static double reduce(const double *x, int64_t first, int64_t end, bt_keep keep)
+{
+    if (first >= end) return NAN;
+    if (keep == BT_KEEP_LAST) return x[end - 1];
+    if (keep == BT_KEEP_MEAN) return bt_stats_mean(x + first, end - first).mean;
+    double out = x[first];
+    for (int64_t i = first + 1; i < end; i++) out = keep == BT_KEEP_SUM ? out + x[i] : bt_max_seen(out, x[i]);
+    return out;
+}
+
+static void reduce_added(bt_summary *s, const bt_history *h)
+{
+    const int64_t first = s->body ? s->window.first : 0;
+    for (int k = 0; k < bt_n_added(); k++) s->added[k] = reduce(h->column[BT_N_COLUMNS + k], first, h->n, bt_added(k)->keep);
+}
+
 static void reduce_window(bt_summary *s, const bt_history *h)
 {
     const int64_t n = s->window.n;
@@ -60,7 +77,13 @@ static void reduce_window(bt_summary *s, const bt_history *h)
 
     double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
     largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
-    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean - s->inertia.mean;
+    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean;
+    for (int k = 0; k < bt_n_added(); k++) {
+        if (bt_added(k)->role != BT_ROLE_BALANCE) continue;
+        largest = bt_max(largest, fabs(s->added[k]));
+        s->balance -= s->added[k];
+    }
+    s->balance -= s->inertia.mean;
     s->closure = s->ice.mean - s->balance;
     s->closure_relative = largest > 0 ? s->closure / largest : s->closure == 0 ? 0 : NAN;
     const double other = s->ice.mean - s->budget.mean;
@@ -110,6 +133,9 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->window.start = s->window.end = s->window.correlation_time = nan;
     if (body) {
         bt_steady_find(&s->window, h, c, t);
+    }
+    reduce_added(s, h);
+    if (body) {
         reduce_window(s, h);
         warn_of_window(s, c, t);
         s->reference_ratio = s->ice.mean / c->reference.mean_force;

@@ -14,7 +14,8 @@ typedef struct bt_summary {
     bt_steady window;
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
+    double added[BT_MAX_ADDED];       ///< reductions of the registered quantities over the window, without a towed body over all steps
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − registered forces − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps, updates, moves; ///< means over all steps

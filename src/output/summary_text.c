@@ -242,6 +242,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_impacts_json(&j, s->impacts);
     if (s->body) bt_estimates_json(&j, "estimates", &s->estimate, s->ice.mean);
     else bt_json_string(&j, "estimates", NULL);
+    for (int k = 0; k < bt_n_added(); k++) bt_json_number(&j, bt_added(k)->summary, s->added[k]);
     bt_json_number(&j, "max_overlap_m", h->max_overlap);
     bt_json_number(&j, "max_overlap_relative", t->mean_size > 0 ? h->max_overlap / t->mean_size : NAN);
     bt_json_int(&j, "unconverged_steps", h->unconverged);

@@ -199,7 +199,7 @@ static bool numbers_of_state(const bt_world *w, bt_errors *err)
 
 static bool numbers_of_sample(const bt_world *w, const bt_sample *s, bt_errors *err)
 {
-    const bt_series_field *f = bt_sample_fault(s, bt_observe_applies(w));
+    const bt_quantity *f = bt_sample_fault(s, bt_observe_applies(w));
     if (!f) return true;
     const double x = bt_sample_value(s, f);
     bt_errors_add(err,

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Quantities: the numbers that a run keeps of every step, each registered once, with all that a reader needs to know of it.
+//
+// A registered quantity is
+//     a series            /series/NAME of result.h5, with units, description, merge, applies, role, label as attributes
+//     a number            KEY of summary.json: its reduction over the window (over all steps where nothing is towed)
+//     a column of members /summary/KEY of ensemble.h5
+//     a line or a panel   of the pictures, and a row of the report, by its role
+//     part of the state   a run that was killed and resumed has the same numbers, bit for bit
+//     a line              of `bergtow --list-quantities`
+// and none of these places knows its name. How to add one: docs/how-to-add-a-quantity.md.
+#ifndef BERGTOW_QUANTITY_H
+#define BERGTOW_QUANTITY_H
+
+#include "bergtow/world.h"
+
+enum { BT_MAX_ADDED = 32 }; ///< quantities beside the program's own
+
+/// How the steps of one sample merge, and the steps of the window for the summary.
+typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep;
+enum { BT_KEEP_KINDS = BT_KEEP_SUM + 1 };
+
+/// What a run must have for a number to mean anything. Where it has not, the number is NaN, and nowhere else.
+typedef enum {
+    BT_APPLIES_ALWAYS, BT_APPLIES_BODY, BT_APPLIES_LINE, BT_APPLIES_BRIDLE, BT_APPLIES_VESSEL, BT_APPLIES_IMPACTS,
+    BT_APPLIES_WINDOW, BT_APPLIES_KINDS
+} bt_applies;
+
+/// Where pictures and reports show it.
+typedef enum {
+    BT_ROLE_NONE,
+    BT_ROLE_BALANCE,    ///< a force against the tow that the momentum balance of the towed body adds up (tow and inertia included)
+    BT_ROLE_FORCE,      ///< a force on the towed body against the tow that is part of another
+    BT_ROLE_LOAD,       ///< a load of the line or the vessel
+    BT_ROLE_DIAGNOSTIC, ///< a panel of its own beside those of the contact solver
+    BT_ROLE_KINDS
+} bt_role;
+
+extern const char *const bt_keep_names[BT_KEEP_KINDS];       ///< "last", "mean", "max", "sum"
+extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line"
+extern const char *const bt_role_names[BT_ROLE_KINDS];       ///< "balance"; "" for none
+
+typedef struct bt_quantity {
+    const char *name;        ///< of the series: lower case, digits and _
+    const char *units;       ///< SI; "1" for a number
+    const char *description; ///< a sentence
+    const char *label;       ///< in legends and tables; NULL = the name in words
+    bt_keep keep;
+    bt_applies applies;
+    bt_role role;
+    const char *summary;     ///< key of its reduction in summary.json, NULL = none; of a registered one it is made of name and units
+    // one of the next two
+    /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank, with the same result.
+    double (*of_world)(const bt_world *w, const void *context);
+    /// The share of one floe. The sum over all floes is exact: the same bits on any number of ranks and threads.
+    double (*of_floe)(const bt_world *w, bt_idx floe, const void *context);
+    const void *context;     ///< of the functions
+    size_t offset;           ///< of its place in bt_sample; set for a registered one
+} bt_quantity;
+
+/// Add a quantity before any run begins. It is copied; its texts and context must outlive every run.
+/// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no room.
+bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err);
+
+/// All series, in the order of the file: the program's own, then those registered.
+int bt_n_series(void);
+const bt_quantity *bt_series(int k);
+/// By name, NULL where there is none.
+const bt_quantity *bt_series_find(const char *name);
+
+/// How many of them are registered beside the program's own: the last ones.
+int bt_n_added(void);
+const bt_quantity *bt_added(int k);
+
+#endif
