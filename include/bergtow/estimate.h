@@ -34,9 +34,11 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 
+/// The program's own; those that are registered follow.
 typedef enum {
-    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_SHIPS, BT_EST_OPEN_WATER, BT_N_ESTIMATES
+    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_SHIPS, BT_EST_OPEN_WATER, BT_N_OWN_ESTIMATES
 } bt_estimate_kind;
+enum { BT_MAX_ESTIMATES = 24 };
 
 #define BT_EST_LOOSE 0.15      ///< A up to which Lichey & Hellmer have no force
 #define BT_EST_DENSE 0.9       ///< A from which ice may capture a berg
@@ -70,19 +72,32 @@ typedef struct bt_estimate {
     const char *note; ///< regime, or why it is not valid; static
 } bt_estimate;
 
-/// The constant part of an estimate.
-typedef struct bt_estimate_kind_info {
+/// An estimate as it is registered.
+typedef struct bt_estimate_def {
     const char *name;    ///< key in summary.json
-    const char *label;   ///< as printed
+    const char *label;   ///< as printed, and in legends
     const char *formula, *source;
-} bt_estimate_kind_info;
-extern const bt_estimate_kind_info bt_estimate_kinds[BT_N_ESTIMATES];
+    /// The force at conditions in which a body moves ahead through ice (of `on_top`, any); `compares` is set by the caller.
+    bt_estimate (*at)(const bt_estimate_input *in);
+    bool (*knows)(const bt_estimate_input *in); ///< does the formula know the concentration here? NULL = it does
+    bool on_top;         ///< no resistance of ice: it comes on top, and no run is held against it
+    bool any_course;     ///< the formula has a value for a body that is pushed backwards through the ice, too
+    bool note_tells;     ///< the note itself says why it is not valid
+} bt_estimate_def;
+
+/// Add an estimate before any run begins. It is copied; its texts must outlive every run. From then on it is in the summary, with its curve over the
+/// concentration, in `bergtow estimate`, ensembles, pictures and reports. How to: docs/how-to-add-an-estimate.md.
+/// Errors: BT_ERR_USAGE, with the reason in err.
+bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err);
+
+int bt_n_estimates(void);
+const bt_estimate_def *bt_estimate_of(int k);
 
 /// Strength of the ice P, N/m.
 double bt_estimate_strength(const bt_estimate_input *in);
 
 /// One estimate at the given conditions.
-bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in);
+bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in);
 
 /// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body, or tow, speed and
 /// along are NaN. The case has been checked (bt_case_finish).

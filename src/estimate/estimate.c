@@ -2,29 +2,14 @@
 // Estimates of broken-ice resistance; equations and sources in bergtow/estimate.h.
 #include "bergtow/estimate.h"
 
+#include <ctype.h>
 #include <math.h>
+#include <string.h>
 
 #include "force/environment.h"
 #include "bergtow/shape.h"
 
 #define GRAVITY 9.81 // m/s²
-
-const bt_estimate_kind_info bt_estimate_kinds[BT_N_ESTIMATES] = {
-    [BT_EST_LICHEY_HELLMER] = {"lichey_hellmer", "Lichey-Hellmer", "0.5 rho_i C_si h W |dV| dV; 0 for A <= 0.15; at most P W when captured",
-                               "Lichey & Hellmer 2001, J. Glaciol. 47"},
-    [BT_EST_COMPACTION] = {"marchenko_compaction", "Marchenko, compaction", "P W, P = P* h exp(-20 (1 - A))",
-                           "our closure of Marchenko et al. 2010 with the strength of Hibler 1979"},
-    [BT_EST_RAFTING] = {"marchenko_rafting", "Marchenko, rafting", "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
-                        "our closure of Marchenko et al. 2010; kappa: Flato & Hibler 1995 for the high end"},
-    [BT_EST_MOMENTUM] = {"marchenko_momentum", "Marchenko, momentum", "rho_i h W V^2 A phi / (phi - A)",
-                         "our closure of Marchenko et al. 2010: ice swept together to phi"},
-    [BT_EST_DILUTE] = {"dilute_limit", "dilute limit", "(4/3) (1 + e) A rho_i h (R + r) V^2, R = W / 2",
-                       "derived: disc-like floes at rest, each met once by a heavy disc"},
-    [BT_EST_SHIPS] = {"ships_in_pack_ice", "ships in pack ice", "0.5 k Fr_p^b rho_i W h V^2 A^n, Fr_p = V / sqrt(g h A); blunt hull, range to slender",
-                      "form of Colbourne 2000 (not at hand); k, b, n as in PolarRoute (British Antarctic Survey), for ships, range not given"},
-    [BT_EST_OPEN_WATER] = {"open_water_drag", "open-water drag", "(0.5 rho_w C_w draft b + rho_w C_ws A_wl) |dV| dV",
-                           "the drag law of this program; no ice resistance, to be added to the others"},
-};
 
 double bt_estimate_strength(const bt_estimate_input *in)
 {
@@ -95,32 +80,81 @@ static bt_estimate ships(const bt_estimate_input *in)
                          .note = in->ship ? "a ship; ice and speeds of the regression are not known here" : "extrapolated: a regression of ships, and this is none"};
 }
 
-static bt_estimate force_of(bt_estimate_kind kind, const bt_estimate_input *in)
+static bt_estimate open_water(const bt_estimate_input *in) { return just(in->drag * in->speed * in->along, true, "drag of the water alone"); }
+
+/// Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9.
+static bool is_dense(const bt_estimate_input *in) { return in->concentration >= BT_EST_DENSE; }
+
+// --- the registry ----------------------------------------------------------------------------------------------------
+
+static bt_estimate_def estimates[BT_MAX_ESTIMATES] = {
+    [BT_EST_LICHEY_HELLMER] = {
+        .name = "lichey_hellmer", .label = "Lichey-Hellmer",
+        .formula = "0.5 rho_i C_si h W |dV| dV; 0 for A <= 0.15; at most P W when captured",
+        .source = "Lichey & Hellmer 2001, J. Glaciol. 47", .at = lichey_hellmer, .knows = is_dense, .any_course = true},
+    [BT_EST_COMPACTION] = {
+        .name = "marchenko_compaction", .label = "Marchenko, compaction", .formula = "P W, P = P* h exp(-20 (1 - A))",
+        .source = "our closure of Marchenko et al. 2010 with the strength of Hibler 1979", .at = compaction},
+    [BT_EST_RAFTING] = {
+        .name = "marchenko_rafting", .label = "Marchenko, rafting",
+        .formula = "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
+        .source = "our closure of Marchenko et al. 2010; kappa: Flato & Hibler 1995 for the high end", .at = rafting},
+    [BT_EST_MOMENTUM] = {
+        .name = "marchenko_momentum", .label = "Marchenko, momentum", .formula = "rho_i h W V^2 A phi / (phi - A)",
+        .source = "our closure of Marchenko et al. 2010: ice swept together to phi", .at = momentum},
+    [BT_EST_DILUTE] = {
+        .name = "dilute_limit", .label = "dilute limit", .formula = "(4/3) (1 + e) A rho_i h (R + r) V^2, R = W / 2",
+        .source = "derived: disc-like floes at rest, each met once by a heavy disc", .at = dilute},
+    [BT_EST_SHIPS] = {
+        .name = "ships_in_pack_ice", .label = "ships in pack ice",
+        .formula = "0.5 k Fr_p^b rho_i W h V^2 A^n, Fr_p = V / sqrt(g h A); blunt hull, range to slender",
+        .source = "form of Colbourne 2000 (not at hand); k, b, n as in PolarRoute (British Antarctic Survey), for ships, range not given",
+        .at = ships, .note_tells = true},
+    [BT_EST_OPEN_WATER] = {
+        .name = "open_water_drag", .label = "open-water drag", .formula = "(0.5 rho_w C_w draft b + rho_w C_ws A_wl) |dV| dV",
+        .source = "the drag law of this program; no ice resistance, to be added to the others", .at = open_water, .on_top = true},
+};
+static int n_estimates = BT_N_OWN_ESTIMATES;
+
+int bt_n_estimates(void) { return n_estimates; }
+const bt_estimate_def *bt_estimate_of(int k) { return &estimates[k]; }
+
+static bool is_name(const char *s)
 {
-    if (isnan(in->along)) return just(NAN, false, "no tow: free drift");
-    if (kind == BT_EST_OPEN_WATER) return just(in->drag * in->speed * in->along, true, "drag of the water alone");
-    if (in->concentration == 0) return just(0, true, "no ice");
-    if (in->along <= 0 && kind != BT_EST_LICHEY_HELLMER) return just(NAN, false, "the body does not move ahead through the ice");
-    if (in->speed == 0) return just(0, true, "no motion through the ice");
-    switch (kind) {
-    case BT_EST_LICHEY_HELLMER: return lichey_hellmer(in);
-    case BT_EST_COMPACTION: return compaction(in);
-    case BT_EST_RAFTING: return rafting(in);
-    case BT_EST_MOMENTUM: return momentum(in);
-    case BT_EST_DILUTE: return dilute(in);
-    case BT_EST_SHIPS: return ships(in);
-    case BT_EST_OPEN_WATER:
-    case BT_N_ESTIMATES: break;
-    }
-    return just(NAN, false, "unknown");
+    const size_t n = strspn(s, "abcdefghijklmnopqrstuvwxyz0123456789_");
+    return n > 0 && n <= 40 && !s[n] && !isdigit((unsigned char)*s) && strcmp(s, "curves");
 }
 
-bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in)
+bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err)
 {
-    bt_estimate e = force_of(kind, in);
-    // Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9, and open water knows no ice.
-    const bool knows = kind != BT_EST_OPEN_WATER && (kind != BT_EST_LICHEY_HELLMER || in->concentration >= BT_EST_DENSE);
-    e.compares = e.valid && knows && e.force > 0;
+    const size_t before = err->n;
+    const char *name = d->name ? d->name : "";
+    if (!is_name(name)) bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+    for (int k = 0; k < n_estimates; k++)
+        if (!strcmp(estimates[k].name, name)) bt_errors_add(err, "estimate %s: there is one of this name; choose another", name);
+    if (!d->label || !d->formula || !d->source) bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
+    if (!d->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);
+    if (n_estimates == BT_MAX_ESTIMATES) bt_errors_add(err, "estimate %s: there are %d; raise BT_MAX_ESTIMATES", name, BT_MAX_ESTIMATES);
+    if (err->n > before) return BT_ERR_USAGE;
+    estimates[n_estimates++] = *d;
+    return BT_OK;
+}
+
+static bt_estimate force_of(const bt_estimate_def *d, const bt_estimate_input *in)
+{
+    if (isnan(in->along)) return just(NAN, false, "no tow: free drift");
+    if (d->on_top) return d->at(in);
+    if (in->concentration == 0) return just(0, true, "no ice");
+    if (in->along <= 0 && !d->any_course) return just(NAN, false, "the body does not move ahead through the ice");
+    if (in->speed == 0) return just(0, true, "no motion through the ice");
+    return d->at(in);
+}
+
+bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
+{
+    const bt_estimate_def *d = &estimates[kind];
+    bt_estimate e = force_of(d, in);
+    e.compares = e.valid && !d->on_top && (!d->knows || d->knows(in)) && e.force > 0;
     return e;
 }
 

@@ -6,7 +6,6 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "output/summary.h"
 
 /// Concentrations of the curves: 0 to 0.98 in hundredths, with a point just above and just below the two thresholds of
 /// Lichey and Hellmer so that the steps stay steps.
@@ -24,59 +23,88 @@ static void curve_points(double a[N_CURVE])
 
 static void curves(bt_json *j, const bt_estimate_input *in)
 {
-    double a[N_CURVE], force[N_CURVE], range[BT_N_ESTIMATES][2];
+    double a[N_CURVE], force[N_CURVE], range[BT_MAX_ESTIMATES][2];
     curve_points(a);
     bt_json_open(j, "curves", '{');
     bt_json_numbers(j, "concentration", N_CURVE, a);
-    for (int k = 0; k < BT_N_ESTIMATES; k++) {
+    for (int k = 0; k < bt_n_estimates(); k++) {
         range[k][0] = range[k][1] = NAN;
         for (int i = 0; i < N_CURVE; i++) {
             bt_estimate_input at = *in;
             at.concentration = a[i];
-            const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, &at);
+            const bt_estimate e = bt_estimate_at(k, &at);
             force[i] = e.force;
             if (!e.valid || a[i] == 0) continue; // without ice all are
             if (isnan(range[k][0])) range[k][0] = a[i];
             range[k][1] = a[i];
         }
-        bt_json_numbers(j, bt_estimate_kinds[k].name, N_CURVE, force);
+        bt_json_numbers(j, bt_estimate_of(k)->name, N_CURVE, force);
     }
     bt_json_open(j, "valid_range", '{'); // of the concentration
-    for (int k = 0; k < BT_N_ESTIMATES; k++) bt_json_numbers(j, bt_estimate_kinds[k].name, 2, range[k]);
+    for (int k = 0; k < bt_n_estimates(); k++) bt_json_numbers(j, bt_estimate_of(k)->name, 2, range[k]);
     bt_json_close(j, '}');
     bt_json_close(j, '}');
 }
 
+/// One estimate and the conditions, as their tables see them.
+typedef struct estimate_item {
+    bt_estimate e;
+    double ratio;
+    const char *label, *kind, *formula, *source;
+} estimate_item;
+
+typedef struct conditions_item {
+    bt_estimate_input in;
+    double strength;
+} conditions_item;
+
+#define OF_ESTIMATE(...) {BT_JSON_AT(0, estimate_item, __VA_ARGS__)}
+const bt_json_key bt_estimate_keys[] = {
+    OF_ESTIMATE("force_n", e.force, "N", "force against the tow; null where the formula has no value"),
+    OF_ESTIMATE("low_n", e.low, "N", "lower end of its range"),
+    OF_ESTIMATE("high_n", e.high, "N", "upper end of its range"),
+    OF_ESTIMATE("simulated_over_estimate", ratio, "1", "mean ice resistance of the run / force; it tells something where `compares`"),
+    OF_ESTIMATE("valid", e.valid, "1", "the formula is meant for these conditions"),
+    OF_ESTIMATE("compares", e.compares, "1", "valid, and it knows the concentration: a run is held against it"),
+    OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
+    OF_ESTIMATE("formula", formula, "", "the formula"),
+    OF_ESTIMATE("source", source, "", "where it is from"),
+    OF_ESTIMATE("label", label, "", "what pictures and tables call it"),
+    OF_ESTIMATE("kind", kind, "", "ice resistance, or on top: to be added to the others"),
+};
+const int bt_n_estimate_keys = sizeof bt_estimate_keys / sizeof *bt_estimate_keys;
+
+#define OF_CONDITIONS(...) {BT_JSON_AT(0, conditions_item, __VA_ARGS__)}
+const bt_json_key bt_condition_keys[] = {
+    OF_CONDITIONS("concentration", in.concentration, "1", "ice concentration"),
+    OF_CONDITIONS("thickness_m", in.thickness, "m", "mean thickness of the ice, weighted with area"),
+    OF_CONDITIONS("floe_radius_m", in.floe_radius, "m", "mean radius of the floes, weighted with area"),
+    OF_CONDITIONS("width_m", in.width, "m", "width of the body across the tow"),
+    OF_CONDITIONS("speed_m_s", in.speed, "m/s", "speed of the body through the ice"),
+    OF_CONDITIONS("speed_along_m_s", in.along, "m/s", "its part along the tow"),
+    OF_CONDITIONS("length_scale", in.length_scale, "1", "by which P* was divided, and P_s by its square"),
+    OF_CONDITIONS("strength_n_m", strength, "N/m", "strength of the ice P"),
+    OF_CONDITIONS("capture_strength_n_m", in.p_s, "N/m", "strength P_s from which the ice captures the body"),
+};
+const int bt_n_condition_keys = sizeof bt_condition_keys / sizeof *bt_condition_keys;
+
 /// Simulated / estimate, NaN where there is none.
-static double ratio_of(int kind, const bt_estimate *e, double simulated)
+static double ratio_of(const bt_estimate_def *d, const bt_estimate *e, double simulated)
 {
-    return kind == BT_EST_OPEN_WATER || !(e->force > 0) ? NAN : simulated / e->force;
+    return d->on_top || !(e->force > 0) ? NAN : simulated / e->force;
 }
 
 void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated)
 {
+    const conditions_item conditions = {*in, bt_estimate_strength(in)};
     bt_json_open(j, key, '{');
-    bt_json_number(j, "concentration", in->concentration);
-    bt_json_number(j, "thickness_m", in->thickness);
-    bt_json_number(j, "floe_radius_m", in->floe_radius);
-    bt_json_number(j, "width_m", in->width);
-    bt_json_number(j, "speed_m_s", in->speed);
-    bt_json_number(j, "speed_along_m_s", in->along);
-    bt_json_number(j, "length_scale", in->length_scale);
-    bt_json_number(j, "strength_n_m", bt_estimate_strength(in));
-    bt_json_number(j, "capture_strength_n_m", in->p_s);
-    for (int k = 0; k < BT_N_ESTIMATES; k++) {
-        const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, in);
-        bt_json_open(j, bt_estimate_kinds[k].name, '{');
-        bt_json_number(j, "force_n", e.force);
-        bt_json_number(j, "low_n", e.low);
-        bt_json_number(j, "high_n", e.high);
-        bt_json_number(j, "simulated_over_estimate", ratio_of(k, &e, simulated));
-        bt_json_bool(j, "valid", e.valid);
-        bt_json_bool(j, "compares", e.compares);
-        bt_json_string(j, "note", e.note);
-        bt_json_string(j, "formula", bt_estimate_kinds[k].formula);
-        bt_json_string(j, "source", bt_estimate_kinds[k].source);
+    bt_json_keys_write(j, bt_condition_keys, bt_n_condition_keys, NULL, (const void *const[]){&conditions});
+    for (int k = 0; k < bt_n_estimates(); k++) {
+        const bt_estimate_def *d = bt_estimate_of(k);
+        const bt_estimate e = bt_estimate_at(k, in);
+        const estimate_item item = {e, ratio_of(d, &e, simulated), d->label, d->on_top ? "on top" : "ice resistance", d->formula, d->source};
+        bt_json_open(j, d->name, '{');
+        bt_json_keys_write(j, bt_estimate_keys, bt_n_estimate_keys, NULL, (const void *const[]){&item});
         bt_json_close(j, '}');
     }
     curves(j, in);
@@ -85,17 +113,17 @@ void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in,
 
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full)
 {
-    for (int k = 0; k < BT_N_ESTIMATES; k++) {
-        const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, in);
-        const double ratio = ratio_of(k, &e, simulated);
+    for (int k = 0; k < bt_n_estimates(); k++) {
+        const bt_estimate e = bt_estimate_at(k, in);
+        const double ratio = ratio_of(bt_estimate_of(k), &e, simulated);
         char force[32] = "no value", low[32], high[32];
         if (isfinite(e.force)) bt_force_text(force, e.force);
-        printf("%s%-22s %-12s", indent, bt_estimate_kinds[k].label, force);
+        printf("%s%-22s %-12s", indent, bt_estimate_of(k)->label, force);
         if (e.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
         else if (!isnan(simulated)) printf(" %-9s", "-");
-        printf(" %s%s", e.valid || k == BT_EST_SHIPS ? "" : "not valid: ", e.note);
+        printf(" %s%s", e.valid || bt_estimate_of(k)->note_tells ? "" : "not valid: ", e.note);
         if (isfinite(e.force) && e.low != e.high) printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
         printf("\n");
-        if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_kinds[k].formula, indent, bt_estimate_kinds[k].source);
+        if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_of(k)->formula, indent, bt_estimate_of(k)->source);
     }
 }

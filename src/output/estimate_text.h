@@ -4,7 +4,12 @@
 #define BT_ESTIMATE_TEXT_H
 
 #include "bergtow/estimate.h"
-#include "base/json.h"
+#include "output/json_keys.h"
+
+extern const bt_json_key bt_estimate_keys[]; ///< of one estimate
+extern const int bt_n_estimate_keys;
+extern const bt_json_key bt_condition_keys[]; ///< of what they depend on
+extern const int bt_n_condition_keys;
 
 /// An object "estimates": the conditions, one object an estimate, and curves over the concentration with all else kept. simulated: mean ice
 /// resistance of a run, N, for the ratios (of the drag: none); NaN = no run.

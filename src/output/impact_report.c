@@ -28,44 +28,10 @@ static double *sorted(const bt_impact_count *c)
     return p;
 }
 
-void bt_impacts_json(bt_json *j, const bt_impact_count *c)
+void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c)
 {
-    if (!c) {
-        bt_json_string(j, "impacts", NULL);
-        return;
-    }
-    bt_json_open(j, "impacts", '{');
-    bt_json_string(j, "conversion", c->conversion);
-    bt_json_number(j, "from_s", c->start);
-    bt_json_number(j, "hours", c->hours);
-    bt_json_int(j, "collisions_whole_run", c->n_all);
-    bt_json_int(j, "collisions", c->n);
-    bt_json_number(j, "collisions_per_hour", c->hours > 0 ? (double)c->n / c->hours : NAN);
-    bt_json_number(j, "mean_collision_resistance_n", c->collision_resistance);
-    bt_json_number(j, "mean_push_resistance_n", c->push_resistance);
-    bt_json_number(j, "largest_push_n", c->largest_push);
-    bt_json_number(j, "start_largest_push_n", c->start_push);
-    bt_json_number(j, "start_largest_peak_n", c->start_peak);
-    if (c->n > 0) {
-        const bt_impact *e = &c->largest;
-        bt_json_open(j, "largest", '{');
-        bt_json_number(j, "peak_n", e->peak);
-        bt_json_number(j, "mean_n", e->mean);
-        bt_json_number(j, "duration_s", e->duration);
-        bt_json_number(j, "impulse_ns", e->impulse);
-        bt_json_number(j, "approach_m_s", e->approach);
-        bt_json_number(j, "effective_mass_kg", e->mass);
-        bt_json_number(j, "time_s", e->time);
-        bt_json_int(j, "floe", (int64_t)e->gid);
-        bt_json_int(j, "panel", (int64_t)e->panel);
-        bt_json_number(j, "x_m", e->x);
-        bt_json_number(j, "y_m", e->y);
-        bt_json_close(j, '}');
-    } else {
-        bt_json_string(j, "largest", NULL);
-    }
     double *peaks = sorted(c);
-    bt_json_open(j, "exceedance", '[');
+    bt_json_open(j, key, '[');
     for (int k = 0; rank_of(k) <= c->n_peaks; k++) {
         bt_json_open(j, NULL, '{');
         bt_json_int(j, "rank", rank_of(k));
@@ -74,7 +40,6 @@ void bt_impacts_json(bt_json *j, const bt_impact_count *c)
         bt_json_close(j, '}');
     }
     bt_json_close(j, ']');
-    bt_json_close(j, '}');
     free(peaks);
 }
 

@@ -6,8 +6,8 @@
 #include "output/impact_count.h"
 #include "base/json.h"
 
-/// "impacts": {...}; null when c is NULL.
-void bt_impacts_json(bt_json *j, const bt_impact_count *c);
+/// An array of ranks, each with its peak and how often that is reached or exceeded.
+void bt_impacts_exceedance(bt_json *j, const char *key, const bt_impact_count *c);
 /// Two lines of the printed table; nothing when c is NULL.
 void bt_impacts_print(const bt_impact_count *c);
 

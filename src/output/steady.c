@@ -82,6 +82,7 @@ static void reduce(bt_steady *s, const bt_history *h)
         const double *x = h->column[reported[k].column];
         bt_reported *r = &s->series[k];
         *r = (bt_reported){.name = reported[k].name, .key = reported[k].key, .present = reported[k].always || is_there(x, s->first, h->n)};
+        if (!r->present) r->mean = bt_stats_mean(NULL, 0);
         if (!r->present) continue;
         r->mean = bt_stats_mean(x + s->first, s->n);
         r->trend = bt_stats_trend(x + s->first, s->n);
@@ -93,6 +94,25 @@ static void reduce(bt_steady *s, const bt_history *h)
         s->unconverged += (h->column[BT_COL_UNCONVERGED][i] != 0) / (double)s->n;
         s->residual = bt_max_seen(s->residual, h->column[BT_COL_RESIDUAL][i]);
     }
+}
+
+double bt_steady_peak_tension(const bt_steady *s, bool before)
+{
+    static const bt_reported_series branch[] = {BT_REPORTED_TENSION_1, BT_REPORTED_TENSION_2};
+    double most = NAN;
+    for (int k = 0; k < 2; k++) {
+        const bt_reported *r = &s->series[branch[k]];
+        const double x = before ? r->start_peak : r->peak;
+        if (r->present && !(x <= most)) most = x;
+    }
+    return most;
+}
+
+void bt_steady_none(bt_steady *s)
+{
+    *s = (bt_steady){.earliest = NAN, .start = NAN, .end = NAN, .correlation_time = NAN};
+    for (int k = 0; k < BT_N_REPORTED; k++)
+        s->series[k] = (bt_reported){.mean = bt_stats_mean(NULL, 0), .peak = NAN, .start_peak = NAN};
 }
 
 static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)

@@ -58,6 +58,12 @@ typedef struct bt_steady {
     bt_reported series[BT_N_REPORTED];
 } bt_steady;
 
+/// The larger of the two branches' peaks in the window, or before it, N; NaN without a line.
+double bt_steady_peak_tension(const bt_steady *s, bool before);
+
+/// Of a run without a towed body: nothing is known.
+void bt_steady_none(bt_steady *s);
+
 /// The window of a run with a towed body.
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t);
 

@@ -130,7 +130,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     const bt_mean none = bt_stats_mean(NULL, 0);
     s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
     s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
-    s->window.start = s->window.end = s->window.correlation_time = nan;
+    bt_steady_none(&s->window);
     if (body) {
         bt_steady_find(&s->window, h, c, t);
     }

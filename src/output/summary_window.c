@@ -6,30 +6,6 @@
 
 #define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is told
 
-void bt_summary_window_json(bt_json *j, const bt_window *v)
-{
-    if (!v) {
-        bt_json_string(j, "moving_window", NULL);
-        return;
-    }
-    static const char *const dropped[] = {"dropped_momentum_x_n_s", "dropped_momentum_y_n_s", "dropped_energy_j"};
-    static const char *const brought[] = {"brought_momentum_x_n_s", "brought_momentum_y_n_s", "brought_energy_j"};
-    bt_json_open(j, "moving_window", '{');
-    bt_json_number(j, "length_m", v->length);
-    bt_json_number(j, "ahead_m", v->ahead);
-    bt_json_number(j, "x_m", bt_window_low(v));
-    bt_json_number(j, "laps", bt_window_laps(v));
-    bt_json_int(j, "renewed", v->renewed);
-    bt_json_int(j, "waiting", v->waiting);
-    bt_json_int(j, "kept", v->kept);
-    bt_json_int(j, "missed", v->missed);
-    bt_json_number(j, "ice_drift_x_m", v->drift_x);
-    bt_json_number(j, "ice_drift_y_m", v->drift_y);
-    for (int k = 0; k < 3; k++) bt_json_number(j, dropped[k], v->dropped[k]);
-    for (int k = 0; k < 3; k++) bt_json_number(j, brought[k], v->brought[k]);
-    bt_json_close(j, '}');
-}
-
 void bt_summary_window_print(const bt_window *v)
 {
     if (!v) return;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The moving window in the summary: JSON, table, warnings. Nothing where there is none (NULL).
+// The moving window in the summary: table, warnings. Nothing where there is none (NULL).
 #ifndef BT_SUMMARY_WINDOW_H
 #define BT_SUMMARY_WINDOW_H
 
 #include "step/window.h"
-#include "base/json.h"
 
-void bt_summary_window_json(bt_json *j, const bt_window *v);
 void bt_summary_window_print(const bt_window *v);
 void bt_summary_window_warn(bt_errors *warnings, const bt_window *v);
 

@@ -123,8 +123,8 @@ static void dilute_limit_and_open_water(void **state)
     CHECK(DILUTE, in, 13346.666666666666, false);
     CHECK(OPEN_WATER, in, 1000, true);
     in = berg(0);
-    for (int k = 0; k < BT_N_ESTIMATES; k++)
-        check(bt_estimate_at((bt_estimate_kind)k, &in), k == BT_EST_OPEN_WATER ? 1000 : 0, true, __LINE__);
+    for (int k = 0; k < bt_n_estimates(); k++)
+        check(bt_estimate_at(k, &in), k == BT_EST_OPEN_WATER ? 1000 : 0, true, __LINE__);
 }
 
 static void without_tow_nothing_has_a_value(void **state)
@@ -132,8 +132,8 @@ static void without_tow_nothing_has_a_value(void **state)
     (void)state;
     bt_estimate_input in = berg(0.8);
     in.speed = in.along = NAN;
-    for (int k = 0; k < BT_N_ESTIMATES; k++) {
-        const bt_estimate e = bt_estimate_at((bt_estimate_kind)k, &in);
+    for (int k = 0; k < bt_n_estimates(); k++) {
+        const bt_estimate e = bt_estimate_at(k, &in);
         assert_true(isnan(e.force) && !e.valid);
     }
     in = berg(0.8);
@@ -241,11 +241,11 @@ static void model_and_full_scale_agree(void **state)
         assert_true(fabs(c.estimate.length_scale - 30) < 1e-12 && c.estimate.p_star == 20e3 && c.estimate.p_s == 13e3);
         bt_estimate_conditions(&c, &model);
         assert_non_null(strstr(bt_estimate_at(BT_EST_LICHEY_HELLMER, &full).note, k ? "captured" : "drag"));
-        for (int i = 0; i < BT_N_ESTIMATES; i++) {
-            const bt_estimate a = bt_estimate_at((bt_estimate_kind)i, &full), b = bt_estimate_at((bt_estimate_kind)i, &model);
+        for (int i = 0; i < bt_n_estimates(); i++) {
+            const bt_estimate a = bt_estimate_at(i, &full), b = bt_estimate_at(i, &model);
             assert_ptr_equal(a.note, b.note);
             if (i == BT_EST_MOMENTUM) assert_true(isnan(a.force) && isnan(b.force));
-            else if (fabs(27000 * b.force / a.force - 1) > 1e-12) fail_msg("%s: %g N, scaled %g N", bt_estimate_kinds[i].name, a.force, 27000 * b.force);
+            else if (fabs(27000 * b.force / a.force - 1) > 1e-12) fail_msg("%s: %g N, scaled %g N", bt_estimate_of(i)->name, a.force, 27000 * b.force);
         }
         bt_case_free(&c);
     }

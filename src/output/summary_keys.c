@@ -1,0 +1,433 @@
+// SPDX-License-Identifier: MIT
+// The table of summary.json. Keys, order and meaning are those that scripts rely on: a row is added, none is renamed.
+#include "output/summary_keys.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "output/estimate_text.h"
+#include "output/impact_report.h"
+#include "step/window.h"
+
+typedef bt_summary_view view;
+
+enum { FROM_SUMMARY, FROM_HISTORY, FROM_TOTALS, FROM_CASE, FROM_WINDOW, FROM_IMPACTS, N_FROM };
+
+// --- what is no member of a struct -----------------------------------------------------------------------------------
+
+static double number_or_nan(bool there, double x) { return there ? x : NAN; }
+
+static const char *version(const view *v) { return (void)v, BT_VERSION; }
+static const char *peak_conversion(const view *v) { return (void)v, "mean over a step, impulse / dt"; }
+static double n_floes(const view *v) { return v->n_floes; }
+static double memory_per_floe(const view *v) { return number_or_nan(v->n_floes > 0, v->t->memory / (double)v->n_floes); }
+static double overlap_relative(const view *v) { return number_or_nan(v->t->mean_size > 0, v->h->max_overlap / v->t->mean_size); }
+
+static const bt_lead_stats *lead(const view *v) { return &v->t->lead; }
+static bool has_lead(const view *v) { return lead(v)->mode != BT_LEAD_NONE; }
+static bool is_channel(const view *v) { return lead(v)->mode == BT_LEAD_CHANNEL; }
+static bool is_managed(const view *v) { return lead(v)->mode != BT_LEAD_CHANNEL; }
+static const char *lead_mode(const view *v) { return is_channel(v) ? "channel" : "managed"; }
+static double mean_piece(const view *v) { return number_or_nan(lead(v)->pieces > 0, lead(v)->mean_piece); }
+
+static const bt_outline_counts *outlines(const view *v) { return &v->t->outlines; }
+static double origin_lon(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->lon * 180 / BT_PI); }
+static double origin_lat(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->lat * 180 / BT_PI); }
+static double origin_east(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->east); }
+static double origin_north(const view *v) { return number_or_nan(outlines(v)->read, outlines(v)->north); }
+static const char *crs(const view *v) { return outlines(v)->read ? outlines(v)->crs : ""; }
+
+static const char *verdict(const view *v) { return v->s->body ? bt_verdict_names[v->s->window.verdict] : NULL; }
+static const char *reason(const view *v)
+{
+    return v->s->body && v->s->window.verdict != BT_STEADY ? v->s->window.reason : NULL;
+}
+static const char *rule(const view *v) { return !v->s->body ? NULL : v->s->window.given ? "given" : "mser5"; }
+static double n_independent(const view *v) { return number_or_nan(v->s->window.n, v->s->ice.n_eff); }
+static double unconverged_share(const view *v) { return number_or_nan(v->s->window.n, v->s->window.unconverged); }
+static double window_residual(const view *v) { return number_or_nan(v->s->window.n, v->s->window.residual); }
+static double peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, false); }
+static double start_peak_tension(const view *v) { return bt_steady_peak_tension(&v->s->window, true); }
+static bool has_reference(const view *v) { return !isnan(v->c->reference.mean_force); }
+
+static bool has_impacts(const view *v) { return v->s->impacts; }
+static bool has_largest(const view *v) { return v->s->impacts->n > 0; }
+static const char *conversion(const view *v) { return v->s->impacts->conversion; }
+static double collisions_per_hour(const view *v)
+{
+    return number_or_nan(v->s->impacts->hours > 0, (double)v->s->impacts->n / v->s->impacts->hours);
+}
+static double largest_floe(const view *v) { return v->s->impacts->largest.gid; }
+static double largest_panel(const view *v) { return v->s->impacts->largest.panel; }
+
+static bool has_window(const view *v) { return v->t->window; }
+static double window_low(const view *v) { return bt_window_low(v->t->window); }
+static double window_laps(const view *v) { return bt_window_laps(v->t->window); }
+
+static double n_events(const view *v) { return v->t->events ? (double)v->t->events->n : 0; }
+
+static const char *state_hash(const view *v)
+{
+    static char text[17];
+    snprintf(text, sizeof text, "%016" PRIx64, v->t->state_hash);
+    return text;
+}
+
+// --- arrays and objects whose members are counted ---------------------------------------------------------------------
+
+static void write_quarters(bt_json *j, const char *key, const view *v, const void *reported)
+{
+    (void)v;
+    bt_json_open(j, key, '[');
+    for (int q = 0; q < 4; q++) bt_json_number(j, NULL, ((const bt_reported *)reported)->quarter[q]);
+    bt_json_close(j, ']');
+}
+
+static void write_reported(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    if (!v->s->body) return;
+    bt_json_open(j, key, '{');
+    for (int k = 0; k < BT_N_REPORTED; k++) {
+        const bt_reported *r = &v->s->window.series[k];
+        if (!r->present || v->s->window.n == 0) continue;
+        bt_json_open(j, r->key, '{');
+        bt_json_keys_write(j, bt_reported_keys, bt_n_reported_keys, v, (const void *const[]){r});
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, '}');
+}
+
+static void write_exceedance(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    bt_impacts_exceedance(j, key, v->s->impacts);
+}
+
+static void write_estimates(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    if (v->s->body) bt_estimates_json(j, key, &v->s->estimate, v->s->ice.mean);
+    else bt_json_string(j, key, NULL);
+}
+
+static void write_added(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)key, (void)source;
+    for (int k = 0; k < bt_n_added(); k++) bt_json_number(j, bt_added(k)->summary, v->s->added[k]);
+}
+
+static void write_events(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    const bt_events *e = v->t->events;
+    bt_json_open(j, key, '[');
+    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_TOLD; i++) {
+        bt_json_open(j, NULL, '{');
+        bt_json_number(j, "time_s", e->event[i].time);
+        bt_json_string(j, "kind", bt_event_names[e->event[i].kind]);
+        bt_json_int(j, "subject", e->event[i].subject);
+        bt_json_number(j, "value", e->event[i].value);
+        bt_json_close(j, '}');
+    }
+    bt_json_close(j, ']');
+}
+
+static void write_warnings(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    bt_json_open(j, key, '[');
+    for (size_t i = 0; i < v->s->warnings.n; i++) bt_json_string(j, NULL, v->s->warnings.text[i]);
+    bt_json_close(j, ']');
+}
+
+// --- the tables ------------------------------------------------------------------------------------------------------
+
+#define OF_SUMMARY(...) {BT_JSON_AT(FROM_SUMMARY, bt_summary, __VA_ARGS__)}
+#define OF_HISTORY(...) {BT_JSON_AT(FROM_HISTORY, bt_history, __VA_ARGS__)}
+#define OF_TOTALS(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__)}
+#define OF_CASE(...) {BT_JSON_AT(FROM_CASE, bt_case, __VA_ARGS__)}
+#define OF_WINDOW(...) {BT_JSON_AT(FROM_WINDOW, bt_window, __VA_ARGS__)}
+#define OF_IMPACTS(...) {BT_JSON_AT(FROM_IMPACTS, bt_impact_count, __VA_ARGS__)}
+#define MACHINE(...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .machine = true}
+#define MACHINE_SUMMARY(...) {BT_JSON_AT(FROM_SUMMARY, bt_summary, __VA_ARGS__), .machine = true}
+#define WHEN(when_, ...) {BT_JSON_AT(FROM_TOTALS, bt_run_totals, __VA_ARGS__), .when = when_}
+#define BY(kind_, key_, units_, text_) .key = key_, .units = units_, .description = text_, .kind = BT_JSON_##kind_
+#define NUMBER(key_, function, units_, text_) {BY(REAL, key_, units_, text_), .number = function}
+#define COUNT(key_, function, units_, text_) {BY(INT, key_, units_, text_), .number = function}
+#define MACHINE_OF(key_, function, units_, text_) {BY(REAL, key_, units_, text_), .number = function, .machine = true}
+#define TEXT(key_, function, text_) {BY(TEXT, key_, "", text_), .text = function}
+#define GROUP(key_, when_, text_) {BY(GROUP, key_, "", text_), .when = when_}
+#define WRITTEN(key_, function, text_) {BY(WRITTEN, key_, "", text_), .write = function}
+/// Mean with standard error and 95 % interval, N.
+#define MEAN(key_, member, text_) \
+    OF_SUMMARY("mean_" key_ "_n", member.mean, "N", "mean over the window: " text_), \
+    OF_SUMMARY("mean_" key_ "_se_n", member.se, "N", "standard error of it"), \
+    OF_SUMMARY("mean_" key_ "_low_n", member.low, "N", "lower end of its 95 % interval"), \
+    OF_SUMMARY("mean_" key_ "_high_n", member.high, "N", "upper end of its 95 % interval")
+
+const bt_json_key bt_summary_keys[] = {
+    OF_CASE("title", run.title, "", "title of the case"),
+    TEXT("version", version, "version of the program"),
+    COUNT("n_floes", n_floes, "1", "floes"),
+    OF_TOTALS("n_steps", n_steps, "1", "steps done"),
+    OF_TOTALS("dt_s", dt, "s", "time step"),
+    OF_SUMMARY("sim_time_s", sim_time, "s", "simulated time"),
+    MACHINE("wall_time_s", wall_time, "s", "wall time of the run"),
+    MACHINE("ranks", ranks, "1", "MPI ranks"),
+    MACHINE("threads", threads, "1", "threads of a rank"),
+    MACHINE("divisions", divisions, "1", "times the field was divided anew among the ranks"),
+    MACHINE("moved_floes", moved_floes, "1", "floes that went to another rank then"),
+    MACHINE("imbalance", imbalance, "1", "load of the busiest rank over the mean, less 1, at the end"),
+    MACHINE("worst_imbalance", worst_imbalance, "1", "the largest of the run"),
+    MACHINE("dealt_imbalance", dealt_imbalance, "1", "the same as the last division dealt it"),
+    MACHINE("worst_dealt_imbalance", worst_dealt_imbalance, "1", "the largest of all divisions"),
+    MACHINE("edge_cut", edge_cut, "1", "share of the edges between tiles that the division cuts"),
+    MACHINE("halo_share", halo_share, "1", "bodies held twice over those owned"),
+    MACHINE_OF("memory_per_floe_b", memory_per_floe, "B", "peak resident memory of all ranks for each floe"),
+    MACHINE("sweep_bytes_per_contact", sweep_bytes_per_contact, "B",
+        "what a sweep reads for a contact point, in the last step"),
+    OF_TOTALS("concentration", concentration, "1", "ice concentration as made"),
+    OF_TOTALS("mean_size_m", mean_size, "m", "mean equivalent diameter of the floes"),
+    GROUP("lead", has_lead, "what was cut into the ice ahead of the tow"),
+    TEXT("lead.mode", lead_mode, "channel or managed"),
+    OF_TOTALS("lead.width_m", lead.width, "m", "width of the lead"),
+    OF_TOTALS("lead.length_m", lead.length, "m", "length of the lead"),
+    WHEN(is_channel, "lead.floes_removed", lead.taken, "1", "floes that overlapped the channel"),
+    WHEN(is_managed, "lead.floes_cut", lead.taken, "1", "floes that overlapped the managed ice"),
+    WHEN(is_channel, "lead.area_removed_m2", lead.area_taken, "m2", "area of the floes removed"),
+    WHEN(is_managed, "lead.area_cut_m2", lead.area_taken, "m2", "area of the floes cut"),
+    OF_TOTALS("lead.pieces", lead.pieces, "1", "pieces that they were cut into"),
+    NUMBER("lead.mean_piece_m", mean_piece, "m", "mean equivalent diameter of the pieces"),
+    OF_TOTALS("lead.concentration_before", lead.concentration_before, "1", "concentration before the cut"),
+    OF_TOTALS("lead.concentration_after", lead.concentration_after, "1", "concentration after the cut"),
+    GROUP("outlines", NULL, "how the outlines of a field that was read were taken"),
+    OF_TOTALS("outlines.read", outlines.read, "1", "outlines of a GeoJSON file"),
+    OF_TOTALS("outlines.turned", outlines.turned, "1", "of them listed clockwise, and turned round"),
+    OF_TOTALS("outlines.dropped_vertices", outlines.dropped, "1", "vertices left out: double, or on a straight line"),
+    OF_TOTALS("outlines.rounded", outlines.rounded, "1", "floes not convex by rounding alone, taken for convex"),
+    OF_TOTALS("outlines.rounded_corners", outlines.rounded_corners, "1", "corners that this left out"),
+    OF_TOTALS("outlines.rounded_area_added_m2", outlines.rounded_area, "m2", "area that it added"),
+    OF_TOTALS("outlines.hulled", outlines.hulled, "1", "floes replaced by their convex hull"),
+    OF_TOTALS("outlines.hull_area_added_m2", outlines.hull_area, "m2", "area that this added"),
+    OF_TOTALS("outlines.split", outlines.split, "1", "floes in convex parts"),
+    OF_TOTALS("outlines.parts", outlines.parts, "1", "their parts"),
+    NUMBER("outlines.origin_lon_deg", origin_lon, "deg", "longitude of x = y = 0"),
+    NUMBER("outlines.origin_lat_deg", origin_lat, "deg", "latitude of x = y = 0"),
+    NUMBER("outlines.origin_east_m", origin_east, "m", "easting of x = y = 0 in the plane of the file"),
+    NUMBER("outlines.origin_north_m", origin_north, "m", "northing of x = y = 0 in the plane of the file"),
+    TEXT("outlines.crs", crs, "coordinates of the file"),
+    OF_TOTALS("outlines.nearly_thickness", outlines.unnamed, "1",
+        "features without a thickness that have a property of nearly this name"),
+    MEAN("ice_resistance", ice, "contact force of ice and walls on the towed body against the tow"),
+    OF_SUMMARY("sd_ice_resistance_n", ice.sd, "N",
+        "standard deviation of the step means of the ice resistance in the window"),
+    OF_SUMMARY("p95_ice_resistance_n", p95, "N",
+        "95th percentile of the step means of the ice resistance in the window"),
+    OF_SUMMARY("p99_ice_resistance_n", p99, "N",
+        "99th percentile of the step means of the ice resistance in the window"),
+    OF_SUMMARY("peak_ice_resistance_n", peak, "N", "largest step mean of the ice resistance in the window"),
+    TEXT("peak_conversion", peak_conversion, "what a peak of a series is"),
+    MEAN("tow_force", tow, "towing force on the body along the tow"),
+    OF_SUMMARY("peak_tow_force_n", window.series[BT_REPORTED_TOW].peak, "N",
+        "largest step mean of the tow force in the window"),
+    OF_SUMMARY("start_peak_tow_force_n", window.series[BT_REPORTED_TOW].start_peak, "N", "largest before the window"),
+    MEAN("line_tension", window.series[BT_REPORTED_TENSION_1].mean, "tension of the line, of its first branch"),
+    MEAN("line_tension_2", window.series[BT_REPORTED_TENSION_2].mean, "tension of the second branch"),
+    MEAN("vessel_thrust", window.series[BT_REPORTED_THRUST].mean, "thrust of the vessel along its course"),
+    NUMBER("peak_line_tension_n", peak_tension, "N", "largest step mean of the tension of either branch in the window"),
+    NUMBER("start_peak_line_tension_n", start_peak_tension, "N", "largest before the window"),
+    OF_SUMMARY("mean_drag_force_n", drag.mean, "N", "mean over the window: drag of water and air against the tow"),
+    OF_SUMMARY("mean_coriolis_force_n", coriolis.mean, "N", "mean over the window: Coriolis force against the tow"),
+    OF_SUMMARY("mean_tilt_force_n", tilt.mean, "N",
+        "mean over the window: force of the sea-surface tilt against the tow"),
+    OF_SUMMARY("mean_inertia_force_n", inertia.mean, "N",
+        "mean over the window: (mass + added mass) x acceleration along the tow"),
+    OF_SUMMARY("mean_ice_resistance_budget_n", budget.mean, "N",
+        "mean ice resistance over the window from the momentum of everything but the body"),
+    GROUP("budget", NULL, "momentum balance of the towed body over the window"),
+    OF_SUMMARY("budget.tow_minus_other_forces_n", balance, "N",
+        "mean tow force less drag, Coriolis, tilt, registered forces of the balance, and inertia"),
+    OF_SUMMARY("budget.closure_n", closure, "N", "mean ice resistance less that"),
+    OF_SUMMARY("budget.closure_relative", closure_relative, "1", "the same over the largest of the means"),
+    OF_SUMMARY("budget.ice_momentum_closure_relative", budget_closure_relative, "1",
+        "mean ice resistance less that from the momentum of the ice, over the largest of the means"),
+    GROUP("window", NULL, "the window that the means refer to"),
+    TEXT("window.verdict", verdict, "steady, not steady or too short"),
+    TEXT("window.reason", reason, "of a verdict other than steady"),
+    OF_SUMMARY("window.earliest_s", window.earliest, "s", "earliest time at which the window may begin"),
+    OF_SUMMARY("window.start_s", window.start, "s", "begin of the window"),
+    OF_SUMMARY("window.end_s", window.end, "s", "end of the window"),
+    OF_SUMMARY("window.n_samples", window.n, "1", "steps in the window"),
+    NUMBER("window.n_independent", n_independent, "1", "independent samples of the ice resistance among them"),
+    OF_SUMMARY("window.correlation_time_s", window.correlation_time, "s", "correlation time of the ice resistance"),
+    NUMBER("window.unconverged_share", unconverged_share, "1",
+        "share of the steps in the window that did not converge"),
+    NUMBER("window.max_residual_m_s", window_residual, "m/s", "largest residual of a step in the window"),
+    TEXT("window.rule", rule, "given by output.window_start, or mser5: found"),
+    TEXT("window.warning", reason, "the reason, under its name in earlier versions"),
+    WRITTEN("window.series", write_reported, "what the verdict rests on, for each reported series"),
+    GROUP("reference", has_reference, "the measured force of the case"),
+    OF_CASE("reference.mean_force_n", reference.mean_force, "N", "measured mean force, given in the case"),
+    OF_CASE("reference.source", reference.source, "", "where it is from"),
+    OF_SUMMARY("reference.ratio", reference_ratio, "1", "mean ice resistance / measured mean force"),
+    GROUP("impacts", has_impacts, "collisions with the towed body"),
+    TEXT("impacts.conversion", conversion, "how the impulse of a collision is turned into a peak"),
+    OF_IMPACTS("impacts.from_s", start, "s", "begin of the window"),
+    OF_IMPACTS("impacts.hours", hours, "h", "its length"),
+    OF_IMPACTS("impacts.collisions_whole_run", n_all, "1", "collisions of the whole run"),
+    OF_IMPACTS("impacts.collisions", n, "1", "collisions in the window"),
+    NUMBER("impacts.collisions_per_hour", collisions_per_hour, "1/h", "the same for each hour"),
+    OF_IMPACTS("impacts.mean_collision_resistance_n", collision_resistance, "N",
+        "part of the mean ice resistance that belongs to collisions"),
+    OF_IMPACTS("impacts.mean_push_resistance_n", push_resistance, "N", "the rest of it: push"),
+    OF_IMPACTS("impacts.largest_push_n", largest_push, "N",
+        "largest force of a floe in a step of the window that is no collision"),
+    OF_IMPACTS("impacts.start_largest_push_n", start_push, "N", "largest before the window"),
+    OF_IMPACTS("impacts.start_largest_peak_n", start_peak, "N", "largest peak of a collision before the window"),
+    GROUP("impacts.largest", has_largest, "the collision with the largest peak in the window"),
+    OF_IMPACTS("impacts.largest.peak_n", largest.peak, "N", "peak force by the conversion"),
+    OF_IMPACTS("impacts.largest.mean_n", largest.mean, "N", "mean force by the conversion"),
+    OF_IMPACTS("impacts.largest.duration_s", largest.duration, "s", "duration by the conversion"),
+    OF_IMPACTS("impacts.largest.impulse_ns", largest.impulse, "N s", "impulse"),
+    OF_IMPACTS("impacts.largest.approach_m_s", largest.approach, "m/s", "approach speed"),
+    OF_IMPACTS("impacts.largest.effective_mass_kg", largest.mass, "kg",
+        "effective mass of the two bodies along the normal"),
+    OF_IMPACTS("impacts.largest.time_s", largest.time, "s", "end of the step in which it began"),
+    COUNT("impacts.largest.floe", largest_floe, "1", "id of the floe"),
+    COUNT("impacts.largest.panel", largest_panel, "1", "panel of the hull"),
+    OF_IMPACTS("impacts.largest.x_m", largest.x, "m", "place on the hull, x of the body frame"),
+    OF_IMPACTS("impacts.largest.y_m", largest.y, "m", "place on the hull, y of the body frame"),
+    WRITTEN("impacts.exceedance", write_exceedance, "how often a peak is reached or exceeded, by rank"),
+    WRITTEN("estimates", write_estimates,
+        "published and derived estimates for the conditions of the run; null without a towed body"),
+    {.key = "", .kind = BT_JSON_ADDED, .write = write_added},
+    OF_HISTORY("max_overlap_m", max_overlap, "m", "deepest overlap of two bodies"),
+    NUMBER("max_overlap_relative", overlap_relative, "1", "the same over the mean floe size"),
+    OF_HISTORY("unconverged_steps", unconverged, "1", "steps that met the sweep limit before the tolerance"),
+    OF_HISTORY("max_residual_m_s", max_residual, "m/s", "largest residual of the contact problem at the end of a step"),
+    OF_TOTALS("tolerance_m_s", tolerance, "m/s", "residual at which the sweeps stop"),
+    OF_SUMMARY("mean_sweeps", sweeps, "1", "sweeps of the contact solver in a step, mean over all steps"),
+    OF_SUMMARY("mean_unit_updates", updates, "1", "updates of single contacts in a step, mean over all steps"),
+    OF_SUMMARY("mean_momentum_moves", moves, "1",
+        "contacts moved on along their last change in a step, mean over all steps"),
+    OF_HISTORY("unprojected_steps", unprojected, "1", "steps whose position projection met its limit of work"),
+    OF_SUMMARY("contacts_mean", contacts, "1", "contact points, mean over all steps"),
+    OF_HISTORY("contact_work_j", contact_work, "J", "work of the contact impulses"),
+    OF_HISTORY("crushed_work_j", crushed_work, "J", "work taken by contact points that crush"),
+    OF_HISTORY("max_crushed_depth_m", max_crushed_depth, "m", "deepest crush of a pair of bodies"),
+    OF_HISTORY("crushing_steps", crushing_steps, "1", "steps with contact points that crush"),
+    OF_HISTORY("max_crushing_contacts", max_crushing, "1", "most of them at once"),
+    OF_TOTALS("stalled_s", stall.time, "s", "time in which the body stood still while the tow asked for motion"),
+    OF_TOTALS("stalled_windows", stall.windows, "1", "stretches of time in which it did"),
+    OF_HISTORY("positive_work_steps", positive_work, "1", "steps in which the contacts added energy"),
+    OF_HISTORY("repeated_solves", repeats, "1",
+        "times a step was solved again because floes outran the contact margin"),
+    OF_HISTORY("outrun_steps", outrun, "1", "steps whose last solution still outran the margin"),
+    OF_HISTORY("restitution_cut_steps", restitution_cut, "1",
+        "steps whose restitution was lowered so that the contacts add no energy"),
+    OF_HISTORY("momentum_residual", max_momentum_residual, "1",
+        "largest |momentum change - external impulse| / momentum exchanged of a step"),
+    OF_TOTALS("floes_outside", floes_outside, "1", "floes that left an open domain"),
+    GROUP("moving_window", has_window, "what the moving window did"),
+    OF_WINDOW("moving_window.length_m", length, "m", "length of the window"),
+    OF_WINDOW("moving_window.ahead_m", ahead, "m", "distance of the body from its front"),
+    NUMBER("moving_window.x_m", window_low, "m", "its low end, not wrapped"),
+    NUMBER("moving_window.laps", window_laps, "1", "way that it has gone, in its lengths"),
+    OF_WINDOW("moving_window.renewed", renewed, "1", "floes taken out behind and put in ahead"),
+    OF_WINDOW("moving_window.waiting", waiting, "1", "floes behind it whose place ahead is not free"),
+    OF_WINDOW("moving_window.kept", kept, "1", "floes that went round as they were"),
+    OF_WINDOW("moving_window.missed", missed, "1", "places ahead that stayed empty"),
+    OF_WINDOW("moving_window.ice_drift_x_m", drift_x, "m", "way of undisturbed ice, x"),
+    OF_WINDOW("moving_window.ice_drift_y_m", drift_y, "m", "way of undisturbed ice, y"),
+    OF_WINDOW("moving_window.dropped_momentum_x_n_s", dropped[0], "N s",
+        "momentum of the renewed floes as they were taken out, x"),
+    OF_WINDOW("moving_window.dropped_momentum_y_n_s", dropped[1], "N s",
+        "momentum of the renewed floes as they were taken out, y"),
+    OF_WINDOW("moving_window.dropped_energy_j", dropped[2], "J",
+        "kinetic energy of the renewed floes as they were taken out"),
+    OF_WINDOW("moving_window.brought_momentum_x_n_s", brought[0], "N s",
+        "momentum of the renewed floes as they entered, x"),
+    OF_WINDOW("moving_window.brought_momentum_y_n_s", brought[1], "N s",
+        "momentum of the renewed floes as they entered, y"),
+    OF_WINDOW("moving_window.brought_energy_j", brought[2], "J", "kinetic energy of the renewed floes as they entered"),
+    MACHINE_SUMMARY("ns_per_floe_step", ns_per_floe_step, "ns", "wall time for each floe and step"),
+    GROUP("phases_s", NULL, "wall time by phase of the step"),
+    MACHINE("phases_s.detect", phases.detect, "s", "wall time of the detection of contacts"),
+    MACHINE("phases_s.colour", phases.colour, "s", "wall time of the order of the contacts"),
+    MACHINE("phases_s.forces", phases.forces, "s", "wall time of the forces and prediction"),
+    MACHINE("phases_s.solve", phases.solve, "s", "wall time of the contact solver"),
+    MACHINE("phases_s.advance", phases.advance, "s", "wall time of the motion and projection"),
+    MACHINE("phases_s.exchange", phases.exchange, "s", "wall time of the exchange between ranks"),
+    MACHINE("phases_s.output", phases.output, "s", "wall time of writing"),
+    TEXT("state_hash", state_hash, "hash of the state at the end, the same for any ranks and threads"),
+    OF_TOTALS("stopped", stopped, "", "why the run ended early"),
+    WRITTEN("events", write_events, "what happened, the first 40; all are in result.h5"),
+    COUNT("n_events", n_events, "1", "how many there were"),
+    WRITTEN("warnings", write_warnings, "doubts about the numbers, in words"),
+};
+const int bt_n_summary_keys = sizeof bt_summary_keys / sizeof *bt_summary_keys;
+
+#define OF_REPORTED(...) {BT_JSON_AT(0, bt_reported, __VA_ARGS__)}
+const bt_json_key bt_reported_keys[] = {
+    OF_REPORTED("mean_n", mean.mean, "N", "mean over the window"),
+    OF_REPORTED("mean_low_n", mean.low, "N", "lower end of its 95 % interval"),
+    OF_REPORTED("mean_high_n", mean.high, "N", "upper end of its 95 % interval"),
+    OF_REPORTED("n_independent", mean.n_eff, "1", "independent samples"),
+    OF_REPORTED("change_n", trend.change, "N", "change of a straight line over the window"),
+    OF_REPORTED("change_low_n", trend.low, "N", "lower end of its interval"),
+    OF_REPORTED("change_high_n", trend.high, "N", "upper end of its interval"),
+    WRITTEN("quarters_n", write_quarters, "means of the quarters of the window, N"),
+    OF_REPORTED("peak_n", peak, "N", "largest step mean in the window"),
+    OF_REPORTED("start_peak_n", start_peak, "N", "largest before the window"),
+};
+const int bt_n_reported_keys = sizeof bt_reported_keys / sizeof *bt_reported_keys;
+
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n)
+{
+    const view v = {s, h, c, t, n};
+    const void *const source[N_FROM] = {s, h, t, c, t->window, s->impacts};
+    bt_json j = {0};
+    bt_json_open(&j, NULL, '{');
+    bt_json_keys_write(&j, bt_summary_keys, bt_n_summary_keys, &v, source);
+    bt_json_close(&j, '}');
+    return j.text;
+}
+
+// --- what they mean --------------------------------------------------------------------------------------------------
+
+static bt_meaning meaning_of(const bt_json_key *k)
+{
+    if (!k) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = ""};
+    return (bt_meaning){.known = true, .machine = k->machine, .units = k->units, .description = k->description, .estimate = "", .label = ""};
+}
+
+/// A key "estimates.NAME.key", or one of the conditions.
+static bt_meaning meaning_of_estimate(const char *key)
+{
+    const char *dot = strchr(key, '.');
+    if (!dot) return meaning_of(bt_json_keys_find(bt_condition_keys, bt_n_condition_keys, key));
+    for (int k = 0; k < bt_n_estimates(); k++) {
+        const bt_estimate_def *d = bt_estimate_of(k);
+        if (strncmp(d->name, key, (size_t)(dot - key)) || d->name[dot - key]) continue;
+        bt_meaning m = meaning_of(bt_json_keys_find(bt_estimate_keys, bt_n_estimate_keys, dot + 1));
+        m.estimate = d->name, m.label = d->label, m.on_top = d->on_top;
+        return m;
+    }
+    return meaning_of(NULL);
+}
+
+bt_meaning bt_summary_meaning(const char *key)
+{
+    for (int k = 0; k < bt_n_added(); k++)
+        if (!strcmp(bt_added(k)->summary, key))
+            return (bt_meaning){.known = true, .units = bt_added(k)->units, .description = bt_added(k)->description, .estimate = "", .label = ""};
+    if (!strncmp(key, "estimates.", 10)) return meaning_of_estimate(key + 10);
+    const char *dot = strrchr(key, '.');
+    if (!strncmp(key, "window.series.", 14)) return meaning_of(bt_json_keys_find(bt_reported_keys, bt_n_reported_keys, dot + 1));
+    bt_meaning m = meaning_of(bt_json_keys_find(bt_summary_keys, bt_n_summary_keys, key));
+    return m;
+}

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// The table of summary.json, and what its keys mean.
+#ifndef BT_SUMMARY_KEYS_H
+#define BT_SUMMARY_KEYS_H
+
+#include "output/json_keys.h"
+#include "output/summary.h"
+
+/// What a summary is made of.
+typedef struct bt_summary_view {
+    const bt_summary *s;
+    const bt_history *h;
+    const bt_case *c;
+    const bt_run_totals *t;
+    bt_idx n_floes;
+} bt_summary_view;
+
+extern const bt_json_key bt_summary_keys[];
+extern const int bt_n_summary_keys;
+extern const bt_json_key bt_reported_keys[]; ///< of an entry of window.series
+extern const int bt_n_reported_keys;
+
+/// What a key of summary.json means, also one of a reported series, an estimate, or a registered quantity.
+typedef struct bt_meaning {
+    bool known, machine;             ///< machine: as bt_json_key.machine
+    const char *units, *description; ///< "" where there are none
+    const char *estimate, *label;    ///< of an estimate: its name and label, else ""
+    bool on_top;                     ///< of an estimate: as bt_estimate_def.on_top
+} bt_meaning;
+bt_meaning bt_summary_meaning(const char *key);
+
+/// Everything that is registered, for people and for programs: series, keys of summary.json, estimates.
+void bt_list_quantities(void *stream);
+void bt_list_quantities_json(void *stream);
+
+#endif
