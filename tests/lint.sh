@@ -28,6 +28,7 @@ done
 for f in $(files '*.py'); do
     "${PYTHON:-/usr/bin/python3}" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
+"${PYTHON:-/usr/bin/python3}" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
 # shellcheck disable=SC2046 # one word a file
