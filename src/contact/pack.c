@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "solve/kernel.h"
 
 enum { MAX_COLOURS = 64 };
@@ -159,8 +159,8 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
     }
     t->n_units = (bt_idx)s->n;
     if (s->n == 0) return;
-    const bool crush = bt_crush_on(w);
-    if (crush) bt_crush_reserve(t);
+    const bool bounded = bt_laws_on(&w->par);
+    if (bounded) bt_laws_reserve(t);
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (t->phase < BT_COLOURS) colour_units(w, t, s, next);
     else memset(s->colour, 0, s->n); // in sequence
@@ -169,8 +169,8 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
         const bt_idx at = next[s->colour[i]]++;
         bt_unit *u = &t->units[at];
         fill_unit(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
-        if (crush) {
-            bt_crush_fill(w, t, at, p, &s->man[i]);
+        if (bounded) {
+            bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
         p->n_points = u->n;

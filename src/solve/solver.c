@@ -10,7 +10,6 @@
 #include "solve/batch.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
-#include "contact/limit.h"
 #include "contact/pack.h"
 #include "space/phases.h"
 #include "solve/restitution.h"
@@ -97,7 +96,7 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
-        const double r = tile->limits ? bt_limited_residual(u, &tile->limits[i], v, &sum) : bt_unit_residual(u, v, &sum);
+        const double r = bt_unit_residual(u, tile->limits ? &tile->limits[i] : NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
         rows += u->n + 1;
@@ -152,13 +151,10 @@ static double update_list(bt_tile *tile, bt_vel *v, const bt_inv *inv)
 {
     enum { AHEAD = 3 };
     double most = 0;
-    for (bt_idx j = 0; !tile->limits && j < tile->n_list; j++) {
-        fetch_ahead(tile, j + AHEAD);
-        most = bt_max(most, bt_update_unit(&tile->units[tile->list[j]], v, inv));
-    }
-    for (bt_idx j = 0; tile->limits && j < tile->n_list; j++) {
+    for (bt_idx j = 0; j < tile->n_list; j++) {
         const bt_idx i = tile->list[j];
-        most = bt_max(most, bt_update_limited(&tile->units[i], &tile->limits[i], v, inv));
+        fetch_ahead(tile, j + AHEAD);
+        most = bt_max(most, bt_update_unit(&tile->units[i], tile->limits ? &tile->limits[i] : NULL, v, inv));
     }
     return most;
 }

@@ -21,8 +21,8 @@
 // berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over all units, as the reference; both end
 // on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
 //
-// With ice.crushing.pressure the normal impulses have an upper bound, too, λ_n <= L(w_n) (contact/crush.h, src/contact/limit.h): the sweep over a tile
-// is another one then, and in the natural map the projection is on [0, L].
+// Where a contact law applies (contact/law.h) the normal impulses have an upper bound, too, λ_n <= L(w_n) (src/solve/limit.h), and in the natural map
+// the projection is on [0, L].
 //
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s

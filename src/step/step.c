@@ -3,7 +3,7 @@
 #include <math.h>
 
 #include "contact/contacts.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "force/environment.h"
 #include "bergtow/forces.h"
 #include "loads/impact.h"
@@ -245,7 +245,7 @@ void bt_world_step(bt_world *w)
     clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
-    bt_crush_grow(w);
+    bt_laws_grow(w);
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);

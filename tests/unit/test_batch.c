@@ -76,7 +76,7 @@ static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
-        for (bt_idx j = 0; j < s->tile.n_list; j++) largest = bt_max(largest, bt_update_unit(&s->units[order[j]], s->v, s->inv));
+        for (bt_idx j = 0; j < s->tile.n_list; j++) largest = bt_max(largest, bt_update_unit(&s->units[order[j]], NULL, s->v, s->inv));
         if (n == 0) *most = largest;
     }
     double against = 0;
