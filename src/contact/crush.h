@@ -46,10 +46,10 @@
 bool bt_crush_on(const bt_params *p);
 bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b);
 void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-bool bt_crush_keeps(const bt_world *w, const bt_trace *r);
+bool bt_crush_keeps(const bt_world *w, bt_trace *r);
 bool bt_crush_gives_way(const bt_unit *u, const bt_limit *l, int i);
 void bt_crush_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals);
-double bt_crush_remember(bt_world *w, bt_tile *t, bt_idx j);
-double bt_crush_depth(const bt_trace *r);
+double bt_crush_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals);
+double bt_crush_count(const bt_world *w, const bt_trace *r, bt_totals *totals);
 
 #endif

@@ -5,7 +5,7 @@
 //     0 <= λ <= L(w),   w > 0 only if λ = 0,   w < 0 only if λ is at its bound,
 // and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound holds, and the law that sets it
 // gives way. The bounds of all laws have one shape, so that there is one update of a contact for all of them (solve/limit.h):
-//     L(w) = min(cap, most, max(flat, base + slope (−w − place)))
+//     L(w) = min(most, max(flat, base + slope (−w − place)))
 //
 // Memory. What a law remembers of a pair is one record, bt_trace (space/tiles.h), kept in the tile that owns the pair, sorted by (a, b, part, law). It
 // is state: it goes with the pair to other tiles and ranks, into checkpoints, and into the hash of the state, whatever the law. So does
@@ -24,17 +24,22 @@
 #include "space/phases.h"
 #include "space/tiles.h"
 
-enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAWS };
+enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS };
 
 /// What the laws book in a step: exact sums.
-enum { BT_CRUSHED_WORK, BT_CRUSHING_POINTS, BT_LAW_SUMS };
+enum {
+    BT_CRUSHED_WORK, BT_CRUSHING_POINTS,
+    BT_RAFT_EDGE_WORK, BT_RAFT_FRICTION_WORK, BT_RAFTING_PAIRS, BT_RAFTED_AREA, BT_RAFTED_ENERGY,
+    BT_LAW_SUMS
+};
 
 /// Bounds of the points of one unit, and what gives way; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
-    double flat[2];  ///< the bound at any approach, N s
+    double flat[2];  ///< the bound at any approach; flat[0] of sheets: the radius of their disc, N s
     double base[2];  ///< of the rising part; never above flat, N s
     double slope[2]; ///< of the rising part, kg
     double most[2];  ///< N s
+    double cap[2];   ///< what rafting allows; never below flat, N s
     double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
     double depth[2]; ///< crushed so far, m (contact/crush.h)
     double grown[2]; ///< by how much the bodies go into each other in this step, m
@@ -48,21 +53,26 @@ typedef struct bt_law {
     bool (*on)(const bt_params *p);
     /// To this pair?
     bool (*applies)(const bt_world *w, bt_idx a, bt_idx b);
+    /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h). NULL = the outlines.
+    bool (*contact)(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_manifold *edge, bt_manifold *sheets);
     /// Narrow the bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the surfaces that are left.
     void (*bound)(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-    /// Does the record stay?
-    bool (*keeps)(const bt_world *w, const bt_trace *r);
+    /// Brings the record up to date with the poses; does it stay?
+    bool (*keeps)(const bt_world *w, bt_trace *r);
     /// Is point i of the unit at the bound of this law?
     bool (*gives_way)(const bt_unit *u, const bt_limit *l, int i);
     /// It is, and approaches: limits[j].grown[i] has been set.
     void (*give_way)(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals);
-    /// After the solve: into the records of the tile. Returns the deepest, m.
-    double (*remember)(bt_world *w, bt_tile *t, bt_idx j);
-    /// Deepest of a record, m.
-    double (*depth)(const bt_trace *r);
+    /// After the solve: into the records of the tile. Returns what the law wants the largest of.
+    double (*remember)(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals);
+    /// A record into the sums; the same largest. Of all records, also where nothing moves.
+    double (*count)(const bt_world *w, const bt_trace *r, bt_totals *totals);
 } bt_law;
 
 extern const bt_law bt_laws[BT_LAWS];
+
+/// Bounds with a rising part: units with them are not swept in batches (src/solve/batch.h).
+bool bt_laws_rise(const bt_params *p);
 
 /// Does any law bound contacts in this world?
 bool bt_laws_on(const bt_params *p);
@@ -71,6 +81,10 @@ bool bt_law_on(const bt_params *p, int law);
 
 /// At the start of a detection: forget what tile t need not remember any more.
 void bt_laws_prune(const bt_world *w, bt_tile *t);
+
+struct bt_pack_scratch;
+/// Contacts of tile t that a law makes of pairs with a record, in place of those of the outlines, and after them.
+void bt_laws_replace(const bt_world *w, bt_tile *t, struct bt_pack_scratch *s);
 
 /// Room for the bounds of the units of a tile.
 void bt_laws_reserve(bt_tile *t);

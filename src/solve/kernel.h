@@ -45,9 +45,40 @@ static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va
     return bt_max(bt_max(fabs(d1) * u->w[0], fabs(d2) * u->w[1]), fabs(dt) * u->wt);
 }
 
+/// The nearest point of a disc about 0.
+static inline void bt_onto_disc(double radius, double *x, double *y)
+{
+    const double far = sqrt(*x * *x + *y * *y), scale = far > radius ? radius / far : 1;
+    *x *= scale;
+    *y *= scale;
+}
+
+/// What the friction of sheets would be after a step of its own (contact/raft.h).
+static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x, double *y)
+{
+    *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * u->mn[0];
+    *y = u->lt - bt_tangent_velocity(u, va, vb) * u->mt;
+    bt_onto_disc(k->flat[0], x, y);
+}
+
+static inline double bt_update_sheets(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+{
+    const bt_inv ia = inv[u->a], ib = inv[u->b];
+    bt_vel va = v[u->a], vb = v[u->b];
+    double x, y;
+    bt_sheets_map(u, k, &va, &vb, &x, &y);
+    const double dx = x - u->ln[0], dy = y - u->lt;
+    bt_apply(u, dx, dx * u->ran[0], dx * u->rbn[0], dy, ia, ib, &va, &vb);
+    u->ln[0] = x, u->lt = y;
+    bt_store(&v[u->a], ia, &va);
+    bt_store(&v[u->b], ib, &vb);
+    return bt_max(fabs(dx), fabs(dy)) * u->wt;
+}
+
 /// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
 static inline double bt_update_unit(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
+    if (u->n == 0) return bt_update_sheets(u, k, v, inv);
     const bt_vel va = v[u->a], vb = v[u->b];
     double l[2];
     bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
@@ -62,9 +93,19 @@ static inline double bt_normal_map(const bt_unit *u, const bt_limit *k, int i, c
     return k ? bt_limit_point(k, u, i, w - u->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * u->mn[i]);
 }
 
-/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential).
+static inline double bt_sheets_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+{
+    double x, y;
+    bt_sheets_map(u, k, &v[u->a], &v[u->b], &x, &y);
+    x = (x - u->ln[0]) * u->wt, y = (y - u->lt) * u->wt;
+    *sum += x * x + y * y;
+    return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
+}
+
+/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential; two of sheets).
 static inline double bt_unit_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
 {
+    if (u->n == 0) return bt_sheets_residual(u, k, v, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double worst = 0, total = 0;
     for (int i = 0; i < u->n; i++) {

@@ -49,7 +49,8 @@ static void start_impulses(bt_tile *tile)
     for (bt_idx i = 0; i < tile->n_units; i++) {
         bt_unit *u = &tile->units[i];
         for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
-        u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+        if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+        else bt_onto_disc(tile->limits[i].flat[0], &u->ln[0], &u->lt);
         double *x = tile->before[i];
         x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
     }
@@ -99,9 +100,10 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
         const double r = bt_unit_residual(u, tile->limits ? &tile->limits[i] : NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
-        rows += u->n + 1;
+        rows += u->n > 0 ? u->n + 1 : 2;
         const double *x = tile->before[i];
         bool on = p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt; // or did before the last sweep
+        if (u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) tile->list[tile->n_list++] = i;
     }
@@ -326,6 +328,7 @@ double bt_solver_work(const bt_world *w, const bt_unit *u)
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
     const bt_vel *va = &w->bodies.vel[u->a], *vb = &w->bodies.vel[u->b];
     double work = 0.5 * u->lt * (bt_tangent_velocity(u, &fa, &fb) + bt_tangent_velocity(u, va, vb));
-    for (int i = 0; i < u->n; i++) work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
+    const int n = u->n > 0 ? u->n : 1; // sheets have one component here
+    for (int i = 0; i < n; i++) work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
     return work;
 }

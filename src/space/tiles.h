@@ -64,7 +64,7 @@ typedef struct bt_unit {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
-    int32_t n, spare;      ///< points, 1 or 2
+    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
 } bt_unit;
 _Static_assert(sizeof(bt_unit) == 192, "three cache lines");
 
@@ -115,6 +115,7 @@ typedef struct bt_tile {
     struct bt_limit *limits;        ///< [n_units] bounds of the units; NULL where contacts are rigid
     bt_trace *memory;               ///< [n_memory] what laws remember of pairs of this tile, sorted by bt_trace_by_names
     bt_idx cap_limits, n_memory, cap_memory;
+    bool rising;                    ///< some bounds have a rising part
     // units that are swept (src/solve/rounds.h)
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_units] unknowns before the last sweep

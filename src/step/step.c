@@ -127,8 +127,8 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];
         const double normal = u->ln[0] + u->ln[1];
-        if (normal == 0) continue;
-        bt_sum_add(&t->sum[EXCHANGED], normal);
+        if (normal == 0 && u->lt == 0) continue;
+        bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
         bt_sum_add(&t->sum[WORK], bt_solver_work(w, u));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
