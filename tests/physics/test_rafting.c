@@ -42,6 +42,7 @@ static void set_speed(bt_world *w, bt_gid g, double x)
 {
     vel(w, g)->x = x;
     w->bodies.stirred[bt_world_index(w, g)] = 1;
+    w->tiles->relabel = true; // it may lie in a tile that rests
 }
 
 /// Sum of the normal impulses on body g over dt, N.
@@ -76,7 +77,7 @@ static void two_squares(void **state)
     bt_world *w = bt_world_create(&p);
     add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
     const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 0, h);
-    const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), left = add_box(w, BT_KINEMATIC, 1, 4, -12, 0, 0);
+    const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), left = add_box(w, BT_KINEMATIC, 1, 4, -9.5, 0, 0);
     set_speed(w, right, -v);
     double work = 0, edge = 0, friction = 0, depth = 0;
     while (depth < 0.8 * a) {
@@ -95,31 +96,34 @@ static void two_squares(void **state)
     CHECK_CLOSE(edge + friction, work, 0.01 * work);
     CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * a * depth, 0.01 * w->stats.rafted_energy);
     CHECK_CLOSE(pose(w, floe)->y, 0, 1e-6);
-    // Back by 3 m: friction alone.
-    set_speed(w, right, 0.5);
-    pose(w, left)->x = pose(w, floe)->x - 0.5 * a - 0.5;
+    // Back: friction alone.
+    set_speed(w, right, 0.08);
     set_speed(w, left, v);
     const double deepest = depth;
-    for (int s = 0; s < 600; s++) {
-        bt_world_step(w);
-        check_step(w);
-        depth = 0.5 * a - pose(w, floe)->x;
-        if (s > 20) CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
-        if (s > 20) assert_true(w->stats.raft_edge_work == 0);
-    }
-    // In again: the edge bears nothing until it is where it was.
-    set_speed(w, left, -0.5);
-    pose(w, right)->x = pose(w, floe)->x + 0.5 * a + 0.5;
-    set_speed(w, right, -v);
+    int touched = 0; // steps: the first ones set the floe in motion
     for (int s = 0; s < 800; s++) {
         bt_world_step(w);
         check_step(w);
         depth = 0.5 * a - pose(w, floe)->x;
+        if (touched > 3) CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
+        if (touched > 3) assert_true(w->stats.raft_edge_work == 0);
+        touched += load_on(w, left) > 0;
+    }
+    assert_true(deepest - depth > 2);
+    // In again: the edge bears nothing until it is where it was.
+    set_speed(w, left, -0.5);
+    set_speed(w, right, -v);
+    touched = 0;
+    for (int s = 0; s < 4000 && depth < deepest + 1; s++) {
+        bt_world_step(w);
+        check_step(w);
+        depth = 0.5 * a - pose(w, floe)->x;
         const double f = load_on(w, right), sheets = a * sheet_load() * depth;
-        if (s > 20 && depth < deepest - 0.1) CHECK_CLOSE(f, sheets, 0.01 * sheets);
+        touched += f > 0;
+        if (touched > 3 && depth < deepest - 0.1) CHECK_CLOSE(f, sheets, 0.01 * sheets);
         if (depth > deepest + 0.1) CHECK_CLOSE(f, sheets + a * edge_load(), 0.01 * f);
     }
-    assert_true(depth > deepest + 0.5);
+    assert_true(depth >= deepest + 1);
     bt_world_free(w);
 }
 
@@ -167,6 +171,8 @@ static void confined_row(void **state)
     bt_world *w = bt_world_create(&p);
     for (int i = 0; i < N; i++) add_box(w, BT_DYNAMIC, a, a, (0.5 + i) * a + 0.001 * i, 0, h);
     scene_wall(w, -5, -20, 0, 20, 0);
+    scene_wall(w, 0, 0.5 * a + 0.001, N * a, 10, 0);
+    scene_wall(w, 0, -10, N * a, -0.5 * a - 0.001, 0);
     const double end = N * a + 0.001 * N;
     const bt_gid plate = add_box(w, BT_KINEMATIC, 2, 30, end + 1, 0, 0);
     set_speed(w, plate, -v);
