@@ -73,6 +73,36 @@ static void the_law_of_one_manifold(void **state)
     assert_true(open > 1000 && held > 1000 && bound > 1000 && rising > 1000);
 }
 
+/// Sheets: at the end of many updates the friction is on the rim of its disc and against the sliding, or inside and nothing slides.
+static void the_law_of_sheets(void **state)
+{
+    (void)state;
+    uint64_t rng = 5;
+    int slides = 0, sticks = 0;
+    for (int k = 0; k < 5000; k++) {
+        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)}, {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
+        bt_unit u = {.a = 0, .b = 1, .nx = 1, .ran = {scene_uniform(&rng) - 0.5}, .rbn = {scene_uniform(&rng) - 0.5}, .rat = scene_uniform(&rng) - 0.5, .rbt = scene_uniform(&rng) - 0.5};
+        u.w[0] = u.wt = inv[0].m + inv[1].m + inv[0].i * (u.ran[0] * u.ran[0] + u.rat * u.rat) + inv[1].i * (u.rbn[0] * u.rbn[0] + u.rbt * u.rbt);
+        u.mn[0] = u.mt = 1 / u.wt;
+        const bt_limit l = {.flat = {scene_uniform(&rng)}};
+        bt_vel v[2];
+        for (int i = 0; i < 2; i++) v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
+        for (int turn = 0; turn < 400; turn++) bt_update_unit(&u, &l, v, inv);
+        double sum = 0;
+        assert_true(bt_unit_residual(&u, &l, v, &sum) < 1e-9);
+        const double x = bt_normal_velocity(&u, 0, &v[0], &v[1]), y = bt_tangent_velocity(&u, &v[0], &v[1]);
+        const double speed = hypot(x, y), friction = hypot(u.ln[0], u.lt);
+        assert_true(friction <= l.flat[0] * (1 + 1e-12));
+        if (speed < 1e-7) sticks++;
+        else {
+            CHECK_CLOSE(friction, l.flat[0], 1e-6);
+            CHECK_CLOSE(u.ln[0] * x + u.lt * y, -friction * speed, 1e-6 * friction * speed);
+            slides++;
+        }
+    }
+    assert_true(slides > 500 && sticks > 500);
+}
+
 /// Without a bound it is the rigid update, bit for bit but for the order of operations.
 static void no_bound_is_rigid(void **state)
 {
@@ -113,7 +143,8 @@ static void stall_windows(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
+        cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(the_law_of_sheets),
+        cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
