@@ -96,6 +96,7 @@ typedef struct bt_case {
         double restitution;             ///< e
         double crushing_pressure;       ///< Pa; 0 = rigid contact
         double crushing_least;          ///< least contact length / thickness
+        double rafting_kappa;           ///< κ of the line load under which floes raft; 0 = they do not
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;

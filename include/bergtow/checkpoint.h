@@ -25,7 +25,8 @@
 //                     not needed: rest (a tile that rests is found to do so again), n_listings
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts (contacts.h)
-//   bt_scar           S all            bt_unit, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
+//   bt_trace          S all: what contact laws remember of pairs (contact/law.h)
+//                     bt_unit, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way      D, - the rest
 //   bt_window         S start, rear, drift, vel, counters, dropped, brought                       D the rest
 //   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats

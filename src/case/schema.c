@@ -102,6 +102,9 @@ const bt_key bt_case_keys[] = {
     REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
          "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = rigid contact without limit"),
     REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]", "least length of a contact / thickness of the floe that is crushed, assumed"),
+    REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
+         "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = "
+         "without loss; 5 to 17, assumed [Rothrock 1975; Parmerter 1975; Hopkins 1998]"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
     REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag of the floe's edge in water [Hunke & Comeau 2011]"),

@@ -3,15 +3,15 @@
 //
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
 // share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
-// (it is no contact) is held at its solved value. With ice.crushing the bounds of the normal impulses are those at the solution.
+// (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the solution.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/fclib.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "solve/solver.h"
-#include "contact/limit.h"
+#include "solve/limit.h"
 
 typedef struct {
     int32_t contact; ///< in the order of the manifolds
@@ -185,7 +185,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         q[i] = u[i] - wr;
     }
     const bt_fclib_places places = places_of(w, rows, n);
-    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, &places, "bergtow",
+    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_laws_on(&w->par) ? bound : NULL, &places, "bergtow",
                                               "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
     void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);

@@ -41,7 +41,7 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];
         const double normal = u->ln[0] + u->ln[1];
-        if (normal == 0) continue;
+        if (normal == 0 && u->lt == 0) continue;
         const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
         if (u->a == towed || u->b == towed) {
             const bool is_b = u->b == towed;
@@ -195,6 +195,12 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .crushing = (double)st->n_crushing,
         .crushed_work = st->crushed_work,
         .crushed_depth = st->crushed_depth,
+        .rafting = (double)st->n_rafting,
+        .rafted_area = st->rafted_area,
+        .rafted_largest = st->rafted_largest,
+        .rafted_energy = st->rafted_energy,
+        .raft_edge_work = st->raft_edge_work,
+        .raft_friction_work = st->raft_friction_work,
         .current_x = w->par.water_u,
         .current_y = w->par.water_v,
         .wind_x = w->par.air_u,
@@ -221,6 +227,7 @@ void bt_observe_contact_force(const bt_world *w, double *force)
     for (bt_idx k = 0; k < w->tiles->n; k++)
         for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
             const bt_unit *u = &w->tiles->tile[k].units[j];
+            if (u->n == 0) continue; // friction of sheets is spread over them
             const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
             force[u->a] = bt_max(force[u->a], f);
             force[u->b] = bt_max(force[u->b], f);

@@ -57,6 +57,12 @@ typedef struct bt_sample {
     double crushing;        ///< contact points that crush (crush.h)
     double crushed_work;    ///< taken by them in the step, J
     double crushed_depth;   ///< deepest crush of a pair in contact, m
+    double rafting;         ///< pairs of floes that lie over each other (raft.h)
+    double rafted_area;     ///< of theirs that overlaps, at the start of the step, m²
+    double rafted_largest;  ///< the largest of one pair, m²
+    double rafted_energy;   ///< potential energy of the sheets on each other, J
+    double raft_edge_work;  ///< taken in the step by edges at their bound, J
+    double raft_friction_work; ///< and by friction between sheets, J
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved

@@ -30,6 +30,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
     double water[2], air[2]; // at time zero; where they change, each step sets its own
     bt_environment_at(c, true, 0, water);
     bt_environment_at(c, false, 0, air);
+    const double rise = c->ice.density * (1 - c->ice.density / c->water.density) * GRAVITY; // of potential energy: contact/raft.h
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -48,6 +49,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .size = size,
         .crush_pressure = c->ice.crushing_pressure,
         .crush_least = c->ice.crushing_least,
+        .raft_line = c->ice.rafting_kappa * 0.5 * rise,
+        .raft_sheet = (c->water.density - c->ice.density) * GRAVITY,
+        .raft_rise = rise,
         .water_u = water[0],
         .water_v = water[1],
         .air_u = air[0],

@@ -64,7 +64,7 @@ typedef struct bt_unit {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
-    int32_t n, spare;      ///< points, 1 or 2
+    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
 } bt_unit;
 _Static_assert(sizeof(bt_unit) == 192, "three cache lines");
 
@@ -75,6 +75,16 @@ typedef struct bt_gaps {
     double push[2];        ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the tile
 } bt_gaps;
+
+/// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).
+typedef struct bt_trace {
+    bt_gid a, b;
+    uint16_t part[2];    ///< as in bt_pair
+    int32_t n_points;
+    uint32_t feature[2]; ///< of the points
+    double value[4];     ///< rigid: impulses as in bt_pair (ln, lt), N s; of other laws: see there
+    uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
+} bt_trace;
 
 typedef struct bt_tile {
     int32_t x, y;                   ///< coordinates
@@ -101,10 +111,11 @@ typedef struct bt_tile {
     bt_idx n_units, cap_units;
     int64_t n_points;
     double overlap;                 ///< deepest, m
-    // crushing (crush.h); NULL in rigid contact
-    struct bt_limit *limits;        ///< [n_units] bounds of the units
-    struct bt_scar *scars;          ///< [n_scars] what pairs of this tile have crushed
-    bt_idx cap_limits, n_scars, cap_scars;
+    // contact laws (contact/law.h)
+    struct bt_limit *limits;        ///< [n_units] bounds of the units; NULL where contacts are rigid
+    bt_trace *memory;               ///< [n_memory] what laws remember of pairs of this tile, sorted by bt_trace_by_names
+    bt_idx cap_limits, n_memory, cap_memory;
+    bool rising;                    ///< some bounds have a rising part
     // units that are swept (src/solve/rounds.h)
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_units] unknowns before the last sweep
@@ -202,17 +213,12 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y);
 /// May the bodies of tile k have another velocity, or pose, than by drifting with the water?
 static inline bool bt_tiles_moves(const bt_tiles *t, bt_idx k) { return !t->rest[k] || t->awake[k]; }
 
-/// What the last step left in a pair, by the names that last.
-typedef struct bt_trace {
-    bt_gid a, b;
-    uint16_t part[2];
-    int32_t n_points;
-    uint32_t feature[2];
-    double ln[2], lt;
-    bool scar;           ///< not a contact but what the pair has crushed (crush.h): ln are the depths, m
-} bt_trace;
+/// In the order of (a, b, part, law).
+int bt_trace_by_names(const void *p, const void *q);
+/// Append a record to the memory of a tile.
+void bt_tiles_remember(bt_tile *t, const bt_trace *r);
 
-/// Traces of the pairs in contact, and of those that have crushed each other, that this rank owns, [*n]; the caller frees.
+/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller frees.
 bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n);
 /// Collective. Tiles as another run left them: their geometry and the labels of all bodies, which every rank holds, have been set, and the
 /// traces [n], which are released, are those of all ranks. A domain has been created, but nothing is dealt yet.

@@ -2,8 +2,9 @@
 // One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
 #include <math.h>
 
+#include "contact/work.h"
 #include "contact/contacts.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "force/environment.h"
 #include "bergtow/forces.h"
 #include "loads/impact.h"
@@ -127,9 +128,9 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];
         const double normal = u->ln[0] + u->ln[1];
-        if (normal == 0) continue;
-        bt_sum_add(&t->sum[EXCHANGED], normal);
-        bt_sum_add(&t->sum[WORK], bt_solver_work(w, u));
+        if (normal == 0 && u->lt == 0) continue;
+        bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
+        bt_sum_add(&t->sum[WORK], bt_contact_work(w, u));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
         bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
@@ -245,7 +246,7 @@ void bt_world_step(bt_world *w)
     clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
-    bt_crush_grow(w);
+    bt_laws_grow(w);
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
