@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "contact/memory.h"
 #include "contact/overlap.h"
 #include "contact/work.h"
 #include "contact/row.h"

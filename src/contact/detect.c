@@ -142,7 +142,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
     bt_tile *t = &w->tiles->tile[k];
     if (t->n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
-    bt_pack_begin(&s->pack, 2 * (size_t)t->n_pairs); // a pair may have a second contact (bt_laws_replace)
+    bt_pack_begin(&s->pack, 2 * (size_t)t->n_pairs); // a pair may have a second contact (bt_pack_replace)
     bool parts = false;
     const bool near = bt_pairs_near(w, k, t, t->margin);
     const double far = t->margin + bt_pairs_near_gap(w);
@@ -168,7 +168,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         parts = parts || p->part[0] || p->part[1];
     }
     if (parts) merge(w, t, &s->pack);
-    if (t->n_memory > 0) bt_laws_replace(w, t, &s->pack);
+    if (t->n_memory > 0) bt_pack_replace(w, t, &s->pack);
     t->n_points = 0;
     t->overlap = 0;
     for (size_t i = 0; i < s->pack.n; i++) {

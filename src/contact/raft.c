@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "contact/memory.h"
 #include "contact/overlap.h"
 #include "contact/work.h"
 
