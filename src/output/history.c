@@ -69,6 +69,13 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     h->max_crushed_depth = bt_max_seen(h->max_crushed_depth, s->crushed_depth);
     h->max_crushing = bt_max_seen(h->max_crushing, s->crushing);
     h->crushing_steps += s->crushing > 0;
+    h->rafting = s->rafting;
+    h->rafted_area = s->rafted_area;
+    h->rafted_energy = s->rafted_energy;
+    h->max_rafted_area = bt_max_seen(h->max_rafted_area, s->rafted_area);
+    h->rafted_largest = bt_max_seen(h->rafted_largest, s->rafted_largest);
+    h->raft_edge_work += s->raft_edge_work;
+    h->raft_friction_work += s->raft_friction_work;
     h->unconverged += s->unconverged != 0;
     h->repeats += (int64_t)s->repeats;
     h->outrun += s->outrun != 0;

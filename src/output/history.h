@@ -26,6 +26,8 @@ typedef struct bt_history {
     double max_overlap, max_momentum_residual, max_residual;
     double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
     int64_t crushing_steps;
+    double rafting, rafted_area, rafted_energy;  ///< in the last step, as in bt_sample
+    double max_rafted_area, rafted_largest, raft_edge_work, raft_friction_work; ///< m², m², J, J
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 

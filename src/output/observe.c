@@ -221,6 +221,16 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 
+double bt_observe_ice_area(const bt_world *w)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_totals t = {.n_sums = 1};
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->thickness[i] > 0 && b->gid[i] != w->towed && bt_domain_owns(w, i)) bt_sum_add(&t.sum[0], b->area[i]);
+    bt_domain_reduce(w, &t);
+    return bt_sum_value(&t.sum[0]);
+}
+
 void bt_observe_contact_force(const bt_world *w, double *force)
 {
     for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;

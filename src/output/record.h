@@ -138,6 +138,7 @@ typedef struct bt_run_totals {
     double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
     bt_lead_stats lead;          ///< what was cut into it then
+    double ice_area;             ///< of all floes in the run, m²
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     bt_stall stall;              ///< of the towed body

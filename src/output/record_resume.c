@@ -22,6 +22,12 @@ static const bt_state_row history_rows[] = {
     HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged), HISTORY(I64, unprojected),
     HISTORY(I64, positive_work), HISTORY(I64, restitution_cut), HISTORY(I64, repeats), HISTORY(I64, outrun),
 };
+/// Not in checkpoints of before floes rafted.
+static const bt_state_row raft_rows[] = {
+    HISTORY(F64, rafting), HISTORY(F64, rafted_area), HISTORY(F64, rafted_energy), HISTORY(F64, max_rafted_area), HISTORY(F64, rafted_largest),
+    HISTORY(F64, raft_edge_work), HISTORY(F64, raft_friction_work),
+};
+enum { N_RAFT = sizeof raft_rows / sizeof *raft_rows };
 enum { N_HISTORY = sizeof history_rows / sizeof *history_rows };
 
 bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_errors *err)
@@ -31,6 +37,7 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_record_flush(r);
     bt_history *h = &r->history;
     bt_snapshot_add_rows(s, "history", history_rows, N_HISTORY, h);
+    bt_snapshot_add_rows(s, "history", raft_rows, N_RAFT, h);
     for (int k = 0; k < BT_N_COLUMNS; k++)
         bt_snapshot_add(s, bt_history_columns[k].name, BT_ITEM_F64, h->n, 1, h->column[k]);
     bt_snapshot_add_int(s, "record/entries", r->written);
@@ -71,6 +78,7 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
     bt_snapshot_take_rows(s, "history", history_rows, N_HISTORY, h);
+    if (bt_snapshot_find(s, "history/rafting")) bt_snapshot_take_rows(s, "history", raft_rows, N_RAFT, h);
     h->n = h->cap = n;
     for (int k = 0; k < BT_N_COLUMNS; k++) {
         free(h->column[k]);

@@ -257,6 +257,14 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "max_crushed_depth_m", h->max_crushed_depth);
     bt_json_int(&j, "crushing_steps", h->crushing_steps);
     bt_json_number(&j, "max_crushing_contacts", h->max_crushing);
+    bt_json_number(&j, "rafting_pairs", h->rafting);
+    bt_json_number(&j, "rafted_area_m2", h->rafted_area);
+    bt_json_number(&j, "rafted_share_of_ice", t->ice_area > 0 ? h->rafted_area / t->ice_area : NAN);
+    bt_json_number(&j, "max_rafted_area_m2", h->max_rafted_area);
+    bt_json_number(&j, "largest_rafted_pair_m2", h->rafted_largest);
+    bt_json_number(&j, "rafted_energy_j", h->rafted_energy);
+    bt_json_number(&j, "raft_edge_work_j", h->raft_edge_work);
+    bt_json_number(&j, "raft_friction_work_j", h->raft_friction_work);
     bt_json_number(&j, "stalled_s", t->stall.time);
     bt_json_int(&j, "stalled_windows", t->stall.windows);
     bt_json_int(&j, "positive_work_steps", h->positive_work);
@@ -355,6 +363,10 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     if (c->ice.crushing_pressure > 0)
         printf("  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n", h->crushed_work,
                (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
+    if (c->ice.rafting_kappa > 0)
+        printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J of it in the sheets' height, "
+               "friction between sheets %.4g J\n", h->rafted_area, 100 * h->rafted_area / t->ice_area, h->rafting, h->raft_edge_work,
+               h->rafted_energy, h->raft_friction_work);
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);

@@ -195,6 +195,72 @@ static void confined_row(void **state)
     bt_world_free(w);
 }
 
+/// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that
+/// a hull drives into the pack: the hull itself does not raft, and its load is that of the edge behind.
+static void apex_under_an_edge(void **state)
+{
+    (void)state;
+    const double v = 0.02, dt = 0.1, base = 6, height = 5, slope = 0.5 * base / height;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_box(w, BT_STATIC, 20, 20, -10, 0, h);
+    double corners[6] = {0, 0, height, -0.5 * base, height, 0.5 * base};
+    const bt_gid floe = add(w, BT_DYNAMIC, 3, corners, 2.0 / 3 * height + 0.01, 0, 0, 1.5 * h); // the thinner of the two counts
+    const bt_gid hull = add_box(w, BT_KINEMATIC, 2, 8, height + 1.02, 0, 2 * h);
+    w->towed = hull; // it carries ice, but is towed
+    w->tow = bt_alloc(1, sizeof *w->tow);
+    *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = -1, .speed = v, .dt = dt};
+    set_speed(w, hull, -v);
+    double depth = 0;
+    while (depth < 4) {
+        bt_world_step(w);
+        check_step(w);
+        const double f = load_on(w, hull);
+        const double in = depth; // at the start of the step, where the bounds are formed
+        depth = 2.0 / 3 * height - pose(w, floe)->x;
+        if (in < 0.05) continue;
+        const double length = bt_max(h, 2 * in * slope);
+        CHECK_CLOSE(f, edge_load() * length + sheet_load() * in * in * slope, 0.002 * f);
+        assert_true(w->stats.n_rafting == 1); // not floe and hull
+    }
+    bt_world_free(w);
+}
+
+/// A plough as wide as its channel, closed at the end, pushes floes in two lanes, half a floe apart. What it needs for a metre of advance is what goes under on it: the
+/// work of the plough is that of edges and sheets, edges take q0 for the area that went under, and as the channel grows shorter by s its width times s lies twice.
+static void plough_in_a_channel(void **state)
+{
+    (void)state;
+    enum { LANE = 5 };
+    const double a = 6, v = 0.05, dt = 0.1, width = 2 * a;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    for (int lane = 0; lane < 2; lane++) {
+        const double y = lane ? 0.5 * a + 0.001 : -0.5 * a - 0.001;
+        for (int i = 0; i < LANE; i++) add_box(w, BT_DYNAMIC, a, a, (0.5 + i + 0.5 * lane) * a, y, h);
+        add_box(w, BT_DYNAMIC, 0.5 * a, a, lane ? 0.25 * a : (LANE + 0.25) * a, y, h);
+    }
+    const double end = (LANE + 0.5) * a;
+    scene_wall(w, -5, -20, -0.001, 20, 0);
+    scene_wall(w, -5, a + 0.003, end + 5, 20, 0);
+    scene_wall(w, -5, -20, end + 5, -a - 0.003, 0);
+    const bt_gid plough = add_box(w, BT_KINEMATIC, 2, 2 * a, end + 1, 0, 0);
+    set_speed(w, plough, -v);
+    double work = 0, edge = 0, friction = 0, way = 0;
+    while (way < 3) {
+        bt_world_step(w);
+        check_step(w);
+        way += v * dt;
+        work += load_on(w, plough) * v * dt;
+        edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+    }
+    CHECK_CLOSE(edge + friction, work, 0.02 * work);
+    CHECK_CLOSE(w->stats.rafted_area, width * way, 0.02 * width * way);
+    CHECK_CLOSE(edge, edge_load() * width * way, 0.03 * edge);
+    CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * w->stats.rafted_area, 1e-9 * w->stats.rafted_energy);
+    bt_world_free(w);
+}
+
 /// Random floes driven at each other with spin and friction: momentum to round-off, no work gained, and what the contacts take is what the kinetic energy loses.
 static void energy_is_booked(void **state)
 {
@@ -234,6 +300,8 @@ int main(void)
         cmocka_unit_test(two_squares),
         cmocka_unit_test(out_behind),
         cmocka_unit_test(confined_row),
+        cmocka_unit_test(apex_under_an_edge),
+        cmocka_unit_test(plough_in_a_channel),
         cmocka_unit_test(energy_is_booked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
