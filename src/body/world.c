@@ -11,6 +11,7 @@
 #include "contact/crush.h"
 #include "loads/impact.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "solve/solver.h"
 #include "space/tiles.h"
 #include "tow/tow.h"
@@ -25,6 +26,7 @@ bt_world *bt_world_create(const bt_params *p)
     w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
     w->tiles = bt_tiles_create();
     w->solver = bt_solver_create();
+    w->forces = bt_forces_create();
     return w;
 }
 
@@ -51,6 +53,7 @@ void bt_world_free(bt_world *w)
     free(b->index_of);
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
+    bt_forces_free(w->forces);
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);

@@ -9,6 +9,7 @@
 
 #include "contact/contacts.h"
 #include "contact/crush.h"
+#include "bergtow/forces.h"
 #include "partition/domain.h"
 
 #define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
@@ -61,13 +62,6 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y)
     x -= t->low_x, y -= t->low_y;
     if (x < 0 || y < 0 || x >= t->n_x || y >= t->n_y) return -1;
     return t->at[(int64_t)y * t->n_x + x];
-}
-
-bool bt_tiles_calm(const bt_world *w)
-{
-    const bt_params *p = &w->par;
-    const bool balanced = p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
-    return balanced && p->tilt_ax == 0 && p->tilt_ay == 0 && p->air_u == p->water_u && p->air_v == p->water_v;
 }
 
 // --- busy tiles ------------------------------------------------------------------------------------------------------
@@ -486,7 +480,7 @@ void bt_tiles_begin(bt_world *w)
     } else if (bt_domain_due(w)) {
         deal(w, false, 0);
     }
-    t->calm = bt_tiles_calm(w);
+    t->calm = bt_forces_rest(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_tiles_wake_all(t);
 }
