@@ -95,20 +95,33 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
 }
 
 /// A body as a law sees it: one of the world, or the undisturbed ice of a moving window (step/window.h), a mean floe that
-/// stands nowhere: its x, y and yaw are NaN, so that a law which depends on the place and forgets it is found at once.
+/// stands nowhere: its place is NaN, so that a law which depends on the place and forgets it is found at once.
 typedef struct bt_force_body {
     const bt_params *par;      ///< Δt, current, wind of the step
     const double *own;         ///< numbers of the law
     const bt_drag *drag;
     bt_vel vel;                ///< U1, m/s, rad/s
     double time;               ///< of the middle of the step, s
-    double x, y, yaw;          ///< at the start of the step, m, m, rad; of the towed body x, y not wrapped
     double mass, inertia;      ///< M kg, I kg m²
     double share;              ///< m/M
-    double radius, area;       ///< m, m²
-    double thickness;          ///< of ice, m; 0 = no ice
     bool towed;
+    // what few laws need is read from here by the functions below
+    const bt_bodies *all;
+    bt_idx i;
+    const double *towed_at;
 } bt_force_body;
+
+static inline double bt_force_radius(const bt_force_body *b) { return b->all->radius[b->i]; } ///< of the circle about the outline, m
+static inline double bt_force_area(const bt_force_body *b) { return b->all->area[b->i]; }     ///< m²
+static inline double bt_force_thickness(const bt_force_body *b) { return b->all->thickness[b->i]; } ///< of ice, m; 0 = no ice
+
+/// Place at the start of the step, m, m, rad; of the towed body x and y are not wrapped.
+static inline bt_pose bt_force_pose(const bt_force_body *b)
+{
+    bt_pose p = b->all->pose[b->i];
+    if (b->towed && !isnan(b->towed_at[0])) p.x = b->towed_at[0], p.y = b->towed_at[1];
+    return p;
+}
 
 /// A key of a law's own: always a real number.
 typedef struct bt_force_key {
@@ -190,13 +203,11 @@ void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse
 /// May floes that drift with the water rest: bt_force_law.rests of all laws.
 bool bt_forces_rest(const bt_world *w);
 
-/// Body i at velocity u as laws see it.
-bt_force_body bt_forces_body(const bt_world *w, bt_idx i, const bt_vel *u);
-
-/// All that acts on a body.
-void bt_forces_load(const bt_world *w, bt_force_body *b, bt_load *l);
+/// All that acts on body i at velocity u.
+void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
 
 /// Velocity after a step of the free drift of a body without outline, whose form drag is part of its skin drag.
+/// b: par, time and towed_at are set here.
 bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
 
 /// Drag of one body from its outline, draft and coefficients: multiplied out.

@@ -54,18 +54,12 @@ static void add_rest(const bt_load *l, const double u[2], balance *a)
     a->scale += hypot(l->fx, l->fy) + hypot(l->jx, l->jy) + l->g * hypot(u[0], u[1]);
 }
 
-static void load_at(const bt_world *w, bt_idx i, const double u[2], bt_load *l)
-{
-    bt_force_body b = bt_forces_body(w, i, &(bt_vel){.x = u[0], .y = u[1]});
-    bt_forces_load(w, &b, l);
-}
-
 static balance balance_at(const bt_world *w, bt_idx i, const double u[2])
 {
     const bt_bodies *b = &w->bodies;
     const double dt = w->par.dt, rate = b->mass[i] / dt;
     bt_load l;
-    load_at(w, i, u, &l);
+    bt_forces_load(w, i, &(bt_vel){.x = u[0], .y = u[1]}, &l);
     bt_turning r = BT_TURNING_NONE;
     bt_turning_set(&r, b->share[i] * l.turn * dt);
     // U' − U without the cancellation of the whole velocities.
@@ -95,9 +89,8 @@ static balance held_balance(const bt_world *w, bt_idx i, const bool hold[2], con
 bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u[2])
 {
     enum { MAX_STEPS = 100, MAX_HALVINGS = 40 };
-    const double rest[2] = {0, 0};
     bt_load l;
-    load_at(w, i, rest, &l);
+    bt_forces_load(w, i, &(bt_vel){0}, &l);
     double skin = 0, form = 0;
     for (int k = 0; k < l.n_streams; k++) skin += l.stream[k].skin, form += l.stream[k].form;
     const double drag = skin + form * (2 * w->bodies.radius[i]);

@@ -4,18 +4,32 @@
 
 #include <math.h>
 
+#include "force/laws.h"
 #include "force/load.h"
 #include "space/tiles.h"
 
-static void predict(bt_world *w, bt_idx i, bt_turning *r)
+/// All laws of a body: those of the list inline, those that a program has added through the table.
+static inline void load_of(const bt_forces *f, bool added, bt_force_body *b, bt_load *l)
+{
+    bt_load_clear(l);
+    int k = 0;
+#define ADD(name) \
+    b->own = f->own[k++]; \
+    if (!bt_law_##name.towed_only || b->towed) bt_add_##name(b, l);
+    BT_FORCE_LAWS(ADD)
+    if (added) bt_load_fill(f, BT_LISTED_LAWS, b, l);
+}
+
+/// Two programs, without and with laws that are added: where the load of a body leaves the function, the compiler must keep all of it in memory.
+__attribute__((always_inline)) static inline void predict(bt_world *w, bt_idx i, bool added, bt_turning *r)
 {
     bt_bodies *b = &w->bodies;
     const double dt = w->par.dt, m = b->mass[i], inertia = b->inertia[i];
     bt_vel u = b->vel[i];
     b->vel_start[i] = u;
-    bt_force_body s = bt_forces_body(w, i, &u);
+    bt_force_body s = bt_load_body(w, i, &u);
     bt_load l;
-    bt_forces_load(w, &s, &l);
+    load_of(w->forces, added, &s, &l);
     const bt_linear a = bt_load_implicit(b, i, &l, &u);
     bt_turning_set(r, s.share * l.turn * dt);
     bt_load_turn(&l, r, dt, m, inertia, &u);
@@ -29,14 +43,16 @@ void bt_forces_predict(bt_world *w)
 {
     bt_bodies *b = &w->bodies;
     bt_tiles *t = w->tiles;
-#pragma omp parallel for schedule(dynamic, 16) if (BT_MANY(t->n_busy, BT_FEW_TILES))
+    const bool added = w->forces->n > BT_LISTED_LAWS;
+    bt_turning r = BT_TURNING_NONE;
+#pragma omp parallel for schedule(dynamic, 16) firstprivate(r) if (BT_MANY(t->n_busy, BT_FEW_TILES))
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
         if (t->rest[k] == BT_REST_KNOWN) continue;
-        bt_turning r = BT_TURNING_NONE;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
-            if (b->motion[i] == BT_DYNAMIC) predict(w, i, &r);
-            else b->vel_free[i] = b->vel[i];
+            if (b->motion[i] != BT_DYNAMIC) b->vel_free[i] = b->vel[i];
+            else if (added) predict(w, i, true, &r);
+            else predict(w, i, false, &r);
         }
         if (t->rest[k]) t->rest[k] = BT_REST_KNOWN;
     }
@@ -54,9 +70,11 @@ bool bt_forces_rest(const bt_world *w)
 bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b)
 {
     const double dt = w->par.dt, m = b->mass;
+    b->par = &w->par, b->time = bt_load_time(w), b->towed_at = w->forces->towed_at;
     bt_vel u = b->vel;
     bt_load l;
-    bt_forces_load(w, b, &l);
+    bt_load_clear(&l);
+    bt_load_fill(w->forces, 0, b, &l);
     bt_linear a = bt_load_linear(&l, u.w);
     for (int k = 0; k < l.n_streams; k++) bt_linear_add_skin(&a, &l.stream[k], hypot(l.stream[k].u - u.x, l.stream[k].v - u.y));
     bt_turning r = BT_TURNING_NONE;

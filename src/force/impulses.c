@@ -48,10 +48,12 @@ static bt_impulse impulse_of(const bt_bodies *b, bt_idx i, const motion *q, cons
     return j;
 }
 
-/// Is law k counted in the series?
-static bool counts(const bt_force_law *law, const bt_force_series *s)
+/// The load of all laws of a sum: as the step itself adds them up, where a sum of their impulses would round otherwise.
+static void load_of_sum(const bt_forces *f, const char *name, bt_force_body *b, bt_load *l)
 {
-    return s->law ? law == s->law : law->part_of && !strcmp(law->part_of, s->name);
+    bt_load_clear(l);
+    for (int k = 0; k < f->n; k++)
+        if (bt_force_laws[k]->part_of && !strcmp(bt_force_laws[k]->part_of, name)) bt_load_add(f, k, b, l);
 }
 
 void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse *series)
@@ -61,21 +63,23 @@ void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse
     const bool led = b->motion[i] != BT_DYNAMIC;
     motion q = {.u1 = led ? &b->vel[i] : &b->vel_start[i], .free = led ? &b->vel[i] : &b->vel_free[i], .u2 = &b->vel[i], .r = BT_TURNING_NONE,
                 .m = b->mass[i], .share = b->share[i], .dt = w->par.dt, .led = led};
-    bt_force_body s = bt_forces_body(w, i, q.u1);
+    bt_force_body s = bt_load_body(w, i, q.u1);
     bt_load l;
-    bt_forces_load(w, &s, &l);
+    bt_load_clear(&l);
+    bt_load_fill(f, 0, &s, &l);
     q.turn = l.turn;
     bt_turning_set(&q.r, q.share * q.turn * q.dt);
     for (int k = 0; k < f->n; k++) {
         bt_load_clear(&l);
-        bt_load_add(f, k, k + 1, &s, &l);
+        bt_load_add(f, k, &s, &l);
         law[k] = impulse_of(b, i, &q, &l);
     }
-    // Of a sum from one load of its laws, not as a sum of impulses: as the step itself adds them up.
     for (int n = 0; n < f->n_series; n++) {
-        bt_load_clear(&l);
+        const bt_force_series *of = &bt_force_series_of[n];
         for (int k = 0; k < f->n; k++)
-            if (counts(bt_force_laws[k], &bt_force_series_of[n])) bt_load_add(f, k, k + 1, &s, &l);
+            if (of->law == bt_force_laws[k]) series[n] = law[k];
+        if (of->law) continue;
+        load_of_sum(f, of->name, &s, &l);
         series[n] = impulse_of(b, i, &q, &l);
     }
 }

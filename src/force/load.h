@@ -8,20 +8,49 @@
 
 #include "bergtow/forces.h"
 
+/// Middle of the step at hand, s.
+static inline double bt_load_time(const bt_world *w) { return ((double)w->step + 0.5) * w->par.dt; }
+
+/// Streams are counted.
 static inline void bt_load_clear(bt_load *l)
 {
-    memset(l, 0, offsetof(bt_load, stream)); // streams are counted
+    l->turn = l->about_x = l->about_y = l->gain_x = l->gain_y = l->fx = l->fy = l->moment = l->yaw = 0;
+    l->g = l->gx = l->gy = l->gw = l->jx = l->jy = l->jw = 0;
+    l->n_streams = 0;
 }
 
-/// What the laws of a world from first up to end add up to.
-static inline void bt_load_add(const bt_forces *f, int first, int end, bt_force_body *b, bt_load *l)
+/// What law k adds to a body on which it acts.
+static inline void bt_load_add(const bt_forces *f, int k, bt_force_body *b, bt_load *l)
 {
-    for (int k = first; k < end; k++) {
-        const bt_force_law *law = bt_force_laws[k];
-        if (law->towed_only && !b->towed) continue;
-        b->own = f->own[k];
-        law->add(b, l);
-    }
+    const bt_force_law *law = bt_force_laws[k];
+    if (law->towed_only && !b->towed) return;
+    b->own = f->own[k];
+    law->add(b, l);
+}
+
+/// What all laws from `first` on add to a body.
+static inline void bt_load_fill(const bt_forces *f, int first, bt_force_body *b, bt_load *l)
+{
+    for (int k = first; k < f->n; k++) bt_load_add(f, k, b, l);
+}
+
+/// Body i at velocity u as laws see it.
+static inline bt_force_body bt_load_body(const bt_world *w, bt_idx i, const bt_vel *u)
+{
+    const bt_bodies *b = &w->bodies;
+    return (bt_force_body){
+        .par = &w->par,
+        .drag = &b->drag[i],
+        .vel = *u,
+        .time = bt_load_time(w),
+        .mass = b->mass[i],
+        .inertia = b->inertia[i],
+        .share = b->share[i],
+        .towed = b->gid[i] == w->towed,
+        .all = b,
+        .i = i,
+        .towed_at = w->forces->towed_at,
+    };
 }
 
 /// The angle by which a load turns a velocity in a step, rad; many bodies have the same.
@@ -73,8 +102,25 @@ static inline void bt_linear_add_skin(bt_linear *a, const bt_stream *s, double s
     a->jy += g * s->v;
 }
 
+/// Form drag of a stream along the convex hull of the outline of body i; rx, ry: U_ref − U, w: ω.
+void bt_linear_add_outline(const bt_bodies *b, bt_idx i, bt_stream s, double rx, double ry, double w, bt_linear *a);
+
 /// Everything implicit that acts on body i at velocity u.
-bt_linear bt_load_implicit(const bt_bodies *b, bt_idx i, const bt_load *l, const bt_vel *u);
+static inline bt_linear bt_load_implicit(const bt_bodies *b, bt_idx i, const bt_load *l, const bt_vel *u)
+{
+    bt_linear a = bt_load_linear(l, u->w);
+    for (int k = 0; k < l->n_streams; k++) {
+        const bt_stream *s = &l->stream[k];
+        const double rx = s->u - u->x, ry = s->v - u->y;
+        bt_linear_add_skin(&a, s, sqrt(rx * rx + ry * ry));
+    }
+    for (int k = 0; k < l->n_streams; k++) {
+        const bt_stream s = l->stream[k]; // a copy: the load itself stays in registers
+        const double rx = s.u - u->x, ry = s.v - u->y;
+        if (s.form != 0 && (rx != 0 || ry != 0 || u->w != 0)) bt_linear_add_outline(b, i, s, rx, ry, u->w, &a);
+    }
+    return a;
+}
 
 /// (M + Δt K) U* = M U' + Δt j; inv: of the diagonal of M + Δt K.
 static inline void bt_linear_take(const bt_linear *l, double dt, double m, double inertia, bt_inv inv, bt_vel *u)

@@ -10,8 +10,7 @@
 
 #define POINTER(name) &bt_law_##name,
 const bt_force_law *bt_force_laws[BT_MAX_FORCE_LAWS] = {BT_FORCE_LAWS(POINTER)};
-#define ONE(name) +1
-int bt_n_force_laws = BT_FORCE_LAWS(ONE);
+int bt_n_force_laws = BT_LISTED_LAWS;
 
 bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES];
 int bt_n_force_series;

@@ -51,9 +51,8 @@ static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
 {
     const bt_bodies *b = &w->bodies;
     const bt_drag *k = &b->drag[i];
-    bt_force_body body = bt_forces_body(w, i, &b->vel[i]);
     bt_load load;
-    bt_forces_load(w, &body, &load);
+    bt_forces_load(w, i, &b->vel[i], &load);
     const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i], drawn = ratio(hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
     const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));

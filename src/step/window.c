@@ -370,15 +370,15 @@ void bt_window_advance(bt_world *w)
 {
     bt_window *v = w->window;
     if (!v) return;
-    const bt_params *p = &w->par;
-    bt_force_body mean = {.par = p, .drag = &v->drag, .vel = v->vel, .time = ((double)w->step + 0.5) * p->dt, .x = NAN, .y = NAN, .yaw = NAN, .mass = v->mass,
-                          .inertia = v->inertia, .share = v->share, .radius = v->radius, .area = v->area, .thickness = v->thickness};
+    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
+    const bt_bodies one = {.n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
+    bt_force_body mean = {.drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
     bt_vel u = bt_forces_drift(w, &mean);
     u.w = 0;
     if (v->held) u.y = 0;
     v->vel = u;
-    v->drift_x += p->dt * u.x;
-    v->drift_y += p->dt * u.y;
+    v->drift_x += w->par.dt * u.x;
+    v->drift_y += w->par.dt * u.y;
 }
 
 uint64_t bt_window_hash(const bt_window *v)
