@@ -164,7 +164,7 @@ typedef struct bt_force_series {
 } bt_force_series;
 
 extern bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES]; ///< those that are no part first, in the order of the table
-extern int bt_n_force_series;
+extern int bt_n_force_series, bt_n_force_wholes;                ///< all; those that are no part
 
 /// Index into bt_force_series_of, −1 = none.
 int bt_force_series_find(const char *name);

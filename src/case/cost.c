@@ -47,7 +47,7 @@ static double steps_kept(const bt_case *c)
 {
     const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;
     const double steps = (double)bt_case_steps(c), blocks = steps / (double)bt_stats_start_step(bt_case_steps(c));
-    return BYTES_PER_STEP * steps + (panels ? (double)sizeof(bt_panel_loads) * blocks * (double)c->impact.panels : 0);
+    return (BYTES_PER_STEP + (double)sizeof(double) * bt_n_law_series()) * steps + (panels ? (double)sizeof(bt_panel_loads) * blocks * (double)c->impact.panels : 0);
 }
 
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
@@ -81,7 +81,7 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
     const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) + 2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
     const double outlines = 24 * n + 16 * corners + 4 * (corners + 2 * n);
-    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = bt_n_series_fields + (c->output.panels ? 3 * (double)c->impact.panels : 0);
+    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = bt_n_series() + (c->output.panels ? 3 * (double)c->impact.panels : 0);
     const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(c);
     const bool on_the_way = (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
                             (c->output.checkpoint_wall > 0 && (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);

@@ -13,7 +13,7 @@ const bt_force_law *bt_force_laws[BT_MAX_FORCE_LAWS] = {BT_FORCE_LAWS(POINTER)};
 int bt_n_force_laws = BT_LISTED_LAWS;
 
 bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES];
-int bt_n_force_series;
+int bt_n_force_series, bt_n_force_wholes;
 
 int bt_force_series_find(const char *name)
 {
@@ -36,6 +36,7 @@ static void find_series(void)
         if (law->part_of) add_series(law->part_of, NULL, false);
         else if (!law->turns_only) add_series(law->name, law, false);
     }
+    bt_n_force_wholes = bt_n_force_series;
     for (int k = 0; k < bt_n_force_laws; k++)
         if (bt_force_laws[k]->part_of && !bt_force_laws[k]->turns_only) add_series(bt_force_laws[k]->name, bt_force_laws[k], true);
 }

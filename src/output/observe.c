@@ -148,6 +148,7 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->drag_force = force_against(w, bt_force_series_find("drag"));
     s->coriolis_force = force_against(w, bt_force_series_find("coriolis"));
     s->tilt_force = force_against(w, bt_force_series_find("tilt"));
+    for (int k = 0; k < bt_n_law_series(); k++) s->law_force[k] = force_against(w, bt_law_series(k));
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
@@ -225,7 +226,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }
-    for (int k = 0; k < bt_n_series_fields; k++)
+    for (int k = 0; k < bt_n_series(); k++)
         if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 
