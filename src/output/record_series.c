@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The table of time series: name, unit, meaning, when it applies and how the steps of one sample merge.
 #include "output/record.h"
+#include "case/cost.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -131,6 +132,8 @@ int bt_n_series(void)
         if (!bt_series_fields[N_FIXED + k].name) fill_row(&bt_series_fields[N_FIXED + k], k);
     return N_FIXED + n;
 }
+
+_Static_assert((int)N_FIXED <= BT_COST_SERIES + 8, "what check says of the disk counts them");
 
 const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has)
 {
