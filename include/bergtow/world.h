@@ -142,6 +142,7 @@ struct bt_exchange;
 struct bt_window;
 struct bt_impacts;
 struct bt_environment;
+struct bt_forces;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
@@ -180,6 +181,7 @@ typedef struct bt_world {
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
+    struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart

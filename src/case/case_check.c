@@ -324,9 +324,7 @@ static void check_path(const check *k, int n, const double *v)
     if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack) reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
     if (reach >= way) return;
     reach = bt_max(reach, 0);
-    double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
-    double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
-    if (c->tow.n_programme > 0) time = bt_case_tow_time(c, reach);
+    const double time = bt_case_tow_time(c, reach);
     bt_check_fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 

@@ -2,7 +2,7 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + (J_ice + J_drag + J_Coriolis + J_tilt)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt)
+//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the table of force laws)
 // On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
@@ -118,6 +118,21 @@ static void observe_line(const bt_tow *tow, bt_sample *s)
     s->vessel_line = s->tow_force; // both along the course
 }
 
+/// Force of a series on the towed body against the tow direction, N.
+static double force_against(const bt_world *w, int series)
+{
+    const bt_impulse *j = &w->forces->series[series];
+    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
+}
+
+/// What holds the body back beside ice and inertia, in the order of the table: water, air, Coriolis, tilt, ….
+static double add_forces(const bt_world *w, double sum)
+{
+    for (int k = 0; k < w->forces->n_series; k++)
+        if (!bt_force_series_of[k].part) sum += force_against(w, k);
+    return sum;
+}
+
 static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
 {
     const bt_bodies *b = &w->bodies;
@@ -125,15 +140,15 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
     const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
-    const bt_external e = bt_forces_external(w, t);
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
-    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
+    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt;
     s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
-    s->drag_force = 0.0 - (e.drag[0] * dx + e.drag[1] * dy) / dt;
-    s->coriolis_force = 0.0 - (e.coriolis[0] * dx + e.coriolis[1] * dy) / dt;
-    s->tilt_force = 0.0 - (e.tilt[0] * dx + e.tilt[1] * dy) / dt;
+    s->drag_force = force_against(w, bt_force_series_find("drag"));
+    s->coriolis_force = force_against(w, bt_force_series_find("coriolis"));
+    s->tilt_force = force_against(w, bt_force_series_find("tilt"));
+    for (int k = 0; k < bt_n_law_series(); k++) s->law_force[k] = force_against(w, bt_law_series(k));
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
@@ -144,7 +159,7 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     if (bt_tow_has_line(tow)) {
         observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {
-        s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
+        s->tow_force = add_forces(w, s->ice_resistance) + s->inertia_force;
     } else {
         s->tow_force = 0;
     }
@@ -217,7 +232,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }
-    for (int k = 0; k < bt_n_series_fields; k++)
+    for (int k = 0; k < bt_n_series(); k++)
         if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 

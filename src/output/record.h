@@ -9,13 +9,14 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 #include "bergtow/event.h"
+#include "bergtow/forces.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "output/stall.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
-/// tow = ice + drag + Coriolis + tilt + inertia.
+/// tow = ice + drag + Coriolis + tilt + other laws + inertia.
 typedef struct bt_sample {
     double time;            ///< s, end of the step
     double tow_force;       ///< N along
@@ -66,6 +67,7 @@ typedef struct bt_sample {
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
+    double law_force[BT_MAX_FORCE_LAWS]; ///< N, of the other force laws against the tow direction: [bt_n_law_series()]
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
@@ -81,8 +83,15 @@ typedef struct bt_series_field {
     bt_applies applies;
 } bt_series_field;
 
-extern const bt_series_field bt_series_fields[];
-extern const int bt_n_series_fields;
+extern bt_series_field bt_series_fields[]; ///< [bt_n_series()]
+
+/// The number of series, those of force laws that have been registered since the last call included.
+int bt_n_series(void);
+
+/// Series of force laws beside drag, Coriolis and tilt, which have members of their own: how many, and the k-th as an index into
+/// bt_force_series_of.
+int bt_n_law_series(void);
+int bt_law_series(int k);
 
 /// A number of a sample by its field.
 static inline double bt_sample_value(const bt_sample *s, const bt_series_field *f)

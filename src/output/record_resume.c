@@ -38,13 +38,16 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_history *h = &r->history;
     bt_snapshot_add_rows(s, "history", history_rows, N_HISTORY, h);
     bt_snapshot_add_rows(s, "history", raft_rows, N_RAFT, h);
-    for (int k = 0; k < BT_N_COLUMNS; k++)
-        bt_snapshot_add(s, bt_history_columns[k].name, BT_ITEM_F64, h->n, 1, h->column[k]);
+    for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) {
+        char name[80];
+        bt_history_name(k, name);
+        bt_snapshot_add(s, name, BT_ITEM_F64, h->n, 1, *bt_history_column(h, k));
+    }
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series_fields : 0, 1, &r->merged);
+    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series() : 0, 1, &r->merged);
     bt_impact_store_save(&r->impacts, s);
     return r->h5.status;
 }
@@ -80,10 +83,13 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     bt_snapshot_take_rows(s, "history", history_rows, N_HISTORY, h);
     if (bt_snapshot_find(s, "history/rafting")) bt_snapshot_take_rows(s, "history", raft_rows, N_RAFT, h);
     h->n = h->cap = n;
-    for (int k = 0; k < BT_N_COLUMNS; k++) {
-        free(h->column[k]);
-        h->column[k] = bt_snapshot_copy(s, bt_history_columns[k].name, BT_ITEM_F64, 1, &n);
-        bt_snapshot_want(s, n == h->n, bt_history_columns[k].name, -1, "has not a value for each step");
+    for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) {
+        double **x = bt_history_column(h, k);
+        char name[80];
+        bt_history_name(k, name);
+        free(*x);
+        *x = bt_snapshot_copy(s, name, BT_ITEM_F64, 1, &n);
+        bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
     }
     if (s->faulty) h->n = 0;
 }
@@ -92,7 +98,7 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
-    for (int k = 0; k < bt_n_series_fields && old->status == BT_OK; k++) {
+    for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series_fields[k].name);
         bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
@@ -165,7 +171,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
     bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1, "does not fit the number of steps");
-    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series_fields, 1, &r->merged);
+    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series(), 1, &r->merged);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {

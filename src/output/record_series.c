@@ -4,6 +4,8 @@
 #include "case/cost.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 
 const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_ALWAYS] = "always",
@@ -18,7 +20,10 @@ const char *const bt_applies_names[BT_APPLIES_KINDS] = {
 #define ROW(name_, applies_, keep_, units_, text_) \
     {.name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_), .keep = BT_KEEP_##keep_, .applies = BT_APPLIES_##applies_}
 
-const bt_series_field bt_series_fields[] = {
+#define LAW_ROW {.name = NULL}
+#define SIX_LAWS LAW_ROW, LAW_ROW, LAW_ROW, LAW_ROW, LAW_ROW, LAW_ROW
+
+bt_series_field bt_series_fields[] = {
     ROW(time, ALWAYS, LAST, "s", "simulated time at the end of the step"),
     ROW(tow_force, BODY, MEAN, "N", "towing force on the body along the tow direction"),
     ROW(ice_resistance, BODY, MEAN, "N", "contact force of ice and walls on the towed body against the tow direction, impulse / dt"),
@@ -88,17 +93,57 @@ const bt_series_field bt_series_fields[] = {
     ROW(window_x, WINDOW, LAST, "m", "low end of the moving window, not wrapped; NaN where the domain stands still"),
     ROW(window_renewed, WINDOW, SUM, "1", "floes taken out behind the moving window and put in ahead as they were at time zero"),
     ROW(window_waiting, WINDOW, LAST, "1", "floes behind the moving window whose place ahead is not free, or not yet reached"),
+    SIX_LAWS, SIX_LAWS, SIX_LAWS, SIX_LAWS, // BT_MAX_FORCE_LAWS rows, filled by bt_n_series
 };
 
-const int bt_n_series_fields = sizeof bt_series_fields / sizeof *bt_series_fields;
+enum { N_ROWS = sizeof bt_series_fields / sizeof *bt_series_fields, N_FIXED = N_ROWS - BT_MAX_FORCE_LAWS };
+_Static_assert(N_ROWS == sizeof(bt_sample) / sizeof(double), "every number of a sample has its row in the table");
 
-_Static_assert(sizeof bt_series_fields / sizeof *bt_series_fields == sizeof(bt_sample) / sizeof(double),
-               "every number of a sample has its row in the table");
-_Static_assert(sizeof bt_series_fields / sizeof *bt_series_fields <= BT_COST_SERIES + 8, "what check says of the disk counts them");
+/// Forces that a sample has members for.
+static bool has_member(const char *name) { return !strcmp(name, "drag") || !strcmp(name, "coriolis") || !strcmp(name, "tilt"); }
+
+static int law_series[BT_MAX_FORCE_LAWS], n_law_series, n_known; ///< n_known: series of forces when the others were found
+
+/// After laws have been registered.
+static void find_law_series(void)
+{
+    if (n_known == bt_n_force_series) return;
+    n_known = bt_n_force_series;
+    n_law_series = 0;
+    for (int i = 0; i < bt_n_force_wholes; i++)
+        if (!has_member(bt_force_series_of[i].name)) law_series[n_law_series++] = i;
+}
+
+int bt_n_law_series(void)
+{
+    find_law_series();
+    return n_law_series;
+}
+
+int bt_law_series(int k) { return k < bt_n_law_series() ? law_series[k] : -1; }
+
+/// The row of a law; its texts stay for the life of the program, as the law does.
+static void fill_row(bt_series_field *f, int k)
+{
+    const bt_force_series *of = &bt_force_series_of[bt_law_series(k)];
+    char *name = NULL, *text = NULL;
+    if (asprintf(&name, "%s_force", of->name) < 0 || asprintf(&text, "%s on the towed body against the tow direction", of->law ? of->law->doc : of->name) < 0) abort();
+    *f = (bt_series_field){name, "N", text, offsetof(bt_sample, law_force) + (size_t)k * sizeof(double), BT_KEEP_MEAN, BT_APPLIES_BODY};
+}
+
+int bt_n_series(void)
+{
+    const int n = bt_n_law_series();
+    for (int k = 0; k < n; k++)
+        if (!bt_series_fields[N_FIXED + k].name) fill_row(&bt_series_fields[N_FIXED + k], k);
+    return N_FIXED + n;
+}
+
+_Static_assert((int)N_FIXED <= BT_COST_SERIES + 8, "what check says of the disk counts them");
 
 const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has)
 {
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         const bt_series_field *f = &bt_series_fields[k];
         const double x = bt_sample_value(s, f);
         if (has & 1u << f->applies ? !(fabs(x) < BT_SAMPLE_MOST) : !isnan(x)) return f;

@@ -3,7 +3,7 @@
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
 //     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
-//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
+//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − … − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "output/summary.h"
 #include "case/arch.h"
@@ -47,6 +47,7 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     s->drag = mean_over(s, h, BT_COL_DRAG);
     s->coriolis = mean_over(s, h, BT_COL_CORIOLIS);
     s->tilt = mean_over(s, h, BT_COL_TILT);
+    for (int k = 0; k < h->n_laws; k++) s->law[k] = bt_stats_mean(h->law[k] + s->window.first, s->window.n);
     s->inertia = mean_over(s, h, BT_COL_INERTIA);
     s->budget = mean_over(s, h, BT_COL_BUDGET);
 
@@ -60,7 +61,12 @@ static void reduce_window(bt_summary *s, const bt_history *h)
 
     double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
     largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
-    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean - s->inertia.mean;
+    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean;
+    for (int k = 0; k < h->n_laws; k++) {
+        largest = bt_max(largest, fabs(s->law[k].mean));
+        s->balance -= s->law[k].mean;
+    }
+    s->balance -= s->inertia.mean;
     s->closure = s->ice.mean - s->balance;
     s->closure_relative = largest > 0 ? s->closure / largest : s->closure == 0 ? 0 : NAN;
     const double other = s->ice.mean - s->budget.mean;
@@ -106,6 +112,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 
     const bt_mean none = bt_stats_mean(NULL, 0);
     s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
+    for (int k = 0; k < h->n_laws; k++) s->law[k] = none;
     s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
     s->window.start = s->window.end = s->window.correlation_time = nan;
     if (body) {

@@ -13,8 +13,9 @@ typedef struct bt_summary {
     double sim_time;                  ///< s
     bt_steady window;
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
+    bt_mean law[BT_MAX_FORCE_LAWS];   ///< N, of the other force laws, [bt_n_law_series()]
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − other laws − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps, updates, moves; ///< means over all steps

@@ -166,6 +166,11 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_case *c)
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
     bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
     bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
+    for (int k = 0; k < bt_n_law_series(); k++) {
+        char key[80];
+        snprintf(key, sizeof key, "mean_%s_force_n", bt_force_series_of[bt_law_series(k)].name);
+        bt_json_number(j, key, s->law[k].mean);
+    }
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
     bt_json_open(j, "budget", '{');
@@ -321,6 +326,7 @@ static void print_forces(const bt_summary *s, const bt_case *c)
            bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
     printf("    drag              %s\n", bt_force_text(a, s->drag.mean));
+    for (int k = 0; k < bt_n_law_series(); k++) printf("    %-17s %s\n", bt_force_series_of[bt_law_series(k)].name, bt_force_text(a, s->law[k].mean));
     for (int k = 0; k < N_OF_THE_LINE; k++) {
         const bt_reported *r = &w->series[of_the_line[k].series];
         if (!r->present) continue;

@@ -196,6 +196,7 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
     if (c->ice.start != BT_START_DRIFT) return;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    bt_forces_setup(w, c);
     double v[2 * BT_MAX_VERTICES], thicknesses[2];
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
@@ -392,6 +393,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     w->environment = bt_environment_create(c);
+    bt_forces_setup(w, c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;

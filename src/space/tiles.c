@@ -63,13 +63,6 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y)
     return t->at[(int64_t)y * t->n_x + x];
 }
 
-bool bt_tiles_calm(const bt_world *w)
-{
-    const bt_params *p = &w->par;
-    const bool balanced = p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
-    return balanced && p->tilt_ax == 0 && p->tilt_ay == 0 && p->air_u == p->water_u && p->air_v == p->water_v;
-}
-
 // --- busy tiles ------------------------------------------------------------------------------------------------------
 
 void bt_tiles_wake(bt_tiles *t, bt_idx k)
@@ -496,7 +489,6 @@ void bt_tiles_begin(bt_world *w)
     } else if (w->exchange && w->exchange->due(w)) {
         deal(w, false, 0);
     }
-    t->calm = bt_tiles_calm(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_tiles_wake_all(t);
 }

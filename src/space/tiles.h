@@ -20,7 +20,7 @@
 // four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on every rank.
 //
 // Rest. A tile T is idle, and costs nothing, when every floe in its block and in a ring of tiles around it has exactly the
-// velocity of the water, there is no other force (bt_tiles_calm), no large body that moves is near, and the position projection
+// velocity of the water, there is no other force (bt_forces_rest), no large body that moves is near, and the position projection
 // moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
 // never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
 // caught after the solve (step.c).
@@ -228,9 +228,5 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n);
 
 /// Tile that owns the contacts of bodies a and b, −1 = not here.
 bt_idx bt_tiles_of_pair(const bt_world *w, bt_idx a, bt_idx b);
-
-/// True when only contacts can move a floe that has the velocity of the water: no wind of another velocity, no Coriolis force
-/// or tilt out of balance.
-bool bt_tiles_calm(const bt_world *w);
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
 #include <math.h>
+#include <string.h>
 
 #include "contact/work.h"
 #include "contact/contacts.h"
@@ -240,7 +241,9 @@ void bt_world_step(bt_world *w)
     bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);
     bt_tiles_begin(w);
+    w->tiles->calm = bt_forces_rest(w);
     clock_phase(w, &st->detect_s, &t0);
+    if (w->tow) memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     clock_phase(w, &st->forces_s, &t0);
@@ -250,6 +253,7 @@ void bt_world_step(bt_world *w)
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
+    bt_forces_record(w); // of the towed body, at X1
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
     bt_window_advance(w);

@@ -8,6 +8,7 @@
 #include "body/bodies.h"
 #include "contact/crush.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "loads/impact.h"
 #include "partition/domain.h"
 #include "solve/solver.h"
@@ -23,6 +24,7 @@ bt_world *bt_world_create(const bt_params *p)
     w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
     w->tiles = bt_tiles_create();
     w->solver = bt_solver_create();
+    w->forces = bt_forces_create();
     return w;
 }
 
@@ -32,6 +34,7 @@ void bt_world_free(bt_world *w)
     bt_bodies_free(&w->bodies);
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
+    bt_forces_free(w->forces);
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);

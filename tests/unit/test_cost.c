@@ -39,7 +39,7 @@ static void disk_by_hand(void **state)
     const double series = 8.0 * 100096, rest = 255e3 + 8.0 * 256 * 13;
     assert_float_equal(bt_cost_frames(&c), 501, 0);
     bt_cost_disk d = bt_cost_disk_of(&c, 1000, 6000, 2);
-    assert_float_equal(d.result, 501 * (1000 * 96.0 + 3460) + 152e3 + series * bt_n_series_fields + rest, 1);
+    assert_float_equal(d.result, 501 * (1000 * 96.0 + 3460) + 152e3 + series * bt_n_series() + rest, 1);
     assert_float_equal(d.checkpoints, 95e3 + 180e3 + 13 * 6000 + 120e6, 1);
     assert_float_equal(d.texts, 30e3 + 501 * 1730, 1);
     const double kept = bt_cost_left(&d);
@@ -49,7 +49,7 @@ static void disk_by_hand(void **state)
     assert_float_equal(d.checkpoints, 2 * (kept - d.result - d.texts), 1);
     assert_float_equal(d.most, 3 * d.result + d.texts + 1.5 * d.checkpoints, 1);
     c.output.panels = true;
-    assert_float_equal(bt_cost_disk_of(&c, 0, 0, 2).result, 501 * 3460 + series * (bt_n_series_fields + 108) + rest, 1);
+    assert_float_equal(bt_cost_disk_of(&c, 0, 0, 2).result, 501 * 3460 + series * (bt_n_series() + 108) + rest, 1);
 }
 
 static void a_step_has_one_frame_at_most(void **state)

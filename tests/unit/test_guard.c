@@ -46,7 +46,7 @@ static bt_sample sound_sample(const bt_world *w)
     bt_sample s;
     memset(&s, 0, sizeof s);
     const unsigned has = bt_observe_applies(w);
-    for (int k = 0; k < bt_n_series_fields; k++)
+    for (int k = 0; k < bt_n_series(); k++)
         if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)&s + bt_series_fields[k].offset) = NAN;
     return s;
 }
@@ -282,7 +282,7 @@ static void numbers_that_are_none_are_found_in_samples(void **state)
     bt_observe(w, 0.13, &s);
     assert_int_equal(bt_observe_applies(w), (1u << BT_APPLIES_KINDS) - 1);
     assert_int_equal(bt_observe_applies(bare), 1u << BT_APPLIES_ALWAYS);
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         const bt_series_field *f = &bt_series_fields[k];
         double *x = (double *)(void *)((char *)&s + f->offset), *y = (double *)(void *)((char *)&without + f->offset);
         const double before = *x, before_without = *y, none[] = {NAN, INFINITY, -INFINITY, 1e100, -2e100};
