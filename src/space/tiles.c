@@ -9,7 +9,6 @@
 
 #include "body/bodies.h"
 #include "contact/crush.h"
-#include "bergtow/forces.h"
 #include "space/exchange.h"
 
 #define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
@@ -480,7 +479,6 @@ void bt_tiles_begin(bt_world *w)
     } else if (w->exchange && w->exchange->due(w)) {
         deal(w, false, 0);
     }
-    t->calm = bt_forces_rest(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_tiles_wake_all(t);
 }
