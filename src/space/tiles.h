@@ -176,7 +176,6 @@ typedef struct bt_tiles {
     bt_idx n_shares, cap_shares;    ///< threads
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
-    bool calm;                      ///< nothing but contacts moves a floe that drifts with the water
     bool still;                     ///< the water is at rest
     int64_t n_labellings, n_listings;
 } bt_tiles;

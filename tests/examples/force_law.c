@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Example of a force law of one's own: the mean drift force of short waves, and the damping that goes with it.
 //
-// Short waves are thrown back whole by a floating body: F = ½ ρ g a² D along the waves, a: amplitude, D: diameter [Maruo 1960].
-// In waves of rate ω a body that drifts meets more or fewer of them: − (4 ω/g) F (U − U_w) [Aranha 1994, F independent of ω].
-#include <math.h>
-
+// A floating body reflects short waves whole: F = ½ ρ g a² D along the waves, a: amplitude, D: diameter [Maruo 1960].
+// In waves of frequency ω a body that drifts meets more or fewer of them: − (4 ω/g) F (U − U_w) [Aranha 1994, for an F
+// that does not depend on ω].
 #include "bergtow/forces.h"
 
 enum { AMPLITUDE, PERIOD, DIRECTION, LOAD, PER_SPEED }; // own[]: the keys in their order, and what setup adds
