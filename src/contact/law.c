@@ -6,10 +6,9 @@
 #include <stdlib.h>
 
 #include "contact/crush.h"
-#include "contact/pack.h"
 #include "contact/raft.h"
 #include "partition/domain.h"
-#include "solve/kernel.h"
+#include "contact/row.h"
 
 const bt_law bt_laws[BT_LAWS] = {
     [BT_LAW_RIGID] = {.name = "rigid", .what = "a contact bears any load"},
@@ -43,43 +42,6 @@ void bt_laws_prune(const bt_world *w, bt_tile *t)
     for (bt_idx k = 0; k < t->n_memory; k++)
         if (bt_laws[t->memory[k].law].keeps(w, &t->memory[k])) t->memory[kept++] = t->memory[k];
     t->n_memory = kept;
-}
-
-bt_idx bt_law_find(const bt_tile *t, const bt_trace *names)
-{
-    if (t->n_memory == 0) return -1;
-    const bt_trace *r = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, bt_trace_by_names);
-    return r ? (bt_idx)(r - t->memory) : -1;
-}
-
-void bt_law_put(bt_tile *t, bt_idx at, const bt_trace *r)
-{
-    if (at >= 0) t->memory[at] = *r;
-    else bt_tiles_remember(t, r);
-}
-
-// --- contacts --------------------------------------------------------------------------------------------------------
-
-void bt_laws_replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
-{
-    const size_t n = s->n;
-    for (int law = 0; law < BT_LAWS; law++) {
-        if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
-        for (size_t k = 0; k < n; k++) {
-            bt_pair *p = &t->pairs[s->pair[k]];
-            const bt_trace names = bt_law_names(w, p, law);
-            const bt_idx at = bt_law_find(t, &names);
-            if (at < 0) continue;
-            bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
-            if (bt_laws[law].contact(w, p, &t->memory[at], &edge, sheets)) {
-                s->man[k] = edge;
-                bt_pack_keep(s);
-            } else {
-                s->man[k] = *sheets;
-                p->n_points = 0;
-            }
-        }
-    }
 }
 
 // --- bounds ----------------------------------------------------------------------------------------------------------

@@ -82,10 +82,6 @@ bool bt_law_on(const bt_params *p, int law);
 /// At the start of a detection: forget what tile t need not remember any more.
 void bt_laws_prune(const bt_world *w, bt_tile *t);
 
-struct bt_pack_scratch;
-/// Contacts of tile t that a law makes of pairs with a record, in place of those of the outlines, and after them.
-void bt_laws_replace(const bt_world *w, bt_tile *t, struct bt_pack_scratch *s);
-
 /// Room for the bounds of the units of a tile.
 void bt_laws_reserve(bt_tile *t);
 

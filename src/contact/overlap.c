@@ -46,7 +46,7 @@ void bt_overlap_clip(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[
 {
     const bt_bodies *s = &w->bodies;
     double off[2];
-    bt_world_offset(w, a, b, off);
+    bt_bodies_offset(w, a, b, off);
     off[0] += dx, off[1] += dy;
     const double *q = outline_of(s, b, part[1]);
     const int n_b = count_of(s, b, part[1]);
@@ -94,7 +94,7 @@ void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t p
 {
     const bt_bodies *s = &w->bodies;
     double off[2];
-    bt_world_offset(w, a, b, off);
+    bt_bodies_offset(w, a, b, off);
     const double *v = o->v[o->now];
     grad[0] = grad[1] = *turn = 0;
     for (int k = 0; k < o->n; k++) {

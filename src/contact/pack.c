@@ -12,7 +12,7 @@
 #include <string.h>
 
 #include "contact/law.h"
-#include "solve/kernel.h"
+#include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
 

@@ -5,7 +5,7 @@
 #include <math.h>
 
 #include "contact/overlap.h"
-#include "solve/solver.h"
+#include "contact/work.h"
 
 #define LEAST_LENGTH 1e-3 // of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other
 
@@ -77,7 +77,7 @@ bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_
     bt_overlap_clip(w, p->a, p->b, p->part, 0, 0, &o);
     bt_overlap_area(&o, centroid);
     bt_overlap_gradient(w, p->a, p->b, p->part, &o, w->par.slop, grad, &turn);
-    bt_world_offset(w, p->a, p->b, off);
+    bt_bodies_offset(w, p->a, p->b, off);
     *edge = (bt_manifold){.a = p->a, .b = p->b};
     *sheets = (bt_manifold){.a = p->a, .b = p->b, .nx = 1};
     sheets->p[0] = (bt_point){.ra = {centroid[0], centroid[1]}, .rb = {centroid[0] - off[0], centroid[1] - off[1]}};
@@ -140,7 +140,7 @@ bool bt_raft_gives_way(const bt_unit *u, const bt_limit *l, int i) { return u->l
 
 void bt_raft_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals)
 {
-    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_solver_normal_work(w, &t->units[j], i));
+    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contacts_normal_work(w, &t->units[j], i));
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
@@ -152,7 +152,7 @@ double bt_raft_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
     if (u->n == 0) {
         t->memory[at].value[2] = u->ln[0];
         t->memory[at].value[3] = u->lt;
-        bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_solver_work(w, u));
+        bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_contacts_work(w, u));
         return 0;
     }
     bool begins = false;

@@ -129,7 +129,7 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
 {
     bt_bodies *b = &w->bodies;
     b->pose[i] = (bt_pose){.x = r->pose[0], .y = r->pose[1], .yaw = r->pose[2]};
-    bt_world_turn_outline(w, i);
+    bt_bodies_turn(&w->bodies, i);
     b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
     b->path[i] = r->path;
     b->tile[i][0] = r->tile[0];

@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "solve/limit.h"
-#include "solve/row.h"
+#include "contact/row.h"
 
 /// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them,
 /// none). Two points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10

@@ -6,7 +6,7 @@
 #include <math.h>
 
 #include "contact/law.h"
-#include "solve/row.h"
+#include "contact/row.h"
 
 /// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising part of the bound,
 /// λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 + slope W), where it is above the flat part
