@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first
 import numpy as np  # noqa: E402
 from matplotlib.colors import LinearSegmentedColormap  # noqa: E402
 
+RAFTED = "#5a1846"  # floes over each other
 WATER = "#0c2a43"
 PAPER = "#ffffff"
 INK = "#1d2733"

@@ -167,8 +167,9 @@ static void check_sizes(const check *k)
         bt_check_fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
               BT_LEAST_THICKNESS);
     if (bt_check_sound(k, "ice.rafting.kappa") && c->ice.rafting_kappa > 0 && c->ice.rafting_kappa < 2)
-        bt_check_fault(k, "ice.rafting.kappa", "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying over each other; 0 = they do not, 5 to 17 in the literature",
-              c->ice.rafting_kappa);
+        bt_check_fault(k, "ice.rafting.kappa",
+                       "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying over each other; "
+                       "0 = they do not, 5 to 17 in the literature", c->ice.rafting_kappa);
     if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
         bt_check_fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;

@@ -5,10 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-#include "contact/memory.h"
 #include "contact/overlap.h"
-#include "contact/work.h"
 #include "contact/row.h"
+#include "contact/work.h"
 
 #define LEAST_WAY 0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
 
@@ -141,7 +140,7 @@ bool bt_crush_gives_way(const bt_unit *u, const bt_limit *l, int i) { return u->
 void bt_crush_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals)
 {
     t->limits[j].depth[i] += t->limits[j].grown[i];
-    bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contact_normal_work(w, &t->units[j], i));
+    bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contacts_normal_work(w, &t->units[j], i));
     bt_sum_add(&totals->sum[BT_CRUSHING_POINTS], 1);
 }
 

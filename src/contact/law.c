@@ -6,7 +6,6 @@
 #include <stdlib.h>
 
 #include "contact/crush.h"
-#include "contact/memory.h"
 #include "contact/raft.h"
 #include "partition/domain.h"
 #include "contact/row.h"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Records of pairs in a tile, sorted by name; see memory.h.
-#include "contact/memory.h"
-
+// Records of contact laws in the memory of a tile; contact/law.h.
 #include <stdlib.h>
+
+#include "contact/law.h"
 
 bt_idx bt_law_find(const bt_tile *t, const bt_trace *names)
 {

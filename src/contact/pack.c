@@ -12,7 +12,6 @@
 #include <string.h>
 
 #include "contact/law.h"
-#include "contact/memory.h"
 #include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
@@ -208,29 +207,5 @@ void bt_pack_store(bt_world *w, bt_idx k)
         p->ln[0] = u->ln[0];
         p->ln[1] = u->ln[1];
         p->lt = u->lt;
-    }
-}
-
-// --- contacts that a law makes --------------------------------------------------------------------------------------------------------
-
-void bt_pack_replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
-{
-    const size_t n = s->n;
-    for (int law = 0; law < BT_LAWS; law++) {
-        if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
-        for (size_t k = 0; k < n; k++) {
-            bt_pair *p = &t->pairs[s->pair[k]];
-            const bt_trace names = bt_law_names(w, p, law);
-            const bt_idx at = bt_law_find(t, &names);
-            if (at < 0) continue;
-            bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
-            if (bt_laws[law].contact(w, p, &t->memory[at], &edge, sheets)) {
-                s->man[k] = edge;
-                bt_pack_keep(s);
-            } else {
-                s->man[k] = *sheets;
-                p->n_points = 0;
-            }
-        }
     }
 }

@@ -31,7 +31,4 @@ void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share)
 /// Impulses and features of the units into the pairs, for the next detection.
 void bt_pack_store(bt_world *w, bt_idx k);
 
-/// Contacts of tile t that a law makes of pairs with a record, in place of those of the outlines, and after them.
-void bt_pack_replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s);
-
 #endif

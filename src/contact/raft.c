@@ -4,7 +4,6 @@
 
 #include <math.h>
 
-#include "contact/memory.h"
 #include "contact/overlap.h"
 #include "contact/work.h"
 
@@ -141,7 +140,7 @@ bool bt_raft_gives_way(const bt_unit *u, const bt_limit *l, int i) { return u->l
 
 void bt_raft_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals)
 {
-    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contact_normal_work(w, &t->units[j], i));
+    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contacts_normal_work(w, &t->units[j], i));
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
@@ -153,7 +152,7 @@ double bt_raft_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
     if (u->n == 0) {
         t->memory[at].value[2] = u->ln[0];
         t->memory[at].value[3] = u->lt;
-        bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_contact_work(w, u));
+        bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_contacts_work(w, u));
         return 0;
     }
     bool begins = false;

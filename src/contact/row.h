@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Velocities and impulses of one unit, two bodies (private to the solver).
+// Velocities and impulses of one unit, two bodies.
 #ifndef BERGTOW_ROW_H
 #define BERGTOW_ROW_H
 

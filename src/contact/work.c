@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Work of contact impulses; see work.h.
+// Work of the impulses of a contact, from velocities without and with contacts.
 #include "contact/work.h"
 
 #include "contact/row.h"
@@ -13,13 +13,13 @@ static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
     return v;
 }
 
-double bt_contact_normal_work(const bt_world *w, const bt_unit *u, int i)
+double bt_contacts_normal_work(const bt_world *w, const bt_unit *u, int i)
 {
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
     return 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
 }
 
-double bt_contact_work(const bt_world *w, const bt_unit *u)
+double bt_contacts_work(const bt_world *w, const bt_unit *u)
 {
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
     const bt_vel *va = &w->bodies.vel[u->a], *vb = &w->bodies.vel[u->b];

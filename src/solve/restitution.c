@@ -107,7 +107,7 @@ bool bt_restitution_lower(bt_world *w)
             const bt_unit *u = &ts->tile[k].units[j];
             const double normal = u->ln[0] + u->ln[1];
             if (normal == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
-            bt_sum_add(&s->surplus[island_of(w, u)], bt_contact_work(w, u) - allowed * (normal + fabs(u->lt)));
+            bt_sum_add(&s->surplus[island_of(w, u)], bt_contacts_work(w, u) - allowed * (normal + fabs(u->lt)));
         }
     if (w->domain) bt_domain_add_by_name(w, s->root, s->name, s->surplus);
     double any = 0;

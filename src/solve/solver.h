@@ -32,6 +32,7 @@
 #define BERGTOW_SOLVER_H
 
 #include "contact/contacts.h"
+#include "contact/work.h"
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "bergtow/world.h"

@@ -132,7 +132,7 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
         bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
-        bt_sum_add(&t->sum[WORK], bt_contact_work(w, u));
+        bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
         bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
@@ -242,7 +242,6 @@ void bt_world_step(bt_world *w)
     bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);
     bt_tiles_begin(w);
-    w->tiles->calm = bt_forces_rest(w);
     clock_phase(w, &st->detect_s, &t0);
     if (w->tow) memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_forces_predict(w); // U*, effective M

@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "body/bodies.h"
-#include "contact/crush.h"
 #include "force/environment.h"
 #include "bergtow/forces.h"
 #include "loads/impact.h"
@@ -70,7 +69,8 @@ static uint64_t mix_double(uint64_t h, double x)
 /// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their names.
 static uint64_t hash_trace(const bt_trace *r)
 {
-    uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ ((uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1]));
+    const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
+    uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ where);
     for (int i = 0; i < r->n_points; i++) h = mix_double(mix(h ^ r->feature[i]), r->value[i]);
     return r->law > 1 ? mix_double(mix_double(h, r->value[2]), r->value[3]) : h;
 }
@@ -89,7 +89,8 @@ uint64_t bt_world_hash(const bt_world *w)
         sum += h;
     }
     for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_memory; i++) sum += hash_trace(&w->tiles->tile[k].memory[i]);
+        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_memory; i++)
+            sum += hash_trace(&w->tiles->tile[k].memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
