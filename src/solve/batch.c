@@ -237,7 +237,7 @@ INLINE vec update_sheets(bt_batch *o, bt_vel *v)
     motion a = load(v, o->a), b = load(v, o->b);
     const vec dvx = b.x - a.x, dvy = b.y - a.y;
     vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
-    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far;
+    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
     const vec square = x * x + y * y, one = {1, 1, 1, 1};
     for (int l = 0; l < LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
     const vec scale = choose(far > o->bound[0], o->bound[0] / far, one);

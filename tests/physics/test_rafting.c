@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Floes that slide over each other, against closed forms: the load on two squares pushed together and apart, a row of floes, a plough, momentum and energy.
+//
+// What turns these tests red: the moment of the gradient with the other sign, a largest area that is forgotten, friction of the largest area instead of the present one, sides that
+// lie on each other and push, a towed body that rafts, a projection that takes rafted overlap back. Each was tried.
 #include "scene.h"
 
 #include "contact/raft.h"
@@ -76,7 +79,7 @@ static void two_squares(void **state)
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
     add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
-    const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 0, h);
+    const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 1e-6, h); // sides that all but lie on each other
     const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), left = add_box(w, BT_KINEMATIC, 1, 4, -9.5, 0, 0);
     set_speed(w, right, -v);
     double work = 0, edge = 0, friction = 0, depth = 0;
@@ -95,7 +98,7 @@ static void two_squares(void **state)
     CHECK_CLOSE(friction, 0.5 * sheet_load() * a * depth * depth, 0.01 * friction);
     CHECK_CLOSE(edge + friction, work, 0.01 * work);
     CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * a * depth, 0.01 * w->stats.rafted_energy);
-    CHECK_CLOSE(pose(w, floe)->y, 0, 1e-6);
+    CHECK_CLOSE(pose(w, floe)->y, 0, 2e-4); // such sides do not push
     // Back: friction alone.
     set_speed(w, right, 0.08);
     set_speed(w, left, v);
@@ -206,7 +209,7 @@ static void apex_under_an_edge(void **state)
     add_box(w, BT_STATIC, 20, 20, -10, 0, h);
     double corners[6] = {0, 0, height, -0.5 * base, height, 0.5 * base};
     const bt_gid floe = add(w, BT_DYNAMIC, 3, corners, 2.0 / 3 * height + 0.01, 0, 0, 1.5 * h); // the thinner of the two counts
-    const bt_gid hull = add_box(w, BT_KINEMATIC, 2, 8, height + 1.02, 0, 2 * h);
+    const bt_gid hull = add_box(w, BT_KINEMATIC, 2, 2, height + 1.02, 0, 2 * h);
     w->towed = hull; // it carries ice, but is towed
     w->tow = bt_alloc(1, sizeof *w->tow);
     *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = -1, .speed = v, .dt = dt};
