@@ -201,7 +201,7 @@ fullscale: deps ## resistance of an 80 m berg in 20 to 95 % ice beside the estim
 	@$(AGAIN) CONFIG=release all
 	$(PYTHON) cases/fullscale/study.py concentration
 
-lint: all ## names of external symbols, licence lines, syntax; cppcheck, shellcheck, pyflakes
+lint: all ## names of external symbols, licence lines, length of lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh
 
 tidy: all ## clang-tidy over the program (minutes)
