@@ -4,8 +4,6 @@
 #define BERGTOW_DIVISION_H
 
 #include "bergtow/comm.h"
-#include "contact/contacts.h"
-#include "solve/solver.h"
 #include "partition/domain.h"
 #include "space/pairs.h"
 
@@ -54,6 +52,15 @@ struct bt_domain {
     double exchange_s;       ///< wall time in exchanges since asked
     bt_domain_stats stats;
 };
+
+/// Work of a body at rest, s: what a tile counts for before anything has been measured (partition/README.md).
+#define BT_WORK_AT_REST 2e-9
+
+/// Place of tile (x, y) in the map, −1 outside.
+int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y);
+
+/// Longest path of a large movable body, m; −1 = there is none.
+double bt_division_large_path(const bt_world *w);
 
 /// Rank that owns tile (x, y) of the map; −1 outside.
 int bt_division_owner(const bt_world *w, int32_t x, int32_t y);

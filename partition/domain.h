@@ -6,6 +6,7 @@
 #include "bergtow/comm.h"
 #include "space/tiles.h"
 #include "bergtow/world.h"
+#include "space/exchange.h"
 #include "space/phases.h"
 
 typedef struct bt_domain bt_domain;
@@ -74,8 +75,9 @@ void bt_domain_moved_elsewhere(bt_world *w, void (*mark)(bt_world *w, bt_idx bod
 /// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
 void bt_domain_send(bt_world *w, int phase, bt_vel *v);
 void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
-/// After the solve: velocities of large bodies and the tow line's impulse to all ranks. Collective.
-void bt_domain_settle(bt_world *w);
+/// After the solve: velocities of large bodies, the tow line's impulse, and displacements (an array over the bodies, or
+/// NULL) to all ranks. Collective.
+void bt_domain_settle(bt_world *w, bt_vel *shift);
 
 /// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the caller frees. Collective.
 void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);

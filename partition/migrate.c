@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/bodies.h"
 #include "partition/division.h"
 #include "partition/domain.h"
 
@@ -103,7 +104,7 @@ static void unpack(bt_bodies *b, const char *data, size_t n_bytes)
         for (int k = 0; k < bt_n_body_fields; k++) record += bt_body_fields[k].size;
         memcpy(&n, data + at + record, sizeof n);
         const int64_t first = b->offset[b->n];
-        bt_world_reserve(b, b->n + 1, first + n);
+        bt_bodies_reserve(b, b->n + 1, first + n);
         const bt_idx i = b->n++;
         for (int k = 0; k < bt_n_body_fields; k++) {
             memcpy(field_of(b, k, i), data + at, bt_body_fields[k].size);

@@ -9,13 +9,12 @@
 #include "partition/division.h"
 #include "partition/domain.h"
 
-void bt_domain_settle(bt_world *w)
+void bt_domain_settle(bt_world *w, bt_vel *shift)
 {
     bt_domain *d = w->domain;
     if (!d) return;
     bt_bodies *b = &w->bodies;
     const bt_tiles *t = w->tiles;
-    bt_vel *shift = w->solver->shifted ? w->solver->shift : NULL;
     const size_t most = 6 * (size_t)(b->n - t->n_tiled) + BT_MAX_BRANCHES;
     double *x = bt_alloc(most, sizeof *x);
     for (int pass = 0; pass < 2; pass++) {

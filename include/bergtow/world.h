@@ -135,6 +135,7 @@ struct bt_tiles;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
+struct bt_exchange;
 struct bt_window;
 struct bt_impacts;
 struct bt_environment;
@@ -171,6 +172,7 @@ typedef struct bt_world {
     struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
+    const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
@@ -208,21 +210,6 @@ static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->b
 
 /// Index of the towed body, −1 = none. Every rank holds it.
 static inline bt_idx bt_world_towed(const bt_world *w) { return w->towed < 0 ? -1 : w->bodies.index_of[w->towed]; }
-
-/// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
-typedef struct bt_body_field {
-    size_t array; ///< offset of the pointer in bt_bodies
-    size_t size;  ///< bytes a body
-} bt_body_field;
-extern const bt_body_field bt_body_fields[];
-extern const int bt_n_body_fields;
-
-/// Arrays over the vertices of the bodies; size: bytes a vertex.
-extern const bt_body_field bt_vertex_fields[];
-extern const int bt_n_vertex_fields;
-
-/// Room for n bodies and n_vertices vertices.
-void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
 
 /// One step Δt: forces, contacts, solve, advance; see src/step/step.c.
 void bt_world_step(bt_world *w);

@@ -3,7 +3,7 @@
 #include "bergtow/estimate.h"
 #include "bergtow/field.h"
 #include "app/cmd.h"
-#include "estimate/estimate_text.h"
+#include "output/estimate_text.h"
 
 #include <stdio.h>
 #include <stdlib.h>

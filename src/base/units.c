@@ -177,3 +177,12 @@ int bt_units_format(double value, bt_unit kind, char *out, size_t size)
     const char *symbol = kinds[kind].symbol;
     return snprintf(out, size, "%s%s%s", digits, *symbol ? " " : "", symbol);
 }
+
+const char *bt_force_text(char out[32], double newton)
+{
+    const double size = fabs(newton);
+    if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
+    else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
+    else snprintf(out, 32, "%#.4g N", newton);
+    return out;
+}

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Defaults that follow from other keys, checks across keys, and the numbers that follow from a case.
+// Defaults that follow from other keys, and checks across keys.
 //
 // A check names the keys it looks at; when one of them was refused already, it is left out: its message would be about
 // the default that stands in for the refused value.
 #include "case/case_check.h"
 
 #include "bergtow/shape.h"
-#include "force/environment.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 #include "case/schema.h"
@@ -17,100 +16,11 @@
 #include <string.h>
 #include <unistd.h>
 
-typedef struct bt_check {
-    bt_case *c;
-    const bt_origin *from;
-    bt_errors *err;
-} check;
-
-void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256])
-{
-    const char *path = c->path ? c->path : "case";
-    if (o && o->set && o->place) snprintf(out, 256, "%.120s%.130s", o->place, o->set);
-    else if (o && o->set) snprintf(out, 256, "--set %.240s", o->set);
-    else if (o && o->line > 0) snprintf(out, 256, "%.160s:%d: %s", path, o->line, key);
-    else snprintf(out, 256, "%.160s: %s", path, key);
-}
-
-static const bt_origin *origin(const check *k, const char *key)
-{
-    return k->from ? &k->from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
-}
-
-static bool given(const check *k, const char *key)
-{
-    const bt_origin *o = origin(k, key);
-    return o && (o->line > 0 || o->set);
-}
-
-// True when none of the keys was refused. keys: names separated by blanks.
-static bool sound(const check *k, const char *keys)
-{
-    while (k->from && *keys) {
-        char name[64];
-        size_t n = strcspn(keys, " ");
-        snprintf(name, sizeof name, "%.*s", (int)n, keys);
-        if (origin(k, name)->faulty) return false;
-        keys += n + strspn(keys + n, " ");
-    }
-    return true;
-}
-
-__attribute__((format(printf, 3, 4))) static void fault(const check *k, const char *key, const char *fmt, ...)
-{
-    char where[256], why[512];
-    bt_case_locate(k->c, origin(k, key), key, where);
-    va_list ap;
-    va_start(ap, fmt);
-    vsnprintf(why, sizeof why, fmt, ap);
-    va_end(ap);
-    bt_errors_add(k->err, "%s: %s", where, why);
-}
-
-bt_case *bt_check_case(const bt_check *k) { return k->c; }
-bool bt_check_given(const bt_check *k, const char *key) { return given(k, key); }
-bool bt_check_sound(const bt_check *k, const char *keys) { return sound(k, keys); }
-void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...)
-{
-    char why[512];
-    va_list ap;
-    va_start(ap, fmt);
-    vsnprintf(why, sizeof why, fmt, ap);
-    va_end(ap);
-    fault(k, key, "%s", why);
-}
+typedef bt_check check;
 
 static void fill(double *member, double value)
 {
     if (isnan(*member)) *member = value;
-}
-
-// ---- outlines ----
-
-static const char *const shape_names[] = {"disc", "square", "rectangle", "ship"};
-
-// Corners of a shape with the centroid at the origin. Returns 0 and names the fault when there is no such outline.
-static int outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v, const char **why)
-{
-    if (shape == BT_BODY_ABSENT) return 0;
-    if (shape != BT_BODY_POLYGON) n = bt_shape_named(shape_names[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
-    else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
-    else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
-    const char *reason = bt_shape_fault(n, v);
-    if (why) *why = reason;
-    if (reason) return 0;
-    bt_shape_centre(n, v);
-    return n;
-}
-
-int bt_case_waterline(const bt_case *c, double *v)
-{
-    return outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, NULL);
-}
-
-int bt_case_floe_outline(const bt_floe_def *f, double *v)
-{
-    return outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
 }
 
 typedef struct {
@@ -203,31 +113,31 @@ static void follow(bt_case *c)
 static void check_run(const check *k)
 {
     const bt_case *c = k->c;
-    if (!sound(k, "run.dt run.duration")) return;
+    if (!bt_check_sound(k, "run.dt run.duration")) return;
     // A case built in memory can leave the two keys without default unset.
-    if (!(c->run.dt > 0)) fault(k, "run.dt", "is not set; give a time step, as in 0.1 s");
-    if (!(c->run.duration > 0)) fault(k, "run.duration", "is not set; give a time, as in 450 s");
+    if (!(c->run.dt > 0)) bt_check_fault(k, "run.dt", "is not set; give a time step, as in 0.1 s");
+    if (!(c->run.duration > 0)) bt_check_fault(k, "run.duration", "is not set; give a time, as in 450 s");
     if (!(c->run.dt > 0) || !(c->run.duration > 0)) return;
     if (c->run.dt > c->run.duration)
-        fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run", c->run.dt, c->run.duration);
+        bt_check_fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run", c->run.dt, c->run.duration);
     double steps = (double)bt_case_steps(c);
     if (steps > BT_MOST_STEPS)
-        fault(k, "run.dt", "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run", steps, BT_MOST_STEPS);
-    if (sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
-        fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it", c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
-    if (sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
-        fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time", c->output.window_start, c->run.duration);
+        bt_check_fault(k, "run.dt", "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run", steps, BT_MOST_STEPS);
+    if (bt_check_sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
+        bt_check_fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it", c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
+    if (bt_check_sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
+        bt_check_fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time", c->output.window_start, c->run.duration);
 }
 
 static void check_closing(const check *k, const char *key, const char *boundary_key, double closing, bt_bound boundary, double extent)
 {
-    if (closing == 0 || !sound(k, key) || !sound(k, boundary_key)) return;
+    if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, boundary_key)) return;
     if (boundary != BT_BOUND_WALL) {
-        fault(k, key, "%g m/s needs a wall to move; set %s: wall, or remove the key", closing, boundary_key);
+        bt_check_fault(k, key, "%g m/s needs a wall to move; set %s: wall, or remove the key", closing, boundary_key);
         return;
     }
-    if (sound(k, "run.duration domain.length domain.width") && 2 * closing * k->c->run.duration >= extent)
-        fault(k, key, "%g m/s brings the walls together after %g s, before the end of the run; slow them or shorten run.duration", closing, extent / (2 * closing));
+    if (bt_check_sound(k, "run.duration domain.length domain.width") && 2 * closing * k->c->run.duration >= extent)
+        bt_check_fault(k, key, "%g m/s brings the walls together after %g s, before the end of the run; slow them or shorten run.duration", closing, extent / (2 * closing));
 }
 
 static void check_domain(const check *k)
@@ -240,59 +150,59 @@ static void check_domain(const check *k)
 static void check_region(const check *k)
 {
     const bt_case *c = k->c;
-    if (!sound(k, "domain.x0 domain.y0 domain.length domain.width ice.x_min ice.x_max ice.y_min ice.y_max")) return;
+    if (!bt_check_sound(k, "domain.x0 domain.y0 domain.length domain.width ice.x_min ice.x_max ice.y_min ice.y_max")) return;
     double x1 = c->domain.x0 + c->domain.length, y1 = c->domain.y0 + c->domain.width, slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (c->ice.x_min >= c->ice.x_max) fault(k, "ice.x_min", "%g m is not below ice.x_max, %g m: the ice region is empty; move one of them", c->ice.x_min, c->ice.x_max);
-    if (c->ice.y_min >= c->ice.y_max) fault(k, "ice.y_min", "%g m is not below ice.y_max, %g m: the ice region is empty; move one of them", c->ice.y_min, c->ice.y_max);
-    if (c->ice.x_min < c->domain.x0 - slack) fault(k, "ice.x_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.x_min, c->domain.x0);
-    if (c->ice.x_max > x1 + slack) fault(k, "ice.x_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.x_max, x1);
-    if (c->ice.y_min < c->domain.y0 - slack) fault(k, "ice.y_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.y_min, c->domain.y0);
-    if (c->ice.y_max > y1 + slack) fault(k, "ice.y_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.y_max, y1);
+    if (c->ice.x_min >= c->ice.x_max) bt_check_fault(k, "ice.x_min", "%g m is not below ice.x_max, %g m: the ice region is empty; move one of them", c->ice.x_min, c->ice.x_max);
+    if (c->ice.y_min >= c->ice.y_max) bt_check_fault(k, "ice.y_min", "%g m is not below ice.y_max, %g m: the ice region is empty; move one of them", c->ice.y_min, c->ice.y_max);
+    if (c->ice.x_min < c->domain.x0 - slack) bt_check_fault(k, "ice.x_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.x_min, c->domain.x0);
+    if (c->ice.x_max > x1 + slack) bt_check_fault(k, "ice.x_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.x_max, x1);
+    if (c->ice.y_min < c->domain.y0 - slack) bt_check_fault(k, "ice.y_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.y_min, c->domain.y0);
+    if (c->ice.y_max > y1 + slack) bt_check_fault(k, "ice.y_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.y_max, y1);
 }
 
 static void check_sizes(const check *k)
 {
     const bt_case *c = k->c;
-    if (sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
-        fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
+    if (bt_check_sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
+        bt_check_fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
               BT_LEAST_THICKNESS);
-    if (sound(k, "ice.density water.density") && c->ice.density > c->water.density)
-        fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
+    if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
+        bt_check_fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
-    if (sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
-        fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water", c->ice.concentration,
+    if (bt_check_sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
+        bt_check_fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water", c->ice.concentration,
               BT_LEAST_CONCENTRATION);
-    if (c->ice.size_law != BT_SIZE_POWER && sound(k, "ice.size") && c->ice.size < BT_LEAST_SIZE)
-        fault(k, "ice.size", "%g m is below %g m; check the unit", c->ice.size, BT_LEAST_SIZE);
-    if (c->ice.size_law == BT_SIZE_POWER && sound(k, "ice.size_min") && c->ice.size_min > 0 &&
+    if (c->ice.size_law != BT_SIZE_POWER && bt_check_sound(k, "ice.size") && c->ice.size < BT_LEAST_SIZE)
+        bt_check_fault(k, "ice.size", "%g m is below %g m; check the unit", c->ice.size, BT_LEAST_SIZE);
+    if (c->ice.size_law == BT_SIZE_POWER && bt_check_sound(k, "ice.size_min") && c->ice.size_min > 0 &&
         c->ice.size_min < BT_LEAST_SIZE)
-        fault(k, "ice.size_min", "%g m is below %g m; check the unit", c->ice.size_min, BT_LEAST_SIZE);
-    if (!sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
+        bt_check_fault(k, "ice.size_min", "%g m is below %g m; check the unit", c->ice.size_min, BT_LEAST_SIZE);
+    if (!bt_check_sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
     double lo = c->ice.size_min, hi = c->ice.size_max;
     bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
-    if (power && !(lo > 0)) fault(k, "ice.size_min", "is %g m and size_law power needs a smallest size; give it, as in 10 m", lo);
-    if (power && !(hi > 0)) fault(k, "ice.size_max", "is %g m and size_law power needs a largest size; give it, as in 100 m", hi);
-    if (!ordered) fault(k, "ice.size_min", "%g m is not below ice.size_max, %g m; swap them", lo, hi);
+    if (power && !(lo > 0)) bt_check_fault(k, "ice.size_min", "is %g m and size_law power needs a smallest size; give it, as in 10 m", lo);
+    if (power && !(hi > 0)) bt_check_fault(k, "ice.size_max", "is %g m and size_law power needs a largest size; give it, as in 100 m", hi);
+    if (!ordered) bt_check_fault(k, "ice.size_min", "%g m is not below ice.size_max, %g m; swap them", lo, hi);
     if (c->ice.size_law == BT_SIZE_LOGNORMAL && ordered && (c->ice.size < lo || (hi > 0 && c->ice.size > hi)))
-        fault(k, "ice.size", "%g m is not between ice.size_min and ice.size_max; change one of them", c->ice.size);
+        bt_check_fault(k, "ice.size", "%g m is not between ice.size_min and ice.size_max; change one of them", c->ice.size);
     if (!ordered || (power && !(lo > 0 && hi > 0))) return;
 
-    if (!sound(k, "ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length domain.width")) return;
+    if (!bt_check_sound(k, "ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length domain.width")) return;
     double room = bt_min(c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     if (room <= 0) return; // reported by check_region
-    if (power && hi > room) fault(k, "ice.size_max", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
-    else if (!power && c->ice.size > room) fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", c->ice.size, room);
+    if (power && hi > room) bt_check_fault(k, "ice.size_max", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
+    else if (!power && c->ice.size > room) bt_check_fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", c->ice.size, room);
     double n = bt_case_expected_floes(c);
     if (n > BT_MOST_FLOES)
-        fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n, BT_MOST_FLOES);
+        bt_check_fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n, BT_MOST_FLOES);
 }
 
 // The defaults of ice and body are those of a model basin. At full scale a number that nobody gave would look like an answer.
 static void check_geographic(const check *k)
 {
     const bt_case *c = k->c;
-    if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !sound(k, "domain.frame")) return;
-    const bool read = c->ice.field || c->ice.outlines, made = !read && !(given(k, "ice.concentration") && c->ice.concentration == 0), body = c->body.shape != BT_BODY_ABSENT;
+    if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
+    const bool read = c->ice.field || c->ice.outlines, made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0), body = c->body.shape != BT_BODY_ABSENT;
     bool by_hand = false; // floes of the list without a thickness of their own
     for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || c->floes[i].thickness == c->ice.thickness;
     const struct {
@@ -304,94 +214,94 @@ static void check_geographic(const check *k)
                 {"body.length", "length of the towed body, as in 80 m, or set body.shape: none", body && c->body.shape != BT_BODY_POLYGON},
                 {"body.draft", "its depth below the waterline, as in 60 m, or set body.shape: none", body}};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
-        if (keys[i].needed && !given(k, keys[i].key))
-            fault(k, keys[i].key, "missing, and in domain.frame: geographic it has no default (that would be a model basin's); add it (%s)", keys[i].what);
+        if (keys[i].needed && !bt_check_given(k, keys[i].key))
+            bt_check_fault(k, keys[i].key, "missing, and in domain.frame: geographic it has no default (that would be a model basin's); add it (%s)", keys[i].what);
 }
 
 static void check_outlines(const check *k)
 {
     const bt_case *c = k->c;
-    if (!sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.origin_east "
+    if (!bt_check_sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.origin_east "
                   "ice.origin_north ice.nonconvex"))
         return;
-    if (c->ice.field && c->ice.outlines) fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
+    if (c->ice.field && c->ice.outlines) bt_check_fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
     const bool lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat), east = !isnan(c->ice.origin_east),
                north = !isnan(c->ice.origin_north);
     const bt_crs crs = c->ice.outlines_crs;
-    if (lon != lat) fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
+    if (lon != lat) bt_check_fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
     if (east != north)
-        fault(k, east ? "ice.origin_east" : "ice.origin_north",
+        bt_check_fault(k, east ? "ice.origin_east" : "ice.origin_north",
               "is given without the other coordinate of the origin; give both or none");
     if (lon && east)
-        fault(
+        bt_check_fault(
             k, "ice.origin_east",
             "and ice.origin_lon both say where x = y = 0 is; keep those of the file's coordinates, metres or degrees");
     if (c->ice.outlines && lon && crs != BT_CRS_FILE && crs != BT_CRS_LONLAT)
-        fault(k, "ice.origin_lon",
+        bt_check_fault(k, "ice.origin_lon",
               "has no effect on outlines in metres; give ice.origin_east and ice.origin_north, or remove the origin");
     if (east && (!c->ice.outlines || crs == BT_CRS_LONLAT || crs == BT_CRS_FRAME || crs == BT_CRS_METRES))
-        fault(k, "ice.origin_east",
+        bt_check_fault(k, "ice.origin_east",
               "has no effect unless ice.outlines are read that are metres east and north; remove the origin, or set "
               "ice.outlines_crs: plane");
     // Every resolved case of before has metres, with outlines or without.
     if (crs != BT_CRS_FILE && crs != BT_CRS_METRES && !c->ice.outlines)
-        fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
+        bt_check_fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
     if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
-        fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
+        bt_check_fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
 }
 
 static void check_polygon(const check *k, const char *key, bt_body_shape shape, int n, const char *shape_key)
 {
-    if (shape == BT_BODY_POLYGON && !n) fault(k, key, "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]");
-    if (shape != BT_BODY_POLYGON && n) fault(k, key, "is given but the shape is not polygon; set %s: polygon, or remove the corners", shape_key);
+    if (shape == BT_BODY_POLYGON && !n) bt_check_fault(k, key, "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]");
+    if (shape != BT_BODY_POLYGON && n) bt_check_fault(k, key, "is given but the shape is not polygon; set %s: polygon, or remove the corners", shape_key);
 }
 
 static bool check_body(const check *k, int *n, double *v)
 {
     const bt_case *c = k->c;
     *n = 0;
-    if (c->body.shape == BT_BODY_ABSENT || !sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw")) return false;
+    if (c->body.shape == BT_BODY_ABSENT || !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw")) return false;
     check_polygon(k, "body.vertices", c->body.shape, c->body.n_vertices, "body.shape");
     if (c->body.shape == BT_BODY_SQUARE && c->body.width != c->body.length)
-        fault(k, "body.width", "%g m differs from body.length, %g m, and the shape is square; remove the key or set body.shape: rectangle", c->body.width, c->body.length);
+        bt_check_fault(k, "body.width", "%g m differs from body.length, %g m, and the shape is square; remove the key or set body.shape: rectangle", c->body.width, c->body.length);
     if (c->body.shape == BT_BODY_POLYGON && !c->body.n_vertices) return false;
     const char *why = NULL;
-    *n = outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, &why);
+    *n = bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, &why);
     if (why) {
-        fault(k, c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length", "the waterline is refused: %s", why);
+        bt_check_fault(k, c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length", "the waterline is refused: %s", why);
         return false;
     }
-    if (!sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return false;
+    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return false;
     box b = bounds_of(*n, v, c->body.x, c->body.y, c->body.yaw);
     const char *extent = c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
     bool too_long = c->domain.ends != BT_BOUND_OPEN && b.x_max - b.x_min >= c->domain.length;
     bool too_wide = c->domain.sides != BT_BOUND_OPEN && b.y_max - b.y_min >= c->domain.width;
-    if (too_long) fault(k, extent, "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length", b.x_max - b.x_min, c->domain.length);
-    if (too_wide) fault(k, extent, "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width", b.y_max - b.y_min, c->domain.width);
+    if (too_long) bt_check_fault(k, extent, "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length", b.x_max - b.x_min, c->domain.length);
+    if (too_wide) bt_check_fault(k, extent, "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width", b.y_max - b.y_min, c->domain.width);
     if (too_long || too_wide) return false;
     char axis = outside(c, b, c->body.x, c->body.y);
-    if (axis == 'x') fault(k, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.x_min, b.x_max, c->domain.x0, c->domain.x0 + c->domain.length);
-    if (axis == 'y') fault(k, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.y_min, b.y_max, c->domain.y0, c->domain.y0 + c->domain.width);
+    if (axis == 'x') bt_check_fault(k, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.x_min, b.x_max, c->domain.x0, c->domain.x0 + c->domain.length);
+    if (axis == 'y') bt_check_fault(k, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.y_min, b.y_max, c->domain.y0, c->domain.y0 + c->domain.width);
     return !axis;
 }
 
 static void check_tow(const check *k)
 {
     bt_case *c = k->c;
-    if (!sound(k, "tow.mode tow.speed body.shape")) return;
+    if (!bt_check_sound(k, "tow.mode tow.speed body.shape")) return;
     if (c->body.shape == BT_BODY_ABSENT && c->tow.mode != BT_TOW_NONE) {
-        if (given(k, "tow.mode")) fault(k, "tow.mode", "there is no body to tow (body.shape: none); set tow.mode: none or give a body");
+        if (bt_check_given(k, "tow.mode")) bt_check_fault(k, "tow.mode", "there is no body to tow (body.shape: none); set tow.mode: none or give a body");
         else c->tow.mode = BT_TOW_NONE;
     }
     if (c->tow.mode == BT_TOW_NONE && c->tow.speed != 0) {
-        if (given(k, "tow.speed") && given(k, "tow.mode")) fault(k, "tow.speed", "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed", c->tow.speed);
+        if (bt_check_given(k, "tow.speed") && bt_check_given(k, "tow.mode")) bt_check_fault(k, "tow.speed", "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed", c->tow.speed);
         else c->tow.speed = 0;
     }
     if (c->tow.mode != BT_TOW_SPEED) return;
     static const char *const start[] = {"body.vx", "body.vy", "body.yaw_rate"};
     const double value[] = {c->body.vx, c->body.vy, c->body.yaw_rate};
     for (int i = 0; i < 3; i++)
-        if (value[i] != 0 && sound(k, start[i])) fault(k, start[i], "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
+        if (value[i] != 0 && bt_check_sound(k, start[i])) bt_check_fault(k, start[i], "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
 }
 
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
@@ -400,7 +310,7 @@ static void check_path(const check *k, int n, const double *v)
     const bt_case *c = k->c;
     // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A vessel may be slower.
     const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0; // way-points: case_tow.c
-    if (!straight || !(c->run.duration > 0) || !sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
+    if (!straight || !(c->run.duration > 0) || !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
@@ -414,7 +324,7 @@ static void check_path(const check *k, int n, const double *v)
     double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
     double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
     if (c->tow.n_programme > 0) time = bt_case_tow_time(c, reach);
-    fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
+    bt_check_fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 
 // After check_tow: the reference speed goes by it.
@@ -427,20 +337,20 @@ static void follow_impact(bt_case *c)
 static void check_water(const check *k)
 {
     const bt_case *c = k->c;
-    if (!sound(k, "water.tilt")) return;
-    if (c->water.tilt == BT_TILT_GEOSTROPHIC && c->water.latitude == 0 && sound(k, "water.latitude"))
-        fault(k, "water.tilt", "geostrophic balance needs the Coriolis force; give water.latitude");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && sound(k, "water.slope_x")) fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && sound(k, "water.slope_y")) fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
+    if (!bt_check_sound(k, "water.tilt")) return;
+    if (c->water.tilt == BT_TILT_GEOSTROPHIC && c->water.latitude == 0 && bt_check_sound(k, "water.latitude"))
+        bt_check_fault(k, "water.tilt", "geostrophic balance needs the Coriolis force; give water.latitude");
+    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && bt_check_sound(k, "water.slope_x")) bt_check_fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
+    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && bt_check_sound(k, "water.slope_y")) bt_check_fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
 }
 
 static void check_estimate(const check *k)
 {
     const bt_case *c = k->c;
-    if (sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
-        fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa, c->estimate.kappa_low);
-    if (sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
-        fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa, c->estimate.kappa_high);
+    if (bt_check_sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
+        bt_check_fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa, c->estimate.kappa_low);
+    if (bt_check_sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
+        bt_check_fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa, c->estimate.kappa_high);
 }
 
 static void check_floe(const check *k, int index)
@@ -458,7 +368,7 @@ static void check_floe(const check *k, int index)
     if (k->err->n > before) return;
     double v[2 * BT_MAX_VERTICES];
     const char *why = NULL;
-    int n = outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, &why);
+    int n = bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, &why);
     if (why) {
         bt_errors_add(k->err, "%s: the outline is refused: %s", where, why);
         return;
@@ -472,7 +382,7 @@ static void check_floe(const check *k, int index)
         bt_errors_add(k->err, "%s: %s", where, why);
         return;
     }
-    if (!sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return;
+    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return;
     box b = bounds_of(n, v, f->x, f->y, f->yaw);
     const bool long_x = bt_bound_wraps(c->domain.ends) && b.x_max - b.x_min >= c->domain.length, long_y = c->domain.sides == BT_BOUND_PERIODIC && b.y_max - b.y_min >= c->domain.width;
     if (long_x || long_y) bt_errors_add(k->err, "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain", where, long_x ? 'x' : 'y');
@@ -506,10 +416,10 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     bt_case_tow_check(&k);
     follow_impact(c);
     if (placed) check_path(&k, n, v);
-    bt_case_check_window(c, n, v, from, err);
+    bt_case_check_window(&k, n, v);
     check_water(&k);
-    bt_case_check_environment(c, from, err);
-    bt_case_check_lead(c, n, v, from, err);
+    bt_case_check_environment(&k);
+    bt_case_check_lead(&k, n, v);
     check_estimate(&k);
     for (bt_idx i = 0; i < c->n_floes && err->n - before < BT_MOST_COMPLAINTS; i++) check_floe(&k, i);
     if (err->n == before) bt_case_check_cost(&k);
@@ -517,62 +427,3 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
 }
 
 bt_status bt_case_finish(bt_case *c, bt_errors *err) { return bt_case_check(c, NULL, err); }
-
-// ---- numbers that follow ----
-
-// Mean square diameter of the floes. For a power law N(>d) ~ d^−a on [lo, hi] the density is ∝ d^(−a−1), so
-// <d²> = ∫ d^(1−a) / ∫ d^(−a−1).
-static double mean_square_size(const bt_case *c)
-{
-    double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
-    if (c->ice.size_law != BT_SIZE_POWER) return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
-    double top = fabs(a - 2) < 1e-9 ? log(hi / lo) : (pow(hi, 2 - a) - pow(lo, 2 - a)) / (2 - a);
-    return top / ((pow(lo, -a) - pow(hi, -a)) / a);
-}
-
-double bt_case_expected_floes(const bt_case *c)
-{
-    if (c->ice.field || c->ice.outlines) return 0;
-    double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
-    double v[2 * BT_MAX_VERTICES];
-    int n = bt_case_waterline(c, v);
-    bool inside = c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
-    if (n && inside) area -= bt_shape_moments(n, v).area;
-    return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
-}
-
-int64_t bt_case_steps(const bt_case *c)
-{
-    double steps = ceil(c->run.duration / c->run.dt * (1 - 1e-12));
-    return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
-}
-
-double bt_case_earliest_window(const bt_case *c)
-{
-    if (c->output.window_start >= 0) return c->output.window_start;
-    return c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp;
-}
-
-double bt_case_body_mass(const bt_case *c)
-{
-    double v[2 * BT_MAX_VERTICES];
-    int n = bt_case_waterline(c, v);
-    if (!n) return 0;
-    if (c->body.mass > 0) return c->body.mass;
-    return c->body.density * bt_shape_moments(n, v).area * (c->body.draft + c->body.sail);
-}
-
-double bt_case_reference_speed(const bt_case *c)
-{
-    if (c->solver.reference_speed > 0) return c->solver.reference_speed;
-    if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
-    double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
-    u = bt_max(u, bt_environment_fastest(c, true));
-    // A velocity that is not given is that of free drift.
-    if (!isnan(c->body.vx)) u = bt_max(u, hypot(c->body.vx, c->body.vy));
-    for (bt_idx i = 0; i < c->n_floes; i++)
-        if (!isnan(c->floes[i].vx)) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
-    // Free drift of ice is about 2 % of the wind (Nansen's rule).
-    u = bt_max(u, 0.02 * bt_environment_fastest(c, false));
-    return u > 0 ? u : 0.1;
-}

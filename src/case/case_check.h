@@ -4,33 +4,21 @@
 #define BERGTOW_CASE_CHECK_H
 
 #include "bergtow/case.h"
-
-/// Where the value of a key comes from, for messages and to leave out checks on values that were refused already.
-typedef struct bt_origin {
-    int line;        ///< in the case file; 0 = default or override
-    const char *set; ///< the override "key=value", or NULL
-    const char *place; ///< where that stands, "FILE:LINE: ", or NULL: in the command line
-    bool faulty;     ///< refused; the member holds the default
-} bt_origin;
+#include "case/case_derived.h"
+#include "case/case_faults.h"
 
 /// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err. Reads the tables that the case
 /// names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
 bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
 
-/// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated to the buffer.
-void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
-
 /// Read the tables of current and wind that the case names. Errors: BT_ERR_IO, BT_ERR_CASE; the table is then empty.
 bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
 
-/// Checks of current and wind in time, as bt_case_check.
-void bt_case_check_environment(const bt_case *c, const bt_origin *from, bt_errors *err);
+/// Checks of current and wind in time.
+void bt_case_check_environment(const bt_check *k);
 
 /// Width and length of the lead that follow from the body and the tow; checks of the lead. The waterline is v [n][2], n = 0 without a body.
-void bt_case_check_lead(bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err);
-
-/// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
-double bt_case_expected_floes(const bt_case *c);
+void bt_case_check_lead(const bt_check *k, int n, const double *v);
 
 /// Length of path that the tow has led along after time t, with ramp or programme, m.
 double bt_case_tow_distance(const bt_case *c, double t);
@@ -47,13 +35,6 @@ double bt_case_line_period(const bt_case *c);
 bool bt_case_start_is_slow(const bt_case *c);
 /// Tell of a start that is not.
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
-
-/// A check under way, for the checks that stand in files of their own (case_tow.c).
-typedef struct bt_check bt_check;
-bt_case *bt_check_case(const bt_check *k);
-bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
-bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
-void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
 /// The direction that way-points give, where the place of the body is known: a moving window lies by it.
 void bt_case_tow_course(const bt_check *k);
@@ -79,7 +60,7 @@ double bt_case_window_ahead(const bt_case *c);
 /// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case leaves it open.
 void bt_case_window_follow(bt_case *c);
 
-/// Checks of the moving window, as bt_case_check. The waterline is v [n][2], n = 0 without a body.
-void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err);
+/// Checks of the moving window. The waterline is v [n][2], n = 0 without a body.
+void bt_case_check_window(const bt_check *k, int n, const double *v);
 
 #endif

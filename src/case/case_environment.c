@@ -19,70 +19,50 @@ bt_status bt_case_load_tables(bt_case *c, bt_errors *err)
     return water == BT_OK ? air : air == BT_OK || water == BT_ERR_CASE ? water : air;
 }
 
-typedef struct {
-    const bt_case *c;
-    const bt_origin *from;
-    bt_errors *err;
-} check;
-
-static int place(const char *key) { return bt_schema_find(bt_case_keys, bt_n_case_keys, key); }
-
-static bool sound(const check *k, const char *key) { return !k->from || !k->from[place(key)].faulty; }
-
-/// "FILE:LINE: KEY" of a message.
-static const char *where(const check *k, const char *key, char out[256])
-{
-    bt_case_locate(k->c, k->from ? &k->from[place(key)] : NULL, key, out);
-    return out;
-}
-
 /// A table stands in place of the other keys of its fluid, and must cover the times that the run asks it for: from 0 to the
 /// middle of the last step (force/environment.h).
-static void check_table(const check *k, const char *key, const bt_table *t, const char *const *others)
+static void check_table(const bt_check *k, const char *key, const bt_table *t, const char *const *others)
 {
-    char at[256];
     if (t->n == 0) return;
     for (; *others; others++) {
         double value;
-        memcpy(&value, (const char *)k->c + bt_case_keys[place(*others)].offset, sizeof value);
-        if (value != 0 && sound(k, *others))
-            bt_errors_add(k->err, "%s: has no effect beside %s, which says it all; remove one of them", where(k, *others, at), key);
+        const int key_index = bt_schema_find(bt_case_keys, bt_n_case_keys, *others);
+        memcpy(&value, (const char *)k->c + bt_case_keys[key_index].offset, sizeof value);
+        if (value != 0 && bt_check_sound(k, *others))
+            bt_check_fault(k, *others, "has no effect beside %s, which says it all; remove one of them", key);
     }
     const double dt = k->c->run.dt, duration = k->c->run.duration;
-    if (!sound(k, "run.dt") || !sound(k, "run.duration") || !(dt > 0) || !(duration > 0)) return;
+    if (!bt_check_sound(k, "run.dt") || !bt_check_sound(k, "run.duration") || !(dt > 0) || !(duration > 0)) return;
     const double first = t->row[0], end = t->row[3 * (t->n - 1)], need = bt_max(duration, ((double)bt_case_steps(k->c) - 0.5) * dt);
-    if (first > 0) bt_errors_add(k->err, "%s: the table begins at %g s and the run at 0 s; add a row for 0 s", where(k, key, at), first);
+    if (first > 0) bt_check_fault(k, key, "the table begins at %g s and the run at 0 s; add a row for 0 s", first);
     if (end < need * (1 - 1e-12))
-        bt_errors_add(k->err, "%s: the table ends at %g s and the run asks it for %g s; add rows, or shorten run.duration", where(k, key, at), end, need);
+        bt_check_fault(k, key, "the table ends at %g s and the run asks it for %g s; add rows, or shorten run.duration", end, need);
 }
 
-void bt_case_check_environment(const bt_case *c, const bt_origin *from, bt_errors *err)
+void bt_case_check_environment(const bt_check *k)
 {
+    const bt_case *c = k->c;
     static const char *const current[] = {"water.current_x", "water.current_y", "water.tide.major", "water.tide.minor", NULL};
     static const char *const wind[] = {"air.wind_x", "air.wind_y", NULL};
-    const check k = {.c = c, .from = from, .err = err};
-    char at[256];
-    if (fabs(c->water.tide.minor) > c->water.tide.major && sound(&k, "water.tide.major") && sound(&k, "water.tide.minor"))
-        bt_errors_add(err, "%s: %g m/s is more than water.tide.major, %g m/s; swap them and turn the inclination by 90 deg",
-                      where(&k, "water.tide.minor", at), c->water.tide.minor, c->water.tide.major);
-    check_table(&k, "water.current_table", &c->water.table, current);
-    check_table(&k, "air.wind_table", &c->air.table, wind);
+    if (fabs(c->water.tide.minor) > c->water.tide.major && bt_check_sound(k, "water.tide.major") && bt_check_sound(k, "water.tide.minor"))
+        bt_check_fault(k, "water.tide.minor", "%g m/s is more than water.tide.major, %g m/s; swap them and turn the inclination by 90 deg", c->water.tide.minor, c->water.tide.major);
+    check_table(k, "water.current_table", &c->water.table, current);
+    check_table(k, "air.wind_table", &c->air.table, wind);
 }
 
-void bt_case_check_lead(bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err)
+void bt_case_check_lead(const bt_check *k, int n, const double *v)
 {
-    const check k = {.c = c, .from = from, .err = err};
-    char at[256];
+    bt_case *c = k->c;
     const double ahead = c->tow.direction - c->body.yaw;
     if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, cos(ahead), sin(ahead)) : 0;
     if (isnan(c->lead.length)) c->lead.length = c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;
-    if (c->lead.mode == BT_LEAD_NONE || !sound(&k, "lead.mode") || !sound(&k, "body.shape") || !sound(&k, "tow.mode")) return;
+    if (c->lead.mode == BT_LEAD_NONE || !bt_check_sound(k, "lead.mode") || !bt_check_sound(k, "body.shape") || !bt_check_sound(k, "tow.mode")) return;
     if (c->body.shape == BT_BODY_ABSENT || c->tow.mode == BT_TOW_NONE) {
-        bt_errors_add(err, "%s: a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode", where(&k, "lead.mode", at));
+        bt_check_fault(k, "lead.mode", "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode");
         return;
     }
-    if (!(c->lead.width > 0) && sound(&k, "lead.width")) bt_errors_add(err, "%s: is %g m; give the width of the lead, as in 20 m", where(&k, "lead.width", at), c->lead.width);
-    if (!(c->lead.length > 0) && sound(&k, "lead.length")) bt_errors_add(err, "%s: is %g m; give the length of the lead, as in 500 m", where(&k, "lead.length", at), c->lead.length);
-    if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && sound(&k, "lead.floe_size"))
-        bt_errors_add(err, "%s: is %g m and a managed lead needs the size of its pieces; give it, as in 10 m", where(&k, "lead.floe_size", at), c->lead.floe_size);
+    if (!(c->lead.width > 0) && bt_check_sound(k, "lead.width")) bt_check_fault(k, "lead.width", "is %g m; give the width of the lead, as in 20 m", c->lead.width);
+    if (!(c->lead.length > 0) && bt_check_sound(k, "lead.length")) bt_check_fault(k, "lead.length", "is %g m; give the length of the lead, as in 500 m", c->lead.length);
+    if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && bt_check_sound(k, "lead.floe_size"))
+        bt_check_fault(k, "lead.floe_size", "is %g m and a managed lead needs the size of its pieces; give it, as in 10 m", c->lead.floe_size);
 }

@@ -109,7 +109,7 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
 
 void bt_case_tow_course(const bt_check *k)
 {
-    bt_case *c = bt_check_case(k);
+    bt_case *c = k->c;
     if (c->domain.frame == BT_FRAME_GEOGRAPHIC) fill(&c->body.x, 0);
     if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction") && !isnan(c->body.x))
         c->tow.direction = atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
@@ -117,7 +117,7 @@ void bt_case_tow_course(const bt_check *k)
 
 void bt_case_tow_follow(const bt_check *k)
 {
-    bt_case *c = bt_check_case(k);
+    bt_case *c = k->c;
     if (c->tow.n_programme > 0) {
         double speed, time;
         largest_speed(c, &speed, &time);
@@ -203,7 +203,7 @@ void bt_case_tow_hull(bt_case *c, int n, const double *v)
 
 static void check_programme(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     if (c->tow.n_programme == 0 || !bt_check_sound(k, "tow.programme")) return;
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++)
@@ -223,7 +223,7 @@ static void check_programme(const bt_check *k)
 
 static void check_lines(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     const char *mode = c->tow.mode == BT_TOW_THRUST ? "thrust" : "line";
     if (!bt_check_sound(k, "tow.mode") || !has_line(c)) return;
     if (!(c->tow.line_length > 0) && bt_check_sound(k, "tow.line_length"))
@@ -238,7 +238,7 @@ static void check_lines(const bt_check *k)
 
 static void check_vessel(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     if (c->tow.mode != BT_TOW_THRUST || !bt_check_sound(k, "tow.mode")) return;
     static const char *const key[] = {"tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"};
     static const char *const example[] = {"3000 t", "1 MN", "15 kn"};
@@ -273,7 +273,7 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
 
 static void check_waypoints(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     if (!bt_check_sound(k, "tow.waypoints tow.turn_radius tow.direction tow.mode tow.line_length tow.line.branches body.x body.y body.yaw")) return;
     if (c->tow.n_waypoints == 0) {
         if (c->tow.turn_radius > 0) bt_check_fault(k, "tow.turn_radius", "has no effect without tow.waypoints; give them or remove it");
@@ -323,7 +323,7 @@ static void check_waypoints(const bt_check *k)
 
 void bt_case_tow_check(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     check_programme(k);
     check_lines(k);
     check_vessel(k);

@@ -4,7 +4,6 @@
 #include <stdio.h>
 
 #include "case/case_check.h"
-#include "case/schema.h"
 
 static const double share_ahead = 0.6; // of the window, assumed
 static const double room = 4;          // floe sizes of ice ahead and behind, at least
@@ -67,28 +66,19 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
     return NULL;
 }
 
-static const bt_origin *origin(const bt_origin *from, const char *key)
+void bt_case_check_window(const bt_check *k, int n, const double *v)
 {
-    return from ? &from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
-}
-
-void bt_case_check_window(const bt_case *c, int n, const double *v, const bt_origin *from, bt_errors *err)
-{
-    static const char *const used[] = {"domain.ends", "domain.length", "domain.x0", "domain.ahead", "domain.sides_closing", "tow.mode",
-                                       "tow.direction", "tow.speed", "water.current_x", "body.x", "body.yaw", "body.shape", "ice.size"};
-    for (size_t k = 0; from && k < sizeof used / sizeof *used; k++)
-        if (origin(from, used[k])->faulty) return;
+    const bt_case *c = k->c;
+    if (!bt_check_sound(k, "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction "
+                           "tow.speed water.current_x body.x body.yaw body.shape ice.size")) return;
     if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
     double x_min = 0, x_max = 0;
-    for (int k = 0; k < n; k++) {
-        const double x = cos(c->body.yaw) * v[2 * k] - sin(c->body.yaw) * v[2 * k + 1];
+    for (int i = 0; i < n; i++) {
+        const double x = cos(c->body.yaw) * v[2 * i] - sin(c->body.yaw) * v[2 * i + 1];
         x_min = bt_min(x_min, x);
         x_max = bt_max(x_max, x);
     }
-    const bt_origin *ahead = origin(from, "domain.ahead");
-    char why[256], where[256];
-    const char *key = find_fault(c, ahead && (ahead->line > 0 || ahead->set), x_min, x_max, why);
-    if (!key) return;
-    bt_case_locate(c, origin(from, key), key, where);
-    bt_errors_add(err, "%s: %s", where, why);
+    char why[256];
+    const char *key = find_fault(c, bt_check_given(k, "domain.ahead"), x_min, x_max, why);
+    if (key) bt_check_fault(k, key, "%s", why);
 }

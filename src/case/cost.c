@@ -7,15 +7,12 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-#include "output/record.h"
 #include "bergtow/shape.h"
 #include "bergtow/stats.h"
 #include "case/case_check.h"
-#include "base/history.h"
 #include "base/largest.h"
-#include "loads/panel_blocks.h"
 
-static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_N_COLUMNS, BASE_BYTES = 20e6;
+static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS, BASE_BYTES = 20e6;
 static const double CHECKPOINT_BYTES_PER_FLOE = 1000; // on rank 0 while it writes one: rows on the way, columns, the field, contacts
 
 // --- disk ------------------------------------------------------------------------------------------------------------
@@ -47,7 +44,7 @@ static double steps_kept(const bt_case *c)
 {
     const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;
     const double steps = (double)bt_case_steps(c), blocks = steps / (double)bt_stats_start_step(bt_case_steps(c));
-    return BYTES_PER_STEP * steps + (panels ? (double)sizeof(bt_panel_loads) * blocks * (double)c->impact.panels : 0);
+    return BYTES_PER_STEP * steps + (panels ? BT_COST_PANEL_BYTES * blocks * (double)c->impact.panels : 0);
 }
 
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
@@ -81,7 +78,7 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
     const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) + 2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
     const double outlines = 24 * n + 16 * corners + 4 * (corners + 2 * n);
-    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = bt_n_series_fields + (c->output.panels ? 3 * (double)c->impact.panels : 0);
+    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = BT_COST_SERIES + (c->output.panels ? 3 * (double)c->impact.panels : 0);
     const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(c);
     const bool on_the_way = (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
                             (c->output.checkpoint_wall > 0 && (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);
@@ -100,7 +97,7 @@ double bt_cost_member(const bt_case *c, const bt_cost_disk *d)
 /// A run that would take longer than anybody waits, or fill any disk.
 void bt_case_check_cost(const bt_check *k)
 {
-    const bt_case *c = bt_check_case(k);
+    const bt_case *c = k->c;
     if (!bt_check_sound(k, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
                            "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels impact.panels")) return;
     const double n = bt_case_expected_floes(c) + c->n_floes, work = bt_cost_seconds(c), result = bt_cost_disk_of(c, n, bt_cost_corners(c, NULL, n), 2).result;

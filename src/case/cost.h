@@ -7,6 +7,13 @@
 #include "bergtow/comm.h"
 #include "bergtow/field.h"
 
+/// What the layers above write, for the estimate of their size; each is held to it where it is defined.
+enum {
+    BT_COST_SERIES = 63,      ///< series of a run
+    BT_COST_COLUMNS = 15,     ///< of them kept in memory from every step
+    BT_COST_PANEL_BYTES = 32, ///< a block of the loads of one panel
+};
+
 /// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 µs at 20, 50 and 80 %, where
 /// force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is linear.
 /// A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.

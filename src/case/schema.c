@@ -12,6 +12,8 @@
 // "assumed" is a choice of this program without a measurement behind it.
 #include "case/schema.h"
 
+#include "bergtow/shape.h"
+
 #include "base/largest.h"
 #include "base/suggest.h"
 #include "case/value.h"
@@ -29,8 +31,8 @@ static const char *const crss[] = {"file", "lonlat", "plane", "frame", "metres",
 static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const starts[] = {"drift", "rest", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
-static const char *const body_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", "none", NULL};
-static const char *const floe_shapes[] = {"disc", "square", "rectangle", "ship", "polygon", NULL};
+static const char *const body_shapes[] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
+static const char *const floe_shapes[] = {BT_SHAPE_NAMES, "polygon", NULL};
 static const char *const tow_modes[] = {"none", "speed", "line", "thrust", NULL};
 static const char *const rope_types[] = {"numbers", "steel-wire", "polypropylene", "dyneema", NULL};
 static const char *const conversions[] = {"none", "duration", "crushing", NULL};
@@ -334,13 +336,6 @@ const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char 
         }
     if (bt_suggest_distance(name, "floes", least) < least) best = "floes";
     return best;
-}
-
-bt_key bt_schema_column(const bt_key *k, int column)
-{
-    bt_key c = *k;
-    if (column == 0 && k->range_first) c.unit = k->unit_first, c.range = k->range_first;
-    return c;
 }
 
 void bt_schema_preset(const bt_key *keys, int n, void *base)

@@ -243,3 +243,10 @@ void bt_value_write(const bt_key *k, const void *base, FILE *out)
     }
     }
 }
+
+bt_key bt_schema_column(const bt_key *k, int column)
+{
+    bt_key c = *k;
+    if (column == 0 && k->range_first) c.unit = k->unit_first, c.range = k->range_first;
+    return c;
+}

@@ -12,7 +12,8 @@
 #ifndef BERGTOW_CONTACTS_H
 #define BERGTOW_CONTACTS_H
 
-#include "bergtow/world.h"
+#include "body/bodies.h"
+#include "space/margin.h"
 
 /// One contact point. Both arms end in the same point of space, between the two surfaces, so that equal and opposite
 /// impulses conserve angular momentum exactly. Two points of a manifold lie on a line along the tangent.
@@ -39,12 +40,6 @@ void bt_contacts_spread(struct bt_tiles *t, int32_t x, int32_t y, double s);
 /// Has the bound grown beyond what the last detection was made for? Collective.
 bool bt_contacts_outrun(const bt_world *w);
 
-/// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
-double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v);
-
-/// Margin for speed s: 2 Δt s, rounded up to a power of √2 so that pair lists stay valid while speeds wander; at least the slop. m
-double bt_contacts_margin(const bt_world *w, double s);
-
 /// Find this step's units at the present poses in the tiles that are active under tiles->bound. Impulses are those of the
 /// same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
 void bt_contacts_detect(bt_world *w, bool again);
@@ -62,33 +57,11 @@ void bt_contacts_detect_all(bt_world *w, double margin);
 /// bound of the distance), axis_out its edge (numbered as in bt_pair).
 bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
 
-/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair; otherwise see src/geometry/manifold.c.
+/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair; otherwise see src/contact/manifold.c.
 bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin, int reference_before, bt_manifold *m, double *gap_out,
                        int32_t *axis_out);
 
 /// All manifolds by testing all pairs, for tests; in the order of gids.
 void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man);
-
-/// Outline of body i turned by its yaw (after a change of pose).
-void bt_world_turn_outline(bt_world *w, bt_idx i);
-
-/// Vector from the centroid of a to that of b, the nearest image in periodic directions.
-static inline void bt_world_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2]);
-
-static inline double bt_nearest_image(double d, double period)
-{
-    if (period > 0) {
-        if (d > 0.5 * period) d -= period;
-        else if (d < -0.5 * period) d += period;
-    }
-    return d;
-}
-
-static inline void bt_world_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2])
-{
-    const bt_pose *pa = &w->bodies.pose[a], *pb = &w->bodies.pose[b];
-    d[0] = bt_nearest_image(pb->x - pa->x, w->par.period_x);
-    d[1] = bt_nearest_image(pb->y - pa->y, w->par.period_y);
-}
 
 #endif

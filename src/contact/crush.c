@@ -60,7 +60,7 @@ static patch patch_of(const bt_world *w, const uint16_t part[2], const bt_manifo
 {
     const bt_bodies *s = &w->bodies;
     double off[2], v[2][4 * BT_MAX_VERTICES];
-    bt_world_offset(w, m->a, m->b, off);
+    bt_bodies_offset(w, m->a, m->b, off);
     off[0] -= way * m->nx, off[1] -= way * m->ny;
     const int64_t first_a = s->offset[m->a] + part[0], first_b = s->offset[m->b] + part[1];
     const double *q = s->outline + 2 * first_b;

@@ -10,28 +10,10 @@
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
-#include "geometry/merge.h"
+#include "contact/merge.h"
 #include "contact/pack.h"
 #include "space/pairs.h"
 #include "space/phases.h"
-
-// A floe that crosses more than this in a step is no longer looked ahead for (it is reported as outrun): a solution that flies apart
-// must not ask for tiles, and pair lists, of the whole field.
-static double most_margin(const bt_world *w) { return 16 * w->par.size; }
-
-double bt_contacts_margin(const bt_world *w, double s)
-{
-    const double least = 2 * w->par.dt * s;
-    if (!(least < most_margin(w)) && w->par.size > 0) return most_margin(w);
-    if (!(least > w->par.slop)) return w->par.slop;
-    return exp2(0.5 * ceil(2 * log2(least)));
-}
-
-double bt_contacts_speed(const bt_world *w, bt_idx i, const bt_vel *v)
-{
-    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
-    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
-}
 
 /// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1.
 static void raise(bt_tiles *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
@@ -55,12 +37,12 @@ static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
     double fastest = 0;
     bool movable = false;
     for (bt_idx l = t->n_tiled; l < b->n; l++) {
-        double s = bt_max(bt_contacts_speed(w, l, &v[l]), bt_contacts_speed(w, l, &v2[l]));
+        double s = bt_max(bt_bodies_speed(w, l, &v[l]), bt_bodies_speed(w, l, &v2[l]));
         if (b->stirred[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
         movable = movable || b->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
         fastest = bt_max(fastest, s);
-        const bt_tile_range r = bt_pairs_range(w, l, bt_contacts_margin(w, s) + t->reach + t->allowance);
+        const bt_tile_range r = bt_pairs_range(w, l, bt_margin_for(w, s) + t->reach + t->allowance);
         raise(t, r.x0, r.x1, r.y0, r.y1, s);
     }
     return movable ? fastest : 0;
@@ -85,7 +67,7 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         double s = 0;
         if (k == n) continue;
         for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
-            s = bt_max(s, bt_max(bt_contacts_speed(w, i, &v[i]), bt_contacts_speed(w, i, &v2[i])));
+            s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[i]), bt_bodies_speed(w, i, &v2[i])));
             if (b->stirred[i]) s = bt_max(s, stir);
         }
         t->speed[k] = s;
@@ -117,7 +99,7 @@ bool bt_contacts_outrun(const bt_world *w)
         const bt_idx k = t->busy[j];
         const bt_tile *tile = &t->tile[k];
         any = tile->own && t->bound[k] > 0 &&
-              (!tile->active || bt_contacts_margin(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * most_margin(w));
+              (!tile->active || bt_margin_for(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;
@@ -241,7 +223,7 @@ static void detect(bt_world *w, bool again)
             tile->active = false;
             continue;
         }
-        const double margin = bt_contacts_margin(w, t->bound[k]);
+        const double margin = bt_margin_for(w, t->bound[k]);
         if (again && tile->active && margin <= tile->margin) continue;
         tile->active = true;
         tile->margin = margin;
@@ -305,7 +287,7 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
 double bt_contacts_overlap(bt_world *w)
 {
     bt_tiles_begin(w); // from here on and again below, bodies may lie elsewhere
-    if (bt_tiles_update(w, bt_contacts_margin(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    if (bt_tiles_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
     detect(w, false);
     const bt_tiles *t = w->tiles;
     double deepest = 0;

@@ -21,7 +21,7 @@
 
 #include "bergtow/field.h"
 #include "bergtow/outline.h"
-#include "field/field_load.h"
+#include "field/field_admit.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
 #include "base/h5util.h"

@@ -5,6 +5,7 @@
 
 #include "bergtow/case.h"
 #include "bergtow/field.h"
+#include "geometry/apart.h"
 #include "bergtow/shape.h"
 
 /// A body that lies in the ice: convex, in domain coordinates.
@@ -64,16 +65,6 @@ bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double a
 int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed);
 /// Remove short edges and vertices beyond BT_CELL_VERTICES inwards; returns the new count.
 int bt_cell_clean(int n, double *v, double shortest);
-
-/// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
-typedef struct bt_apart {
-    double gap;       ///< max n·D − h_a(n) − h_b(−n): distance if > 0 along the best edge normal, depth of overlap if < 0, m
-    double both;      ///< factor by which both can be scaled about their centroids until they touch: max n·D/(h_a + h_b)
-    double first;     ///< the same when only the first is scaled: max (n·D − h_b)/h_a
-} bt_apart;
-
-/// a [na][2], b [nb][2] relative to their centroids, (dx, dy) from the centroid of a to that of b.
-bt_apart bt_apart_of(int na, const double *a, int nb, const double *b, double dx, double dy);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
 double *bt_field_outlines(const bt_field *f);

@@ -27,7 +27,7 @@
 #include <strings.h>
 
 #include "bergtow/outline.h"
-#include "field/field_load.h"
+#include "field/field_admit.h"
 #include "field/field_make.h"
 #include "base/fileio.h"
 #include "case/ice_bounds.h"

@@ -70,14 +70,6 @@ void bt_environment_mean(const bt_case *c, bool water, double v[2])
     v[0] = sum[0] / SAMPLES, v[1] = sum[1] / SAMPLES;
 }
 
-double bt_environment_fastest(const bt_case *c, bool water)
-{
-    const bt_table *t = water ? &c->water.table : &c->air.table;
-    if (t->n > 0) return bt_table_fastest(t);
-    if (!water) return hypot(c->air.wind_x, c->air.wind_y);
-    return hypot(c->water.current_x, c->water.current_y) + bt_max(c->water.tide.major, fabs(c->water.tide.minor));
-}
-
 static void own(bt_table *t)
 {
     if (t->n == 0) return;

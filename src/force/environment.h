@@ -47,7 +47,5 @@ void bt_environment_at(const bt_case *c, bool water, double t, double v[2]);
 /// Mean of current or wind over the run, m/s.
 void bt_environment_mean(const bt_case *c, bool water, double v[2]);
 
-/// Largest speed that the current (or wind) of a case can have, m/s.
-double bt_environment_fastest(const bt_case *c, bool water);
 
 #endif

@@ -27,7 +27,7 @@
 //               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then; the rebound, if any, has no part in it
 // In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
 //
-// What is counted of them, and from when: src/loads/impact_count.h, src/loads/panel_blocks.h.
+// What is counted of them, and from when: src/output/impact_count.h, src/loads/panel_blocks.h.
 //
 // On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all that follows.
 #ifndef BERGTOW_IMPACT_H

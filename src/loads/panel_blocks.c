@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Blocks of panel loads between the possible starts of the window; see panel_blocks.h.
 #include "loads/panel_blocks.h"
+#include "case/cost.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/stats.h"
+
+_Static_assert(sizeof(bt_panel_loads) == BT_COST_PANEL_BYTES, "what check says of memory and disk counts them");
 
 static void add(bt_panel_loads *to, const bt_panel_loads *l)
 {

@@ -4,6 +4,7 @@
 // Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times: at the rate k/T. The table takes the ranks
 // 1, 2, 5, 10, ...; nothing is fitted and nothing between ranks is made up. A rate near 1/T rests on one peak.
 #include "output/impact_report.h"
+#include "base/units.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 #ifndef BT_IMPACT_REPORT_H
 #define BT_IMPACT_REPORT_H
 
-#include "loads/impact_count.h"
+#include "output/impact_count.h"
 #include "base/json.h"
 
 /// "impacts": {...}; null when c is NULL.

@@ -6,7 +6,7 @@
 #include "loads/impact.h"
 #include "base/h5read.h"
 #include "base/h5util.h"
-#include "loads/impact_count.h"
+#include "output/impact_count.h"
 #include "loads/panel_blocks.h"
 #include "base/snapshot.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The table of time series: name, unit, meaning, when it applies and how the steps of one sample merge.
 #include "output/record.h"
+#include "case/cost.h"
 
 #include <math.h>
 
@@ -87,6 +88,7 @@ const int bt_n_series_fields = sizeof bt_series_fields / sizeof *bt_series_field
 
 _Static_assert(sizeof bt_series_fields / sizeof *bt_series_fields == sizeof(bt_sample) / sizeof(double),
                "every number of a sample has its row in the table");
+_Static_assert(sizeof bt_series_fields / sizeof *bt_series_fields <= BT_COST_SERIES + 8, "what check says of the disk counts them");
 
 const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has)
 {

@@ -129,7 +129,7 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
 {
     bt_bodies *b = &w->bodies;
     b->pose[i] = (bt_pose){.x = r->pose[0], .y = r->pose[1], .yaw = r->pose[2]};
-    bt_world_turn_outline(w, i);
+    bt_bodies_turn(&w->bodies, i);
     b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
     b->path[i] = r->path;
     b->tile[i][0] = r->tile[0];
@@ -220,16 +220,6 @@ static const bt_state_row trace_columns[] = {
     MEMBER(bt_trace, "a", I64, 1, a), MEMBER(bt_trace, "b", I64, 1, b), MEMBER(bt_trace, "part", U16, 2, part), MEMBER(bt_trace, "points", I32, 1, n_points),
     MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "impulse", F64, 2, ln), MEMBER(bt_trace, "friction", F64, 1, lt), MEMBER(bt_trace, "crushed", U8, 1, scar),
 };
-
-int bt_trace_by_names(const void *p, const void *q)
-{
-    const bt_trace *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    if (a->b != b->b) return a->b < b->b ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
-    return a->scar - b->scar;
-}
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
 static void blank(bt_trace *t)

@@ -20,6 +20,16 @@
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 
+int bt_trace_by_names(const void *p, const void *q)
+{
+    const bt_trace *a = p, *b = q;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
+    return a->scar - b->scar;
+}
+
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
 static const int32_t FAR = 1000000000; // tiles, periods: as labels of tiles are limited (tiles.c)
 

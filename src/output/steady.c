@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Window and verdict of a run; the rules are in steady.h.
 #include "output/steady.h"
+#include "base/units.h"
 
 #include <math.h>
 #include <stdarg.h>

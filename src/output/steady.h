@@ -15,7 +15,7 @@
 #define BT_STEADY_H
 
 #include "bergtow/stats.h"
-#include "base/history.h"
+#include "output/history.h"
 
 #define BT_STEADY_INDEPENDENT 20    ///< below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
 #define BT_STEADY_MATERIAL 0.02     ///< change over the window / mean below which a trend does not matter, assumed

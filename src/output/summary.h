@@ -30,8 +30,6 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 /// summary.json as text; the caller frees it.
 char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
 void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
-/// A force with a prefix that keeps three digits before the point; returns out.
-const char *bt_force_text(char out[32], double newton);
 void bt_summary_free(bt_summary *s);
 
 #endif

@@ -4,7 +4,8 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "estimate/estimate_text.h"
+#include "output/estimate_text.h"
+#include "base/units.h"
 #include "output/impact_report.h"
 #include "base/json.h"
 #include "output/summary.h"
@@ -283,21 +284,10 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     return j.text;
 }
 
-static const char *force(char out[32], double newton)
-{
-    const double size = fabs(newton);
-    if (size >= 1e6) snprintf(out, 32, "%#.4g MN", newton / 1e6);
-    else if (size >= 1e3) snprintf(out, 32, "%#.4g kN", newton / 1e3);
-    else snprintf(out, 32, "%#.4g N", newton);
-    return out;
-}
-
-const char *bt_force_text(char out[32], double newton) { return force(out, newton); }
-
 static void print_mean(const char *label, const bt_mean *m)
 {
     char a[32], b[32], d[32], e[32];
-    printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, force(a, m->mean), force(b, m->low), force(d, m->high), force(e, m->sd));
+    printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, bt_force_text(a, m->mean), bt_force_text(b, m->low), bt_force_text(d, m->high), bt_force_text(e, m->sd));
 }
 
 static void print_forces(const bt_summary *s, const bt_case *c)
@@ -316,23 +306,23 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     print_mean("  ice resistance", &s->ice);
     printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to use\n");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
-    printf("    quarters          %s,", force(a, quarter[0]));
-    printf(" %s, %s, %s\n", force(a, quarter[1]), force(b, quarter[2]), force(d, quarter[3]));
-    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", force(a, s->p95), force(b, s->p99), force(d, s->peak));
-    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", force(a, s->balance),
-           force(b, s->budget.mean));
+    printf("    quarters          %s,", bt_force_text(a, quarter[0]));
+    printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
+    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95), bt_force_text(b, s->p99), bt_force_text(d, s->peak));
+    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", bt_force_text(a, s->balance),
+           bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
-    printf("    drag              %s\n", force(a, s->drag.mean));
+    printf("    drag              %s\n", bt_force_text(a, s->drag.mean));
     for (int k = 0; k < N_OF_THE_LINE; k++) {
         const bt_reported *r = &w->series[of_the_line[k].series];
         if (!r->present) continue;
         print_mean(of_the_line[k].label, &r->mean);
-        printf("      peak            %s in the window", force(a, r->peak));
-        if (isfinite(r->start_peak)) printf(", %s in the start before it", force(b, r->start_peak));
+        printf("      peak            %s in the window", bt_force_text(a, r->peak));
+        if (isfinite(r->start_peak)) printf(", %s in the start before it", bt_force_text(b, r->start_peak));
         printf("\n");
     }
     if (!isnan(c->reference.mean_force))
-        printf("  measured            %s (%s): computed / measured = %.3g\n", force(a, c->reference.mean_force),
+        printf("  measured            %s (%s): computed / measured = %.3g\n", bt_force_text(a, c->reference.mean_force),
                c->reference.source ? c->reference.source : "no source given", s->reference_ratio);
 }
 

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 
+#include "case/case_derived.h"
 #include "force/environment.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
@@ -28,7 +29,7 @@ typedef struct {
 
 static drivers drivers_of(const bt_case *c)
 {
-    const double water = bt_environment_fastest(c, true), air = bt_environment_fastest(c, false);
+    const double water = bt_case_fastest_flow(c, true), air = bt_case_fastest_flow(c, false);
     const bool circles = c->water.tilt == BT_TILT_GEOSTROPHIC || c->water.tilt == BT_TILT_DYNAMIC;
     double prescribed = bt_max(bt_case_reference_speed(c), bt_max(c->domain.ends_closing, c->domain.sides_closing));
     if (c->tow.mode != BT_TOW_NONE) prescribed = bt_max(prescribed, c->tow.speed);

@@ -239,7 +239,7 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double fr
 {
     const bt_bodies *bd = &w->bodies;
     double d[2];
-    bt_world_offset(w, a, b, d);
+    bt_bodies_offset(w, a, b, d);
     d[0] -= from[0], d[1] -= from[1];
     const int64_t na = bd->offset[a + 1] - bd->offset[a], nb = bd->offset[b + 1] - bd->offset[b];
     for (int64_t k = 0; k <= na + nb; k++) {
@@ -389,7 +389,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     bt_world *w = bt_world_create(&p);
     w->environment = bt_environment_create(c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
-    bt_world_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
+    bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
     *r = (bt_roster){.n_floes = f->n + c->n_floes, .mean_size = size};
     r->thickness = bt_alloc((size_t)r->n_floes + 5, sizeof *r->thickness);

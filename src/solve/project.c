@@ -140,5 +140,5 @@ void bt_solver_project(bt_world *w)
     else bt_rounds_run(w, &p, &work);
     st->position_sweeps = work.sweeps;
     st->projected = work.residual <= p.tolerance;
-    bt_domain_settle(w);
+    bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
 }

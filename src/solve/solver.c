@@ -286,7 +286,7 @@ static void sweep_to_tolerance(bt_world *w)
     st->residual_rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
     st->converged = work.residual <= p.tolerance;
     bt_phases_any_order(w, store, NULL, &(bt_totals){0});
-    bt_domain_settle(w);
+    bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);
 }
 
 void bt_solver_solve(bt_world *w)

@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/contacts.h"
+#include "body/bodies.h"
 
 enum { X, Y, LOW_X, LOW_Y, HIGH_X, HIGH_Y, N_BOX };
 

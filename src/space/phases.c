@@ -7,9 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "space/tiles.h"
+#include "space/exchange.h"
 #include "tow/tow.h"
-#include "partition/domain.h"
 
 void bt_totals_merge(bt_totals *into, const bt_totals *from)
 {
@@ -64,7 +63,7 @@ void bt_phases_deal(bt_world *w)
 static int stretch_of(const bt_world *w, bt_idx k)
 {
     const bt_tile *tile = &w->tiles->tile[k];
-    return 2 * tile->phase + !(w->domain && tile->border);
+    return 2 * tile->phase + !(w->exchange && tile->border);
 }
 
 void bt_phases_order(bt_world *w)
@@ -124,7 +123,7 @@ static void visit_stretch(pass *o, int stretch)
 static void run_phases(pass *o, bt_vel *exchanged)
 {
     bt_world *w = o->w;
-    const bool among = w->domain != NULL;
+    const bool among = w->exchange != NULL;
     const bt_tiles *t = w->tiles;
     for (int p = 0; p < BT_PHASES; p++) {
         if (among) {
@@ -132,14 +131,14 @@ static void run_phases(pass *o, bt_vel *exchanged)
 #pragma omp barrier
             if (exchanged) {
 #pragma omp master
-                bt_domain_send(w, p, exchanged);
+                w->exchange->send(w, p, exchanged);
             }
         }
         if (t->start[p] + t->n_border[p] < t->start[p + 1]) visit_stretch(o, 2 * p + 1);
         else if (!among) continue; // nobody was here
         if (among && exchanged) {
 #pragma omp master
-            bt_domain_receive(w, p, exchanged);
+            w->exchange->receive(w, p, exchanged);
         }
 #pragma omp barrier
     }

@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/contacts.h"
+#include "body/bodies.h"
 #include "contact/crush.h"
-#include "partition/domain.h"
+#include "space/exchange.h"
 
 #define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
 
@@ -165,7 +165,7 @@ static void choose(bt_world *w, double margin)
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_DYNAMIC) most[5] = bt_max(most[5], b->mass[i]);
         most[6] = bt_max(most[6], b->restitution[i]);
-        most[7] = bt_max(most[7], bt_contacts_speed(w, i, &b->vel[i]));
+        most[7] = bt_max(most[7], bt_bodies_speed(w, i, &b->vel[i]));
         if (b->large[i] || !isfinite(b->pose[i].x + b->pose[i].y)) continue;
         most[0] = bt_max(most[0], -b->pose[i].x);
         most[1] = bt_max(most[1], -b->pose[i].y);
@@ -173,11 +173,11 @@ static void choose(bt_world *w, double margin)
         most[3] = bt_max(most[3], b->pose[i].y);
         most[4] = bt_max(most[4], b->radius[i]);
     }
-    bt_domain_maxima(w, most, 8);
+    if (w->exchange) w->exchange->maxima(w, most, 8);
     t->reach = most[4];
     t->heaviest = most[5];
     t->rebounds = most[6] > 0;
-    t->margin_max = bt_max(2 * bt_max(margin, bt_contacts_margin(w, most[7])), 0.25 * w->par.size);
+    t->margin_max = bt_max(2 * bt_max(margin, bt_margin_for(w, most[7])), 0.25 * w->par.size);
     const bool any = most[0] + most[2] >= 0;
     t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
     t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
@@ -316,7 +316,7 @@ static void make_tiles(bt_world *w)
             const int32_t tx = x + t->low_x, ty = y + t->low_y;
             const bt_idx first = i;
             while (i < t->n_tiled && b->tile[i][0] == tx && b->tile[i][1] == ty) i++;
-            const bool own = bt_domain_owns_tile(w, tx, ty);
+            const bool own = !w->exchange || w->exchange->owns_tile(w, tx, ty);
             t->at[(int64_t)y * t->n_x + x] = own || i > first ? t->n : -1;
             if (!own && i == first) continue;
             bt_tile *tile = new_tile(t, tx, ty);
@@ -335,7 +335,7 @@ static void make_tiles(bt_world *w)
     large->first = t->n_tiled;
     large->end = b->n;
     large->phase = BT_COLOURS;
-    large->own = bt_domain_owns_large(w);
+    large->own = !w->exchange || w->exchange->owns_large(w);
     const size_t n = (size_t)t->n;
     t->speed = bt_realloc(t->speed, n, sizeof *t->speed);
     t->bound = bt_realloc(t->bound, n, sizeof *t->bound);
@@ -450,11 +450,11 @@ static void place(bt_world *w, bt_trace *trace, int64_t n)
     bt_tiles *t = w->tiles;
     for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
     t->n = 0;
-    trace = bt_domain_migrate(w, trace, &n);
+    if (w->exchange) trace = w->exchange->migrate(w, trace, &n);
     sort_bodies(w);
     make_tiles(w);
     bt_tiles_put_traces(w, trace, n);
-    bt_domain_connect(w);
+    if (w->exchange) w->exchange->connect(w);
     free(trace);
     t->labelled = true;
 }
@@ -483,7 +483,7 @@ void bt_tiles_begin(bt_world *w)
     if (!t->labelled || t->relabel) {
         if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
         deal(w, true, w->par.slop);
-    } else if (bt_domain_due(w)) {
+    } else if (w->exchange && w->exchange->due(w)) {
         deal(w, false, 0);
     }
     t->calm = bt_tiles_calm(w);

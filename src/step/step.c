@@ -50,7 +50,7 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     }
     if (turn != 0) {
         p->yaw += turn;
-        bt_world_turn_outline(w, i);
+        bt_bodies_turn(&w->bodies, i);
     }
     if (w->tow && i >= w->tiles->n_tiled && i == bt_world_towed(w)) {
         w->tow->travel_x += dx;
@@ -199,7 +199,7 @@ static void solve_contacts(bt_world *w)
     bt_bodies *b = &w->bodies;
     double t0 = bt_clock();
     double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
-    if (bt_tiles_update(w, bt_contacts_margin(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+    if (bt_tiles_update(w, bt_margin_for(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     int64_t sweeps = 0, updates = 0, moves = 0;
     bool again = false;
     st->repeats = 0;
@@ -216,7 +216,7 @@ static void solve_contacts(bt_world *w)
         done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
         if (!done) {
             st->repeats++;
-            again = !bt_tiles_update(w, bt_contacts_margin(w, fastest));
+            again = !bt_tiles_update(w, bt_margin_for(w, fastest));
             if (!again) {
                 bt_contacts_bound(w, b->vel_start, b->vel_free, false);
                 bt_contacts_bound(w, b->vel, b->vel, true);

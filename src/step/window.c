@@ -15,7 +15,7 @@
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
-#include "field/field_make.h"
+#include "geometry/apart.h"
 
 #define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
 #define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
@@ -274,7 +274,7 @@ static void put(bt_world *w, bt_idx i)
     h->lap = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = v->vel;
     b->stirred[i] = 1;
-    bt_world_turn_outline(w, i);
+    bt_bodies_turn(&w->bodies, i);
 }
 
 /// Every rank adds in the order of ids, all floes, held here or not: the sums are the same everywhere.

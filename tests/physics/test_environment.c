@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+#include "case/case_derived.h"
 #include "force/environment.h"
 #include "base/table.h"
 
@@ -40,7 +41,7 @@ static void ellipse_by_hand(void **state)
         CHECK_CLOSE(v[0], 0.1 + want[k % 4][0], 1e-12);
         CHECK_CLOSE(v[1], -0.05 + want[k % 4][1], 1e-12);
     }
-    CHECK_CLOSE(bt_environment_fastest(&c, true), hypot(0.1, 0.05) + 0.5, 1e-15);
+    CHECK_CLOSE(bt_case_fastest_flow(&c, true), hypot(0.1, 0.05) + 0.5, 1e-15);
     // The mean: of whole periods the constant part; of the half in which the current goes along the axis 2/π of the largest more.
     double mean[2];
     c.run.duration = 24 * hour;

@@ -198,7 +198,7 @@ static void detect_equals_brute_force_with_parts(void **state)
         d.x = d.y = 0.5 * box;
         bt_world_add(w, &d);
         for (int step = 0; step < 25; step++) {
-            const double margin = bt_contacts_margin(w, 0.5 / w->par.dt * (step % 10 < 5 ? 0.05 : 0.12));
+            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 10 < 5 ? 0.05 : 0.12));
             // Which of two facing edges is the reference depends on the step before, within the tie: without it both must find the same.
             for (bt_idx k = 0; k < w->tiles->n; k++)
                 for (bt_idx j = 0; j < w->tiles->tile[k].n_pairs; j++) w->tiles->tile[k].pairs[j].n_points = 0;
@@ -229,7 +229,7 @@ static void detect_equals_brute_force_with_parts(void **state)
             for (bt_idx i = 0; i < b->n; i++) {
                 const double dx = 0.06 * (scene_uniform(&rng) - 0.5), dy = 0.06 * (scene_uniform(&rng) - 0.5), dr = 0.06 * (scene_uniform(&rng) - 0.5);
                 b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
-                bt_world_turn_outline(w, i);
+                bt_bodies_turn(&w->bodies, i);
                 b->path[i] += hypot(dx, dy) + b->radius[i] * fabs(dr);
             }
             for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->moved[k] += 0.14;

@@ -138,7 +138,7 @@ static void bridle_shares_the_load(void **state)
     t->carriage_x = 0.2 + sqrt(l * l - 0.36);
     bt_idx i = bt_world_towed(w);
     w->bodies.pose[i].yaw = 0.2;
-    bt_world_turn_outline(w, i);
+    bt_bodies_turn(&w->bodies, i);
     for (int s = 0; s < 20000; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);

@@ -68,7 +68,7 @@ static void move_all(bt_world *w, uint64_t *rng, double step)
         b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
         if (w->par.period_x > 0) b->pose[i].x -= w->par.period_x * floor(b->pose[i].x / w->par.period_x);
         if (w->par.period_y > 0) b->pose[i].y -= w->par.period_y * floor(b->pose[i].y / w->par.period_y);
-        bt_world_turn_outline(w, i);
+        bt_bodies_turn(&w->bodies, i);
         b->path[i] += hypot(dx, dy) + b->radius[i] * fabs(dr);
     }
 }
@@ -125,7 +125,7 @@ static void detect_equals_brute_force(void **state)
         const double box = scene % 2 ? 12 : 25;
         bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
         for (int step = 0; step < 60; step++) {
-            const double margin = bt_contacts_margin(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12)); // it comes and goes
+            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12)); // it comes and goes
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, m;
@@ -157,7 +157,7 @@ static void gaps_are_distances(void **state)
     int seen = 0, corners = 0;
     for (int scene = 0; scene < 10; scene++) {
         bt_world *w = random_scene(&rng, 120, scene % 2, 25);
-        const double margin = bt_contacts_margin(w, 0.5 / w->par.dt * 0.6);
+        const double margin = bt_margin_for(w, 0.5 / w->par.dt * 0.6);
         bt_contacts_detect_all(w, margin);
         bt_idx k = 0, n;
         contact *c = contacts_of(w, &n);
@@ -166,7 +166,7 @@ static void gaps_are_distances(void **state)
                 const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
                 if (w->bodies.motion[i] != BT_DYNAMIC && w->bodies.motion[j] != BT_DYNAMIC) continue;
                 double p[2 * BT_MAX_VERTICES], q[2 * BT_MAX_VERTICES], d[2];
-                bt_world_offset(w, i, j, d);
+                bt_bodies_offset(w, i, j, d);
                 int np = world_polygon(w, i, 0, 0, p);
                 int nq = world_polygon(w, j, w->bodies.pose[i].x + d[0] - w->bodies.pose[j].x,
                                        w->bodies.pose[i].y + d[1] - w->bodies.pose[j].y, q);
@@ -205,7 +205,7 @@ static void arms_meet(void **state)
     for (bt_idx k = 0; k < n; k++) {
         const bt_manifold *m = &man[k];
         double d[2];
-        bt_world_offset(w, m->a, m->b, d);
+        bt_bodies_offset(w, m->a, m->b, d);
         CHECK_CLOSE(hypot(m->nx, m->ny), 1, 1e-12);
         assert_true(m->n_points >= 1 && m->n_points <= 2);
         for (int i = 0; i < m->n_points; i++) {
@@ -268,7 +268,7 @@ static void edge_contact_keeps_its_features(void **state)
         pair->lt = 7 + s;
         w->bodies.pose[1].y += 0.002;
         w->bodies.pose[1].yaw = 2e-4 * (s % 2 ? 1 : -1); // the two edges take turns in being the better axis
-        bt_world_turn_outline(w, 1);
+        bt_bodies_turn(&w->bodies, 1);
         w->bodies.path[1] += 0.01;
         note_moves(w, 0.01);
     }

@@ -6,7 +6,7 @@
 // dropped; rows of a file not checked when it is taken up.
 #include "made_up_run.h"
 
-#include "loads/impact_count.h"
+#include "output/impact_count.h"
 #include "loads/panel_blocks.h"
 #include "base/snapshot.h"
 

@@ -49,7 +49,7 @@ static void move(bt_world *w, bt_gid g, double dx, double dy, double yaw)
     p->x += dx, p->y += dy, p->yaw += yaw;
     if (p->x < 0) p->x += LENGTH, w->bodies.home[i].lap--;
     if (p->x >= LENGTH) p->x -= LENGTH, w->bodies.home[i].lap++;
-    bt_world_turn_outline(w, i);
+    bt_bodies_turn(&w->bodies, i);
     w->bodies.stirred[i] = 1;
     w->tiles->labelled = false;
 }

@@ -212,7 +212,7 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
                       double *gap_out, int32_t *axis_out)
 {
     double d[2];
-    bt_world_offset(w, a, b, d);
+    bt_bodies_offset(w, a, b, d);
     const polygon pa = polygon_of(&w->bodies, a, 0, 0, 0), pb = polygon_of(&w->bodies, b, 0, d[0], d[1]);
 
     // Two edges that face each other squarely have nearly the same separation: keep the reference of the step
@@ -412,7 +412,7 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
 {
     if (part[0] == 0 && part[1] == 0) return bt_contacts_pair(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
-    bt_world_offset(w, ia, ib, d);
+    bt_bodies_offset(w, ia, ib, d);
     const part_of_body a = part_of(&w->bodies, ia, part[0], 0, 0), b = part_of(&w->bodies, ib, part[1], d[0], d[1]);
     const double tie = 0.01 * bt_min(w->bodies.radius[ia], w->bodies.radius[ib]);
     // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the last axis first.

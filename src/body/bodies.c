@@ -1,32 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Storage of the bodies: creation, growth, outlines, hash.
-#include "bergtow/world.h"
+// Storage of the bodies: growth, outlines and parts of a new one.
+#include "body/bodies.h"
 
 #include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include "contact/contacts.h"
-#include "contact/crush.h"
-#include "loads/impact.h"
-#include "force/environment.h"
-#include "solve/solver.h"
-#include "space/tiles.h"
-#include "tow/tow.h"
-#include "step/window.h"
-#include "partition/domain.h"
-
-bt_world *bt_world_create(const bt_params *p)
-{
-    bt_world *w = bt_alloc(1, sizeof *w);
-    w->par = *p;
-    w->towed = -1;
-    w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
-    w->tiles = bt_tiles_create();
-    w->solver = bt_solver_create();
-    return w;
-}
 
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
@@ -41,26 +20,15 @@ const bt_body_field bt_vertex_fields[] = {
 };
 const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_fields;
 
-void bt_world_free(bt_world *w)
+void bt_bodies_free(bt_bodies *b)
 {
-    if (!w) return;
-    bt_bodies *b = &w->bodies;
     for (int k = 0; k < bt_n_body_fields; k++) free(*(void **)((char *)b + bt_body_fields[k].array));
     for (int k = 0; k < bt_n_vertex_fields; k++) free(*(void **)((char *)b + bt_vertex_fields[k].array));
     free(b->offset);
     free(b->index_of);
-    bt_tiles_free(w->tiles);
-    bt_solver_free(w->solver);
-    bt_domain_free(w->domain);
-    bt_impacts_free(w->impacts);
-    bt_environment_free(w->environment);
-    bt_tow_free(w->tow);
-    bt_events_free(&w->events);
-    free(w->window);
-    free(w);
 }
 
-void bt_world_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
+void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices)
 {
     if (n > b->cap) {
         const bt_idx cap = b->cap == 0 ? n : n > b->cap + b->cap / 4 ? n : b->cap + b->cap / 4;
@@ -136,15 +104,14 @@ static void add_polygons(bt_bodies *b, bt_idx i, const bt_body_def *d)
     }
 }
 
-bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
+bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 {
-    bt_bodies *b = &w->bodies;
     assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
     assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
     assert(b->n == b->n_global); // bodies are added before they are dealt to ranks
     int64_t first = b->offset[b->n];
     const int n_vertices = d->n_vertices + (d->parts ? d->parts->n_vertices : 0);
-    bt_world_reserve(b, b->n + 1, first + n_vertices);
+    bt_bodies_reserve(b, b->n + 1, first + n_vertices);
     const bt_idx i = b->n++;
     if ((b->n_global & (b->n_global - 1)) == 0) // a power of two: room for twice as many
         b->index_of = bt_realloc(b->index_of, 2 * (size_t)b->n_global + 2, sizeof *b->index_of);
@@ -172,14 +139,12 @@ bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
     b->stirred[i] = 1;
     b->tile[i][0] = b->tile[i][1] = 0;
     b->home[i] = (bt_home){0};
-    bt_world_turn_outline(w, i);
-    w->tiles->labelled = false;
+    bt_bodies_turn(b, i);
     return b->gid[i];
 }
 
-void bt_world_turn_outline(bt_world *w, bt_idx i)
+void bt_bodies_turn(bt_bodies *b, bt_idx i)
 {
-    bt_bodies *b = &w->bodies;
     bt_pose *p = &b->pose[i];
     p->c = cos(p->yaw);
     p->s = sin(p->yaw);
@@ -190,47 +155,8 @@ void bt_world_turn_outline(bt_world *w, bt_idx i)
     }
 }
 
-/// Mix of a 64-bit word: the finaliser of SplitMix64 (Steele, Lea & Flood 2014).
-static uint64_t mix(uint64_t z)
+double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v)
 {
-    z += 0x9e3779b97f4a7c15u;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-}
-
-static uint64_t mix_double(uint64_t h, double x)
-{
-    uint64_t u;
-    x += 0.0; // −0 and +0 are the same state
-    memcpy(&u, &x, sizeof u);
-    return mix(h ^ u);
-}
-
-static uint64_t hash_scar(const bt_scar *s)
-{
-    uint64_t h = mix(mix(mix((uint64_t)s->a) ^ (uint64_t)s->b) ^ ((uint64_t)s->part[0] << 16 | s->part[1]));
-    for (int i = 0; i < s->n; i++) h = mix_double(mix(h ^ s->feature[i]), s->depth[i]);
-    return h;
-}
-
-uint64_t bt_world_hash(const bt_world *w)
-{
-    // The sum over bodies is associative: any order, any distribution.
-    const bt_bodies *b = &w->bodies;
-    uint64_t sum = 0;
-    for (bt_idx i = 0; i < b->n; i++) {
-        if (!bt_domain_owns(w, i)) continue;
-        uint64_t h = mix((uint64_t)b->gid[i]);
-        const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
-        for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
-        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
-        sum += h;
-    }
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_scars; i++) sum += hash_scar(&w->tiles->tile[k].scars[i]);
-    sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
-    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
-    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
-    return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
+    const double x = v->x - w->par.water_u, y = v->y - w->par.water_v;
+    return sqrt(x * x + y * y) + w->bodies.radius[i] * fabs(v->w);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Collisions in the window of a run and before it: numbers, the largest, the largest peaks; see impact_count.h.
-#include "loads/impact_count.h"
+#include "output/impact_count.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -9,7 +9,7 @@
 #define BT_IMPACT_COUNT_H
 
 #include "loads/impact.h"
-#include "base/history.h"
+#include "output/history.h"
 #include "output/steady.h"
 
 enum { BT_IMPACT_PEAKS = 10000 }; ///< the largest peaks kept for the exceedance table

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What the readers of ice fields share: which outlines get in, and whether they lie where they can.
-#ifndef BT_FIELD_LOAD_H
-#define BT_FIELD_LOAD_H
+#ifndef BT_FIELD_ADMIT_H
+#define BT_FIELD_ADMIT_H
 
 #include "bergtow/field.h"
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The estimates of a case as JSON and as a table.
-#include "estimate/estimate_text.h"
+#include "output/estimate_text.h"
+#include "base/units.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -5,7 +5,7 @@
 // differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it stops a floe that slides, and with friction the
 // sweeps find no solution at all (seen: a hexagon in two parts, 20,000 sweeps, 18 J gained). Normals farther apart than those of edges that face
 // each other squarely (manifold.c) belong to different shores, as in a notch, and stay.
-#include "geometry/merge.h"
+#include "contact/merge.h"
 
 #include <math.h>
 

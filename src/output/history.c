@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Columns and running totals of the steps of a run; what is made of them: steady.h, summary.h.
-#include "base/history.h"
+#include "output/history.h"
+#include "case/cost.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -9,6 +10,8 @@
 #define WORK_ROUNDING 1e-10
 
 #define COLUMN(column, name, member) [column] = {"history/" name, offsetof(bt_sample, member)}
+_Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
+
 const bt_column_def bt_history_columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_TIME, "time", time),
     COLUMN(BT_COL_ICE, "ice", ice_resistance),

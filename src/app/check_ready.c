@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// What the check of a case and that of a study share: refusals, warnings and the ice that a run would begin with.
+#include "app/cmd_check.h"
+
+#include <math.h>
+
+#include "bergtow/comm.h"
+#include "bergtow/setup.h"
+#include "bergtow/world.h"
+#include "case/arch.h"
+#include "case/case_check.h"
+#include "case/cost.h"
+#include "estimate/packing.h"
+
+static bt_check_ice ice_of_case(const bt_case *c)
+{
+    bt_check_ice n = {.count = bt_case_expected_floes(c) + c->n_floes, .size = c->ice.size, .thickness = c->ice.thickness, .concentration = c->ice.concentration};
+    if (c->ice.size_law == BT_SIZE_POWER) {
+        double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
+        n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) / ((pow(lo, -a) - pow(hi, -a)) / a);
+    }
+    return n;
+}
+
+static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)
+{
+    bt_check_ice n = {.count = f->n + c->n_floes, .concentration = f->concentration};
+    for (bt_idx i = 0; i < f->n; i++) {
+        n.size += sqrt(4 * f->area[i] / BT_PI) / f->n;
+        n.thickness += f->thickness[i] / f->n;
+    }
+    return n;
+}
+
+bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f)
+{
+    bt_check_ice n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
+    n.corners = bt_cost_corners(c, f, n.count);
+    return n;
+}
+
+bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
+{
+    bt_check_step s = {.longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5, .pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size};
+    s.size = s.pieces ? c->lead.floe_size : n->size;
+    s.passed = n->count < 1 ? 0 : c->run.dt * bt_case_reference_speed(c) / s.size;
+    s.contact = c->run.dt <= s.longest;
+    s.floes = s.passed <= 0.1;
+    return s;
+}
+
+double bt_check_seconds(const bt_case *c, const bt_check_ice *n) { return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration); }
+
+// --- refusals and warnings -------------------------------------------------------------------------------------------
+
+static bool reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
+
+/// Bodies, walls and floes that are known, as the run sets them up.
+static bt_status try_setup(const bt_case *c, const bt_field *f, bt_errors *err)
+{
+    bt_world *w = NULL;
+    bt_roster r = {0};
+    const bt_status status = bt_setup_world(c, f, &w, &r, err);
+    bt_roster_free(&r);
+    bt_world_free(w);
+    return status;
+}
+
+bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run, bt_lead_stats *lead, bt_errors *err)
+{
+    const double machine = bt_cost_machine();
+    bt_status status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, machine, err);
+    if (status == BT_OK && reads_field(c)) status = bt_field_load(c, f, err);
+    if (status == BT_OK && reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
+    if (status != BT_OK) return status;
+    *n = *run = bt_check_ice_of(c, f);
+    if (reads_field(c) && c->lead.mode != BT_LEAD_NONE) {
+        status = bt_lead_open(c, f, lead, err);
+        if (status == BT_OK) *run = bt_check_ice_of(c, f);
+    }
+    return status == BT_OK ? try_setup(c, f, err) : status;
+}
+
+static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+{
+    const bt_check_step s = bt_check_step_of(c, n);
+    if (!s.contact)
+        bt_errors_add(warnings, "run.dt: %g s is longer than a collision lasts %s; take at most %g s", c->run.dt, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", s.longest);
+    if (!s.floes)
+        bt_errors_add(warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s", c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed,
+                      0.1 * s.size / bt_case_reference_speed(c));
+}
+
+void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)
+{
+    const bt_arch arch = bt_arch_of(c, n->concentration, n->count < 1 ? 0 : n->size);
+    bt_arch_warn(&arch, warnings);
+    const bt_packing packing = bt_packing_of(c, n->concentration);
+    bt_packing_warn(&packing, c->run.duration, warnings);
+    warn_of_step(c, n, warnings);
+    bt_case_warn_start(c, warnings);
+}

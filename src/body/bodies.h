@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT
+// The arrays of bodies (bergtow/world.h): storage, outlines, kinematics. Knows nothing of cells, contacts or ranks.
+#ifndef BERGTOW_BODIES_H
+#define BERGTOW_BODIES_H
+
+#include "bergtow/world.h"
+
+/// Arrays over the bodies, one row an array: what sorting, migration and storage of bodies go through.
+typedef struct bt_body_field {
+    size_t array; ///< offset of the pointer in bt_bodies
+    size_t size;  ///< bytes a body
+} bt_body_field;
+extern const bt_body_field bt_body_fields[];
+extern const int bt_n_body_fields;
+
+/// Arrays over the vertices of the bodies; size: bytes a vertex.
+extern const bt_body_field bt_vertex_fields[];
+extern const int bt_n_vertex_fields;
+
+/// Room for n bodies and n_vertices vertices.
+void bt_bodies_reserve(bt_bodies *b, bt_idx n, int64_t n_vertices);
+void bt_bodies_free(bt_bodies *b);
+
+/// Add a body (bt_world_add); returns its gid.
+bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d);
+
+/// Outline of body i turned by its yaw (after a change of pose).
+void bt_bodies_turn(bt_bodies *b, bt_idx i);
+
+/// Speed of the fastest point of body i at velocity v through the water's frame, m/s.
+double bt_bodies_speed(const bt_world *w, bt_idx i, const bt_vel *v);
+
+static inline double bt_nearest_image(double d, double period)
+{
+    if (period > 0) {
+        if (d > 0.5 * period) d -= period;
+        else if (d < -0.5 * period) d += period;
+    }
+    return d;
+}
+
+/// Vector from the centroid of a to that of b, the nearest image in periodic directions.
+static inline void bt_bodies_offset(const bt_world *w, bt_idx a, bt_idx b, double d[2])
+{
+    const bt_pose *pa = &w->bodies.pose[a], *pb = &w->bodies.pose[b];
+    d[0] = bt_nearest_image(pb->x - pa->x, w->par.period_x);
+    d[1] = bt_nearest_image(pb->y - pa->y, w->par.period_y);
+}
+
+#endif

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// Numbers that follow from a case; see case_derived.h and bergtow/case.h.
+#include "case/case_derived.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/table.h"
+#include "bergtow/shape.h"
+
+static const char *const shape_names[] = {BT_SHAPE_NAMES};
+
+int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v, const char **why)
+{
+    if (shape == BT_BODY_ABSENT) return 0;
+    if (shape != BT_BODY_POLYGON) n = bt_shape_named(shape_names[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
+    else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
+    else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
+    const char *reason = bt_shape_fault(n, v);
+    if (why) *why = reason;
+    if (reason) return 0;
+    bt_shape_centre(n, v);
+    return n;
+}
+
+int bt_case_waterline(const bt_case *c, double *v)
+{
+    return bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, NULL);
+}
+
+int bt_case_floe_outline(const bt_floe_def *f, double *v)
+{
+    return bt_case_outline(f->shape, f->length, f->width, f->n_vertices, f->vertices, v, NULL);
+}
+
+// Mean square diameter of the floes. For a power law N(>d) ~ d^−a on [lo, hi] the density is ∝ d^(−a−1), so
+// <d²> = ∫ d^(1−a) / ∫ d^(−a−1).
+static double mean_square_size(const bt_case *c)
+{
+    double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
+    if (c->ice.size_law != BT_SIZE_POWER) return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
+    double top = fabs(a - 2) < 1e-9 ? log(hi / lo) : (pow(hi, 2 - a) - pow(lo, 2 - a)) / (2 - a);
+    return top / ((pow(lo, -a) - pow(hi, -a)) / a);
+}
+
+double bt_case_expected_floes(const bt_case *c)
+{
+    if (c->ice.field || c->ice.outlines) return 0;
+    double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
+    double v[2 * BT_MAX_VERTICES];
+    int n = bt_case_waterline(c, v);
+    bool inside = c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
+    if (n && inside) area -= bt_shape_moments(n, v).area;
+    return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
+}
+
+int64_t bt_case_steps(const bt_case *c)
+{
+    double steps = ceil(c->run.duration / c->run.dt * (1 - 1e-12));
+    return steps < 0x1p62 ? (int64_t)steps : INT64_MAX; // a refused case can ask for more than fits
+}
+
+double bt_case_earliest_window(const bt_case *c)
+{
+    if (c->output.window_start >= 0) return c->output.window_start;
+    return c->tow.mode == BT_TOW_NONE ? 0 : c->tow.ramp;
+}
+
+double bt_case_body_mass(const bt_case *c)
+{
+    double v[2 * BT_MAX_VERTICES];
+    int n = bt_case_waterline(c, v);
+    if (!n) return 0;
+    if (c->body.mass > 0) return c->body.mass;
+    return c->body.density * bt_shape_moments(n, v).area * (c->body.draft + c->body.sail);
+}
+
+double bt_case_reference_speed(const bt_case *c)
+{
+    if (c->solver.reference_speed > 0) return c->solver.reference_speed;
+    if (c->tow.mode != BT_TOW_NONE && c->tow.speed > 0) return c->tow.speed;
+    double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
+    u = bt_max(u, bt_case_fastest_flow(c, true));
+    // A velocity that is not given is that of free drift.
+    if (!isnan(c->body.vx)) u = bt_max(u, hypot(c->body.vx, c->body.vy));
+    for (bt_idx i = 0; i < c->n_floes; i++)
+        if (!isnan(c->floes[i].vx)) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
+    // Free drift of ice is about 2 % of the wind (Nansen's rule).
+    u = bt_max(u, 0.02 * bt_case_fastest_flow(c, false));
+    return u > 0 ? u : 0.1;
+}
+
+double bt_case_fastest_flow(const bt_case *c, bool water)
+{
+    const bt_table *t = water ? &c->water.table : &c->air.table;
+    if (t->n > 0) return bt_table_fastest(t);
+    if (!water) return hypot(c->air.wind_x, c->air.wind_y);
+    return hypot(c->water.current_x, c->water.current_y) + bt_max(c->water.tide.major, fabs(c->water.tide.minor));
+}

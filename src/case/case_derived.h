@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+// Numbers that follow from a case whose keys have their values; more of them are in bergtow/case.h.
+#ifndef BERGTOW_CASE_DERIVED_H
+#define BERGTOW_CASE_DERIVED_H
+
+#include "bergtow/case.h"
+
+/// Corners v [n][2] of an outline with its centroid at the origin. Returns n; 0, and names the fault in *why (or NULL),
+/// when there is no such outline.
+int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
+                    const char **why);
+
+/// Floes that the ice region should hold: concentration × area / mean floe area. 0 without a generator.
+double bt_case_expected_floes(const bt_case *c);
+
+/// Largest speed that the current (or wind) of a case can have, m/s.
+double bt_case_fastest_flow(const bt_case *c, bool water);
+
+#endif

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// How a check of a case complains: where a key stands, whether it was given, whether it was refused already.
+#include "case/case_faults.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "case/schema.h"
+
+void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256])
+{
+    const char *path = c->path ? c->path : "case";
+    if (o && o->set && o->place) snprintf(out, 256, "%.120s%.130s", o->place, o->set);
+    else if (o && o->set) snprintf(out, 256, "--set %.240s", o->set);
+    else if (o && o->line > 0) snprintf(out, 256, "%.160s:%d: %s", path, o->line, key);
+    else snprintf(out, 256, "%.160s: %s", path, key);
+}
+
+static const bt_origin *origin(const bt_check *k, const char *key)
+{
+    return k->from ? &k->from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
+}
+
+bool bt_check_given(const bt_check *k, const char *key)
+{
+    const bt_origin *o = origin(k, key);
+    return o && (o->line > 0 || o->set);
+}
+
+bool bt_check_sound(const bt_check *k, const char *keys)
+{
+    while (k->from && *keys) {
+        char name[64];
+        size_t n = strcspn(keys, " ");
+        snprintf(name, sizeof name, "%.*s", (int)n, keys);
+        if (origin(k, name)->faulty) return false;
+        keys += n + strspn(keys + n, " ");
+    }
+    return true;
+}
+
+void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...)
+{
+    char where[256], why[512];
+    bt_case_locate(k->c, origin(k, key), key, where);
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(why, sizeof why, fmt, ap);
+    va_end(ap);
+    bt_errors_add(k->err, "%s: %s", where, why);
+}

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// How a check of a case complains.
+#ifndef BERGTOW_CASE_FAULTS_H
+#define BERGTOW_CASE_FAULTS_H
+
+#include "bergtow/case.h"
+
+/// Where the value of a key comes from, for messages and to leave out checks on values that were refused already.
+typedef struct bt_origin {
+    int line;        ///< in the case file; 0 = default or override
+    const char *set; ///< the override "key=value", or NULL
+    const char *place; ///< where that stands, "FILE:LINE: ", or NULL: in the command line
+    bool faulty;     ///< refused; the member holds the default
+} bt_origin;
+
+/// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated to the buffer.
+void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
+
+/// A check under way.
+typedef struct bt_check {
+    bt_case *c;
+    const bt_origin *from; ///< [bt_n_case_keys], or NULL
+    bt_errors *err;
+} bt_check;
+
+bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
+bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused
+void bt_check_fault(const bt_check *k, const char *key, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
+
+#endif

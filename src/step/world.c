@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// The world: who makes and frees all that a step works on, and the hash of its state.
+#include "bergtow/world.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "body/bodies.h"
+#include "contact/crush.h"
+#include "force/environment.h"
+#include "loads/impact.h"
+#include "partition/domain.h"
+#include "solve/solver.h"
+#include "space/tiles.h"
+#include "step/window.h"
+#include "tow/tow.h"
+
+bt_world *bt_world_create(const bt_params *p)
+{
+    bt_world *w = bt_alloc(1, sizeof *w);
+    w->par = *p;
+    w->towed = -1;
+    w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
+    w->tiles = bt_tiles_create();
+    w->solver = bt_solver_create();
+    return w;
+}
+
+void bt_world_free(bt_world *w)
+{
+    if (!w) return;
+    bt_bodies_free(&w->bodies);
+    bt_tiles_free(w->tiles);
+    bt_solver_free(w->solver);
+    bt_domain_free(w->domain);
+    bt_impacts_free(w->impacts);
+    bt_environment_free(w->environment);
+    bt_tow_free(w->tow);
+    bt_events_free(&w->events);
+    free(w->window);
+    free(w);
+}
+
+bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
+{
+    w->tiles->labelled = false;
+    return bt_bodies_add(&w->bodies, d);
+}
+
+/// Mix of a 64-bit word: the finaliser of SplitMix64 (Steele, Lea & Flood 2014).
+static uint64_t mix(uint64_t z)
+{
+    z += 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+static uint64_t mix_double(uint64_t h, double x)
+{
+    uint64_t u;
+    x += 0.0; // −0 and +0 are the same state
+    memcpy(&u, &x, sizeof u);
+    return mix(h ^ u);
+}
+
+static uint64_t hash_scar(const bt_scar *s)
+{
+    uint64_t h = mix(mix(mix((uint64_t)s->a) ^ (uint64_t)s->b) ^ ((uint64_t)s->part[0] << 16 | s->part[1]));
+    for (int i = 0; i < s->n; i++) h = mix_double(mix(h ^ s->feature[i]), s->depth[i]);
+    return h;
+}
+
+uint64_t bt_world_hash(const bt_world *w)
+{
+    // The sum over bodies is associative: any order, any distribution.
+    const bt_bodies *b = &w->bodies;
+    uint64_t sum = 0;
+    for (bt_idx i = 0; i < b->n; i++) {
+        if (!bt_domain_owns(w, i)) continue;
+        uint64_t h = mix((uint64_t)b->gid[i]);
+        const double state[] = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw, b->vel[i].x, b->vel[i].y, b->vel[i].w};
+        for (int k = 0; k < 6; k++) h = mix_double(h, state[k]);
+        if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
+        sum += h;
+    }
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_scars; i++) sum += hash_scar(&w->tiles->tile[k].scars[i]);
+    sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
+    if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
+    if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);
+    return w->tow ? mix(sum ^ bt_tow_hash(w->tow)) : sum;
+}

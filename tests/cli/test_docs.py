@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: MIT
+"""The documentation names what there is: links, files, names in the code, commands, keys, make targets; its example
+cases are valid."""
+import fnmatch
+import functools
+import json
+import re
+import shlex
+
+import pytest
+
+from harness import DONE, ROOT, call
+
+DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [*DOCS, *sorted((ROOT / "cases").glob("*/README.md"))]
+PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
+HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
+COMMANDS = {"run", "check", "field", "ensemble", "resume", "diff", "estimate"}
+MADE_BY_RUNS = {"bench.csv", "statistics.csv"}
+# Words with a dot that begin like a section of a case and are none of its keys: files, and members of Python objects.
+NO_KEYS = "h5 h c sh yml csv png md html json geojson py mp4 part resolved append summary units polygons".split()
+every_page = pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(ROOT)))
+every_doc = pytest.mark.parametrize("path", DOCS, ids=lambda path: str(path.relative_to(ROOT)))
+
+
+# --- the parts of a page ---------------------------------------------------------------------------------------------
+
+
+def without_fences(text):
+    return re.sub(r"^```.*?^```", "", text, flags=re.S | re.M)
+
+
+def blocks(text):
+    """Code blocks, fenced or indented, as (language, lines)."""
+    for m in re.finditer(r"^```(\w*)\n(.*?)^```", text, re.S | re.M):
+        yield m[1], m[2].splitlines()
+    for m in re.finditer(r"(?<=\n\n)((?: {4}.*\n|\n(?= {4}))+)", without_fences(text)):
+        yield "", [line[4:] for line in m[1].splitlines()]
+
+
+def commands(text):
+    """Lines of code blocks without their comments."""
+    return [re.sub(r"(^|\s)#\s.*", "", line) for _, lines in blocks(text) for line in lines]
+
+
+def calls(text):
+    """Each call of the program in a code block: the line, and its words after the program."""
+    for line in commands(text):
+        if m := re.search(r"(?:^|\s)(?:build/\w+/)?bergtow\s+(\S.*)", line):
+            yield line, shlex.split(re.sub(r"[|>].*", "", m[1]))
+
+
+def code(text):
+    """What stands as code, but for the example of an error message."""
+    text = re.sub(r".*: unknown key; did you mean .*", "", text)
+    return " ".join(re.findall(r"`([^`]+)`", without_fences(text))) + "\n" + "\n".join(commands(text))
+
+
+def anchor(heading):
+    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+
+
+# --- what there is ---------------------------------------------------------------------------------------------------
+
+
+@functools.cache
+def files():
+    found = (p for head in HEADS for p in (ROOT / head).rglob("*") if p.is_file())
+    return [p for p in found if "corpus" not in p.parts and "__pycache__" not in p.parts]
+
+
+@functools.cache
+def source():
+    return "\n".join(p.read_text() for p in files() if p.suffix in (".c", ".h"))
+
+
+@functools.cache
+def options(command):
+    done = call(command, "--help")
+    assert done.returncode == DONE, command
+    return set(re.findall(r"(?<![\w-])(--?[a-z][a-z-]*)", done.stdout))
+
+
+@functools.cache
+def keys():
+    return {k["name"] for k in json.loads(call("--list-keys", "--json").stdout)["keys"]}
+
+
+# --- tests -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_readme_is_a_page():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 100
+
+
+@every_page
+def test_lines_are_short(path):
+    """Tables excepted, whose rows cannot be broken."""
+    lines = enumerate(path.read_text().splitlines(), 1)
+    assert not [n for n, line in lines if len(line) > 120 and not line.startswith("|")]
+
+
+@every_page
+def test_links_lead_somewhere(path):
+    for target in re.findall(r"\]\(([^)\s]+)\)", path.read_text()):
+        if re.match(r"https?:", target):
+            continue
+        file, _, heading = target.partition("#")
+        there = (path.parent / file).resolve() if file else path
+        assert there.exists(), target
+        headings = re.findall(r"^#+ (.*)", without_fences(there.read_text()), re.M) if heading else []
+        assert not heading or heading in map(anchor, headings), target
+
+
+@every_page
+def test_files_named_exist(path):
+    """Paths from the root or from the page's own folder; sources named alone, somewhere. NAME stands for any."""
+    text = re.sub(r"<!--.*?-->", "", path.read_text(), flags=re.S)
+    own = [] if path in DOCS else [d.name for d in path.parent.iterdir() if d.is_dir()]
+    paths = re.findall(rf"(?<![\w/.-])((?:{'|'.join([*HEADS, *own])})/[\w./*-]*\w)", text)
+    assert paths or path not in DOCS
+    for file in paths:
+        assert "NAME" in file or (ROOT / file).exists() or (path.parent / file).exists(), file
+    names = {p.name for p in files()} | MADE_BY_RUNS
+    for file in re.findall(r"(?<![\w/.-])(\w+\.(?:c|h|py|sh|csv))\b(?!\()", text):
+        assert file in names, file
+
+
+def test_files_of_the_architecture_are_in_their_folders():
+    """Each `name` of the table of files is a file of that folder, or the beginning of some with *."""
+    page = (ROOT / "docs/architecture.md").read_text()
+    layers, table = re.search(r"^## Layers\n(.*?)^## Files, folder by folder\n(.*?)^## ", page, re.S | re.M).groups()
+    folders = {f"src/{d.name}" for d in (ROOT / "src").iterdir() if d.is_dir()} | {"partition/"}
+    row = r"^\| ((?:src|partition)/\w*) \| (.*) \|$"
+    assert folders == {m[0] for m in re.findall(row, layers, re.M)} == {m[0] for m in re.findall(row, table, re.M)}
+    for folder, text in re.findall(row, table, re.M):
+        there = [p.name for p in (ROOT / folder).iterdir()]
+        for part in re.findall(r"`([\w.*]+)`", text):
+            assert fnmatch.filter(there, part if "." in part else part + ".[ch]"), f"{folder}: {part}"
+
+
+@every_page
+def test_names_of_the_code_exist(path):
+    names = set(re.findall(r"\bbt_\w+", path.read_text()))
+    assert not [n for n in names if not re.search(rf"\b{n}\b", source())]
+
+
+@every_doc
+def test_functions_are_defined_where_the_page_says(path):
+    """Written "src/a/b.c `name`", or in a table as `name` | src/a/b.c."""
+    text = path.read_text()
+    said = [(name, file) for file, name in re.findall(r"((?:src|partition)/[\w/]+\.[ch]) `(\w+)`", text)]
+    for names, file in re.findall(r"^\| ((?:`\w+`(?:, )?)+) \| ((?:src|partition)/[\w/]+\.c) \|", text, re.M):
+        said += [(name, file) for name in re.findall(r"\w+", names)]
+    assert said or path.name != "architecture.md"
+    for name, file in said:
+        assert re.search(rf"^\w[\w *]*\b{name}\(", (ROOT / file).read_text(), re.M), f"{file}: {name}"
+
+
+@every_page
+def test_commands_and_options_are_known(path):
+    for line, words in calls(path.read_text()):
+        if words[0].startswith("--"):
+            assert set(words) <= {"--help", "--version", "--list-keys", "--json"}, line
+            continue
+        assert words[0] in COMMANDS, line
+        assert {w.split("=")[0] for w in words[1:] if re.match("-.", w)} <= options(words[0]), line
+        assert {b.split("=")[0] for a, b in zip(words, words[1:]) if a in ("--set", "-s")} <= keys(), line
+        assert all((ROOT / w).exists() for w in words if w.startswith("cases/")), line
+
+
+def test_the_manual_has_every_command_and_option():
+    """But for those that every program has; and the commands of this test are those of the program."""
+    text = (ROOT / "docs/manual.md").read_text()
+    assert set(re.findall(r"^  ([a-z]+)  ", call("--help").stdout, re.M)) == COMMANDS
+    assert {words[0] for _, words in calls(text)} >= COMMANDS
+    for command in sorted(COMMANDS):
+        for option in options(command) - {"--usage", "--output"}:
+            assert not option.startswith("--") or option in text, f"{command} {option}"
+
+
+@every_page
+def test_make_targets_are_known(path):
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.M))
+    for line in commands(path.read_text()):
+        for words in (part.split() for part in line.split("&&")):
+            if words[:1] == ["make"]:
+                asked = [w for w in words[1:] if re.fullmatch("[a-z-]+", w)]
+                # In tests/README.md a word of explanation follows the target.
+                assert set(asked[:1] if path.parent.name == "tests" else asked) <= targets, line
+
+
+@every_page
+def test_keys_named_exist(path):
+    sections = {k.split(".")[0] for k in keys()}
+    for word in re.findall(r"(?<![\w./-])([a-z]+(?:\.[a-z0-9_]+)+)\b(?!\()", code(path.read_text())):
+        if word.split(".")[0] in sections and word.split(".")[-1] not in NO_KEYS:
+            assert word in keys() or any(k.startswith(word + ".") for k in keys()), word
+
+
+@every_doc
+def test_examples_are_valid_cases(path, tmp_path):
+    examples = [lines for language, lines in blocks(path.read_text()) if language == "yaml"]
+    assert examples or path.name not in ("README.md", "manual.md")
+    for lines in examples:
+        case = tmp_path / "case.yml"
+        case.write_text("\n".join(lines) + "\n")
+        done = call("check", case)
+        assert done.returncode == DONE, done.stderr
+        assert "warning" not in done.stdout + done.stderr
