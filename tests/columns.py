@@ -42,7 +42,8 @@ def prose(lines):
         if code or line.lstrip().startswith("|"):
             continue
         bullet = ITEM.match(line)
-        item = bullet.end() if bullet else item  # where the text of a list's item begins: its code is indented from there
+        if bullet:
+            item = bullet.end()  # where the text of a list's item begins: its code is indented from there
         yield number, TARGET.sub("", line)
 
 

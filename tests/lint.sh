@@ -31,7 +31,8 @@ for f in $(files '*.py'); do
     "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
 # shellcheck disable=SC2046 # one word a file
-"$python" tests/columns.py $(files '*.sh' '*.js' '*.css' '*.html' '*.yml' '*.supp' Makefile .ci/run) ||
+"$python" tests/columns.py $(files '*.md' '*.sh' '*.js' '*.css' '*.html' '*.yml' '*.supp' \
+    Makefile .ci/run .clang-tidy) ||
     complain "lines of more than 120 characters: see above"
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
