@@ -19,7 +19,7 @@ import numpy as np
 #: keys that the page shows in the open; all others are in the folded table
 KEY_VALUES = {
     "Ice": ["ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.density", "ice.friction", "ice.restitution",
-            "ice.crushing.pressure", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
+            "ice.crushing.pressure", "ice.rafting.kappa", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
     "Towed body": ["body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass", "body.friction", "body.drag.water_form"],
     "Tow": ["tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter", "tow.line_length", "tow.line_stiffness",
             "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
@@ -186,6 +186,9 @@ def quality(run):
              ("contact work", f"{style.short(n('contact_work_j'))} J", f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
     if n("crushing_steps", 0):
         rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J", f"in {n('crushing_steps'):.0f} steps, deepest {style.short(n('max_crushed_depth_m'))} m"))
+    if n("max_rafted_area_m2", 0):
+        rows.append(("rafted", f"{style.short(n('rafted_area_m2'))} m²", f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took {style.short(n('raft_edge_work_j'))} J, "
+                     f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction {style.short(n('raft_friction_work_j'))} J"))
     if n("stalled_s", 0):
         rows.append(("body stood still", f"{style.short(n('stalled_s'))} s", "while the tow asked for motion"))
     return rows

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
+import rafted
 import style
 from bergtow_read import RunError, place
 
@@ -192,6 +193,8 @@ class Scene:
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
                                      linewidths=float(np.clip(0.035 * floe_pt, 0.1, 0.6)), zorder=2, **kept)
+        self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
+        self._rafts = run.value("ice.rafting.kappa", 0) > 0
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
         self._solid.set_facecolors([style.WALL if b.wall else style.FIXED for b in run.bodies if not b.towed]
                                    * len(self._images))
@@ -210,9 +213,10 @@ class Scene:
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
-        self.artists = [self._water, self._floes, self._track, self._solid, *edges, self._line, self._body, self._arrow]
+        self.artists = [self._water, self._floes, self._rafted, self._track, self._solid, *edges, self._line, self._body, self._arrow]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
+        axes.add_collection(self._rafted, autolim=False)
         axes.add_line(self._track)
         axes.add_collection(self._solid, autolim=False)
         axes.add_line(self._line)
@@ -243,6 +247,8 @@ class Scene:
         outlines, index = run.polygon_array(frame, position + self._middle if self.follow else None)
         self._floes.set_verts(self._flat(outlines - origin))
         self._floes.set_array(self.colouring.values(frame)[index])
+        if self._rafts:
+            self._rafted.set_verts([self._flat(p - origin) for p in rafted.overlaps(outlines)])
         bodies = run.body_polygons(frame, centre)
         self._solid.set_verts([self._flat(p + shift - origin) for shift in self._images
                                for p, b in zip(bodies, run.bodies) if not b.towed])

@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first
 import numpy as np  # noqa: E402
 from matplotlib.colors import LinearSegmentedColormap  # noqa: E402
 
+RAFTED = "#5a1846"  # floes over each other
 WATER = "#0c2a43"
 PAPER = "#ffffff"
 INK = "#1d2733"
@@ -31,6 +32,7 @@ DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
 CORIOLIS = "#b8860b"  # Coriolis force
 TILT = "#4d4d4d"      # force of the sea-surface tilt
+LAWS = ("#c2417c", "#1b4f9c", "#7a5b00")  # force laws that are added
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 

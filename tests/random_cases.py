@@ -34,7 +34,7 @@ LEFT_OUT = {
 FREE = {
     "domain.wall_friction": (1e-3, 1, "lm"), "domain.wall_restitution": (1e-2, 1, "lm"),
     "ice.density": (700, 1000, "lm"), "ice.friction": (1e-3, 1, "lm"), "ice.restitution": (1e-2, 1, "lm"),
-    "ice.crushing.least_length": (1e-2, 10, "lm"), "ice.added_mass": (1e-2, 1, "lm"), "ice.added_inertia": (1e-2, 1, "lm"),
+    "ice.crushing.least_length": (1e-2, 10, "lm"), "ice.rafting.kappa": (2, 30, "l"), "ice.added_mass": (1e-2, 1, "lm"), "ice.added_inertia": (1e-2, 1, "lm"),
     "ice.drag.water_form": (0.01, 10, "lm"), "ice.drag.water_skin": (1e-4, 0.1, "lm"), "ice.drag.air_form": (0.01, 10, "l"), "ice.drag.air_skin": (1e-4, 0.1, "l"),
     "ice.seed": (1, 1e6, "lm"), "ice.shake": (0.1, 100, "l"), "ice.thickness_spread": (0.01, 1, "l"),
     "body.density": (300, 2000, ""), "body.added_mass": (0.01, 2, "lm"), "body.added_inertia": (0.01, 2, "lm"), "body.friction": (1e-3, 1, "lm"),

@@ -58,6 +58,8 @@ typedef struct bt_floe_def {
 
 enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
 
+enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
+
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
     char *text;       ///< the file's text
@@ -96,6 +98,7 @@ typedef struct bt_case {
         double restitution;             ///< e
         double crushing_pressure;       ///< Pa; 0 = rigid contact
         double crushing_least;          ///< least contact length / thickness
+        double rafting_kappa;           ///< κ of the line load under which floes raft; 0 = they do not
         double added_mass;              ///< C_m
         double added_inertia;           ///< C_I
         bt_drag_coefs drag;
@@ -233,6 +236,7 @@ typedef struct bt_case {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
         char *source;            ///< where it was published
     } reference;
+    double extra[BT_EXTRA_KEYS]; ///< values of keys that are added to the table, those of force laws (forces.h), SI
 } bt_case;
 
 /// Read and check a case file; every error of the file is appended to err with file, line, key and remedy.

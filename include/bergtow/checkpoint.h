@@ -21,12 +21,14 @@
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no tile is known to rest
 //   bt_tiles          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels decide which tile owns a contact, and
 //                       so the order of the sweeps. They are older than the poses, and cannot be made from them
-//                     D tile array, at, n_tiled, labelled      - moved, moved_any, speed, bound, awake, order, run, calm, still
+//                     D tile array, at, n_tiled, labelled      - moved, moved_any, speed, bound, awake, order, run, still
 //                     not needed: rest (a tile that rests is found to do so again), n_listings
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts (contacts.h)
-//   bt_scar           S all            bt_unit, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
+//   bt_trace          S all: what contact laws remember of pairs (contact/law.h)
+//                     bt_unit, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way      D, - the rest
+//   bt_forces         D own                                                                        - what is recorded of the towed body, its place
 //   bt_window         S start, rear, drift, vel, counters, dropped, brought                       D the rest
 //   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats
 //   bt_impacts        S open                       D rule, panels' places                         - touch, closed, collision, largest_push, panels' loads

@@ -33,10 +33,10 @@ typedef struct bt_fclib_places {
 } bt_fclib_places;
 
 /// The same with an upper bound of the normal impulses, 0 <= r_n <= bound [n] N s (u_n < 0 where it holds): what FCLIB's format does not know, stored
-/// as /bound beside it. NULL: none. Places, or NULL, are stored as /places.
+/// as /bound beside it, and with contacts whose two components both lie in a disc about 0 of this radius, N s, stored as /disc (NaN: no such contact). NULL: none. Places, or NULL, are stored as /places.
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
                                  const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound, const bt_fclib_places *places,
+                                 const double *solution_u, const double *solution_r, const double *bound, const double *disc, const bt_fclib_places *places,
                                  const char *title, const char *description, bt_errors *err);
 
 #endif

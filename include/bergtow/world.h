@@ -123,6 +123,9 @@ typedef struct bt_params {
     double size;           ///< mean floe diameter, sets tiles and skin, m
     double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
     double crush_least;    ///< least length of a contact / ice thickness
+    double raft_line;      ///< line load under which floes raft / thickness², Pa/m; 0 = they do not (raft.h)
+    double raft_sheet;     ///< pressure between sheets on each other / thickness, Pa/m
+    double raft_rise;      ///< potential energy of sheets on each other / (area × both thicknesses), Pa/m
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -139,6 +142,7 @@ struct bt_exchange;
 struct bt_window;
 struct bt_impacts;
 struct bt_environment;
+struct bt_forces;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
@@ -158,6 +162,12 @@ typedef struct bt_step_stats {
     double crushed_work;     ///< taken by contact points that crush, J
     int64_t n_crushing;      ///< contact points that crush
     double crushed_depth;    ///< deepest crush of a pair in contact, at the end, m
+    int64_t n_rafting;       ///< pairs of floes that lie over each other (raft.h)
+    double rafted_area;      ///< of theirs that overlaps, at the start, m²
+    double rafted_largest;   ///< the largest of one pair, m²
+    double rafted_energy;    ///< potential energy of the sheets on each other, J
+    double raft_edge_work;   ///< taken by edges at their bound, J
+    double raft_friction_work; ///< taken by friction between sheets, J
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
     double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s
@@ -171,6 +181,7 @@ typedef struct bt_world {
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
+    struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart

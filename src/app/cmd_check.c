@@ -143,6 +143,17 @@ static void print_crushing(const bt_case *c, const bt_check_ice *n)
     printf("crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n", line, line * c->ice.crushing_least * n->thickness, line * n->size);
 }
 
+/// Load under which an edge of the mean floe rafts, and the friction of sheets on each other.
+static void print_rafting(const bt_case *c, const bt_check_ice *n)
+{
+    if (!(c->ice.rafting_kappa > 0) || n->count < 1) return;
+    const double share = c->ice.density / c->water.density, h = n->thickness;
+    printf("rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an edge of a mean floe's width rafts at %.4g N\n",
+           c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h, c->ice.rafting_kappa,
+           c->ice.friction * (c->water.density - c->ice.density) * gravity * h,
+           c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h * n->size);
+}
+
 static void print_window(const bt_case *c)
 {
     if (c->domain.ends != BT_BOUND_MOVING) return;
@@ -264,6 +275,7 @@ static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, 
     printf("domain               %g x %g m\n", c->domain.length, c->domain.width);
     print_ice(c, &n);
     print_crushing(c, &n);
+    print_rafting(c, &n);
     print_outlines(&f->outlines, c);
     print_body(c);
     print_width(c, &n);

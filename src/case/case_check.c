@@ -166,6 +166,10 @@ static void check_sizes(const check *k)
     if (bt_check_sound(k, "ice.thickness") && c->ice.thickness < BT_LEAST_THICKNESS)
         bt_check_fault(k, "ice.thickness", "%g m is below %g m, which is no ice; check the unit", c->ice.thickness,
               BT_LEAST_THICKNESS);
+    if (bt_check_sound(k, "ice.rafting.kappa") && c->ice.rafting_kappa > 0 && c->ice.rafting_kappa < 2)
+        bt_check_fault(k, "ice.rafting.kappa",
+                       "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying over each other; "
+                       "0 = they do not, 5 to 17 in the literature", c->ice.rafting_kappa);
     if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
         bt_check_fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
@@ -321,9 +325,7 @@ static void check_path(const check *k, int n, const double *v)
     if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack) reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
     if (reach >= way) return;
     reach = bt_max(reach, 0);
-    double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
-    double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
-    if (c->tow.n_programme > 0) time = bt_case_tow_time(c, reach);
+    const double time = bt_case_tow_time(c, reach);
     bt_check_fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
 }
 

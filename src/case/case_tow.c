@@ -8,6 +8,7 @@
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
+#include "case/speed_law.h"
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
@@ -27,31 +28,21 @@ static void largest_speed(const bt_case *c, double *speed, double *time)
         if (p[2 * i + 1] > *speed) *speed = p[2 * i + 1], *time = i > 0 ? p[2 * i] : 0;
 }
 
+static bt_speed_law speed_law(const bt_case *c)
+{
+    return (bt_speed_law){.speed = c->tow.speed, .ramp = c->tow.ramp, .programme = c->tow.programme, .n = c->tow.n_programme};
+}
+
 double bt_case_tow_distance(const bt_case *c, double t)
 {
-    const int n = c->tow.n_programme;
-    if (n > 0) {
-        const double *p = c->tow.programme;
-        double way = bt_min(t, p[0]) * p[1]; // constant before the first
-        for (int i = 0; i + 1 < n && t > p[2 * i]; i++) {
-            const double dt = p[2 * i + 2] - p[2 * i], rise = (p[2 * i + 3] - p[2 * i + 1]) / dt, s = bt_min(t - p[2 * i], dt);
-            way += s * (p[2 * i + 1] + 0.5 * rise * s);
-        }
-        return way + bt_max(0, t - p[2 * n - 2]) * p[2 * n - 1];
-    }
-    const double ramp = c->tow.ramp;
-    return c->tow.speed * (t < ramp ? t * t / (2 * ramp) : t - ramp / 2);
+    const bt_speed_law l = speed_law(c);
+    return bt_speed_law_way(&l, t);
 }
 
 double bt_case_tow_time(const bt_case *c, double way)
 {
-    double low = 0, high = c->run.duration;
-    for (int i = 0; i < 100; i++) {
-        const double mid = 0.5 * (low + high);
-        if (bt_case_tow_distance(c, mid) < way) low = mid;
-        else high = mid;
-    }
-    return low;
+    const bt_speed_law l = speed_law(c);
+    return bt_speed_law_time(&l, way, c->run.duration);
 }
 
 // ---- where it starts, and its path ----

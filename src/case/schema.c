@@ -54,7 +54,10 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 #define ANYWHERE "[-1e7, 1e7]"
 #define ANY_SPEED "[-100, 100]"
 
-const bt_key bt_case_keys[] = {
+#define SPARE {.name = NULL}
+#define EIGHT_SPARE SPARE, SPARE, SPARE, SPARE, SPARE, SPARE, SPARE, SPARE
+
+bt_key bt_case_keys[] = {
     TEXT("run.title", run.title, "none", "one line for the reports"),
     REAL("run.dt", run.dt, TIME, NULL, "(0, 1000]",
          "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at most 5 s at full scale [Yulmetov & Løset 2017]"),
@@ -102,6 +105,9 @@ const bt_key bt_case_keys[] = {
     REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
          "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = rigid contact without limit"),
     REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]", "least length of a contact / thickness of the floe that is crushed, assumed"),
+    REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
+         "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = "
+         "without loss; 5 to 17, assumed [Rothrock 1975; Parmerter 1975; Hopkins 1998]"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
     REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
     REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag of the floe's edge in water [Hunke & Comeau 2011]"),
@@ -266,8 +272,10 @@ const bt_key bt_case_keys[] = {
 
     REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]", "measured mean ice resistance, shown beside the computed one"),
     TEXT("reference.source", reference.source, "none", "where the measured force was published"),
+
+    EIGHT_SPARE, EIGHT_SPARE, EIGHT_SPARE, EIGHT_SPARE, // BT_EXTRA_KEYS rows for bt_schema_add
 };
-const int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys;
+int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS;
 
 #undef AT
 #define AT(member) .offset = offsetof(bt_floe_def, member)
@@ -288,6 +296,37 @@ const bt_key bt_floe_keys[] = {
     BOOL("fixed", fixed, "false", "at rest for ever, as a structure or grounded ice"),
 };
 const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
+
+/// Does the section of this name stand in the table, and not at its end?
+static bool section_is_closed(const char *name)
+{
+    const size_t n = strcspn(name, ".") + 1;
+    const bool open = !strncmp(bt_case_keys[bt_n_case_keys - 1].name, name, n);
+    char section[64] = {0};
+    memcpy(section, name, bt_min(n - 1, sizeof section - 1));
+    return !open && bt_schema_is_section(section);
+}
+
+int bt_schema_add(const bt_key *k, bt_errors *err)
+{
+    const int place = bt_n_case_keys - (int)(sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS);
+    const size_t before = err->n, length = strlen(k->name);
+    bt_key row = *k;
+    bt_range r;
+    char why[BT_WHY];
+    row.type = BT_KEY_REAL;
+    row.offset = offsetof(bt_case, extra) + (size_t)place * sizeof(double);
+    if (place >= BT_EXTRA_KEYS) bt_errors_add(err, "%s: there is no room for more than %d added keys; raise BT_EXTRA_KEYS", k->name, BT_EXTRA_KEYS);
+    else if (length > 60 || !strchr(k->name, '.')) bt_errors_add(err, "%s: a key is SECTION.NAME, of at most 60 characters", k->name);
+    else if (bt_schema_find(bt_case_keys, bt_n_case_keys, k->name) >= 0) bt_errors_add(err, "%s: this key is there; choose another name", k->name);
+    else if (section_is_closed(k->name)) bt_errors_add(err, "%s: its section has keys of the program; choose a section of its own", k->name);
+    else if (!k->range || !bt_value_range(&row, &r)) bt_errors_add(err, "%s: the range must be \"[least, most]\" or with ( and )", k->name);
+    else if (!k->preset || k->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, k->preset, true, why)) bt_errors_add(err, "%s: the default must be a number within the range, or none", k->name);
+    else if (!k->doc || strlen(k->doc) < 8) bt_errors_add(err, "%s: say in a sentence what it is", k->name);
+    if (err->n > before) return -1;
+    bt_case_keys[bt_n_case_keys++] = row;
+    return place;
+}
 
 int bt_schema_find(const bt_key *keys, int n, const char *name)
 {

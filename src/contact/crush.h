@@ -38,50 +38,18 @@
 #ifndef BERGTOW_CRUSH_H
 #define BERGTOW_CRUSH_H
 
-#include "contact/contacts.h"
-#include "space/tiles.h"
+#include "contact/law.h"
 
 #define BT_CRUSH_MEMORY 0.1 // of the mean floe size, the gap beyond which a pair forgets; tiles always reach that far (tiles.h)
 
-/// Bounds of the points of one unit; all INFINITY (and slope 0) between bodies that are no ice.
-typedef struct bt_limit {
-    double flat[2];  ///< the bound at any approach, N s
-    double base[2];  ///< p h Δt ℓ1, N s; never above flat
-    double slope[2]; ///< θ p h κ Δt², kg
-    double most[2];  ///< p h Δt ℓ2, N s
-    double place[2]; ///< max(g + d, 0)/Δt: approach that closes the gap and crushes nothing, m/s
-    double depth[2]; ///< d, m
-    double grown[2]; ///< by how much it grows in this step, m
-    int32_t scar;    ///< in the tile, −1 = the pair has crushed nothing yet
-} bt_limit;
-
-/// What a pair has crushed: state of the world, kept in the tile that owns the pair, sorted by (a, b, part).
-typedef struct bt_scar {
-    bt_gid a, b;
-    uint16_t part[2]; ///< as in bt_pair
-    int32_t n;
-    uint32_t feature[2];
-    double depth[2]; ///< m
-} bt_scar;
-
-static inline bool bt_crush_on(const bt_world *w) { return w->par.crush_pressure > 0; }
-
-/// At the start of a detection: forget pairs of tile t that have parted.
-void bt_crush_prune(const bt_world *w, bt_tile *t);
-
-/// Room for the bounds of the units of a tile.
-void bt_crush_reserve(bt_tile *t);
-
-/// Bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the crushed surfaces.
-void bt_crush_fill(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-
-/// Deepest overlap of the crushed surfaces in a tile, m.
-double bt_crush_overlap(const bt_tile *t);
-
-/// After the solve: depths grow where the bound holds; work, number and depth of crushing contacts into stats. Collective.
-void bt_crush_grow(bt_world *w);
-
-/// Append a scar to a tile, in the order of (a, b, part).
-void bt_crush_add(bt_tile *t, const bt_scar *s);
+// The crushing law's row in the table (contact/law.h). Its record: a depth for each contact feature, m.
+bool bt_crush_on(const bt_params *p);
+bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b);
+void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+bool bt_crush_keeps(const bt_world *w, bt_trace *r);
+bool bt_crush_gives_way(const bt_unit *u, const bt_limit *l, int i);
+void bt_crush_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals);
+double bt_crush_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals);
+double bt_crush_count(const bt_world *w, const bt_trace *r, bt_totals *totals);
 
 #endif

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
@@ -136,13 +136,36 @@ static void merge(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
     s->n = kept;
 }
 
+/// Contacts that a law makes of pairs with a record, in place of those of the outlines, and after them.
+static void replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
+{
+    const size_t n = s->n;
+    for (int law = 0; law < BT_LAWS; law++) {
+        if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
+        for (size_t k = 0; k < n; k++) {
+            bt_pair *p = &t->pairs[s->pair[k]];
+            const bt_trace names = bt_law_names(w, p, law);
+            const bt_idx at = bt_law_find(t, &names);
+            if (at < 0) continue;
+            bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
+            if (bt_laws[law].contact(w, p, &t->memory[at], &edge, sheets)) {
+                s->man[k] = edge;
+                bt_pack_keep(s);
+            } else {
+                s->man[k] = *sheets;
+                p->n_points = 0;
+            }
+        }
+    }
+}
+
 static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
     bt_tile *t = &w->tiles->tile[k];
-    if (t->n_scars > 0) bt_crush_prune(w, t);
+    if (t->n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
-    bt_pack_begin(&s->pack, (size_t)t->n_pairs);
+    bt_pack_begin(&s->pack, 2 * (size_t)t->n_pairs); // a pair may have a second contact (replace)
     bool parts = false;
     const bool near = bt_pairs_near(w, k, t, t->margin);
     const double far = t->margin + bt_pairs_near_gap(w);
@@ -168,6 +191,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         parts = parts || p->part[0] || p->part[1];
     }
     if (parts) merge(w, t, &s->pack);
+    if (t->n_memory > 0) replace(w, t, &s->pack);
     t->n_points = 0;
     t->overlap = 0;
     for (size_t i = 0; i < s->pack.n; i++) {
@@ -176,7 +200,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
     }
     bt_pack_units(w, k, &s->pack);
-    if (bt_crush_on(w)) t->overlap = bt_crush_overlap(t); // crushed ice does not count as overlap
+    if (bt_laws_on(&w->par)) t->overlap = bt_laws_overlap(t); // what has given way does not count as overlap
 }
 
 static void wake_body(bt_world *w, bt_idx i)

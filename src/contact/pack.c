@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/crush.h"
-#include "solve/kernel.h"
+#include "contact/law.h"
+#include "contact/row.h"
 
 enum { MAX_COLOURS = 64 };
 
@@ -95,6 +95,19 @@ static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
     u->lt = before == 0 ? 0 : kept == before ? p->lt : p->lt * (kept / before);
 }
 
+/// Sheets that lie on each other (contact/raft.h): components along x and y, one step length for both.
+static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt_unit *u, bt_gaps *g)
+{
+    const bt_inv ia = w->bodies.inv[m->a], ib = w->bodies.inv[m->b];
+    const bt_point *q = &m->p[0];
+    *u = (bt_unit){.a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0]};
+    *g = (bt_gaps){.pair = pair};
+    const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
+    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt, xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
+    u->w[0] = u->wt = free + 0.5 * (x + y) + sqrt(0.25 * (x - y) * (x - y) + xy * xy);
+    u->mn[0] = u->mt = 1 / u->w[0];
+}
+
 static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u, bt_gaps *g)
 {
     const bt_bodies *b = &w->bodies;
@@ -159,8 +172,9 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
     }
     t->n_units = (bt_idx)s->n;
     if (s->n == 0) return;
-    const bool crush = bt_crush_on(w);
-    if (crush) bt_crush_reserve(t);
+    const bool bounded = bt_laws_on(&w->par);
+    t->rising = bt_laws_rise(&w->par);
+    if (bounded) bt_laws_reserve(t);
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (t->phase < BT_COLOURS) colour_units(w, t, s, next);
     else memset(s->colour, 0, s->n); // in sequence
@@ -168,9 +182,14 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
         bt_pair *p = &t->pairs[s->pair[i]];
         const bt_idx at = next[s->colour[i]]++;
         bt_unit *u = &t->units[at];
+        if (s->man[i].n_points == 0) {
+            fill_sheets(w, &s->man[i], s->pair[i], u, &t->gaps[at]);
+            bt_laws_bound(w, t, at, p, &s->man[i]);
+            continue;
+        }
         fill_unit(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
-        if (crush) {
-            bt_crush_fill(w, t, at, p, &s->man[i]);
+        if (bounded) {
+            bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
         }
         p->n_points = u->n;
@@ -183,6 +202,7 @@ void bt_pack_store(bt_world *w, bt_idx k)
     bt_tile *t = &w->tiles->tile[k];
     for (bt_idx i = 0; i < t->n_units; i++) {
         const bt_unit *u = &t->units[i];
+        if (u->n == 0) continue; // sheets have a record (contact/raft.h)
         bt_pair *p = &t->pairs[t->gaps[i].pair];
         p->ln[0] = u->ln[0];
         p->ln[1] = u->ln[1];

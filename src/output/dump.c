@@ -3,15 +3,16 @@
 //
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
 // share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
-// (it is no contact) is held at its solved value. With ice.crushing the bounds of the normal impulses are those at the solution.
+// (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the solution. Sheets that
+// lie on each other (contact/raft.h) are contacts, too, whose two components are bounded by a disc.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/fclib.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "solve/solver.h"
-#include "contact/limit.h"
+#include "solve/limit.h"
 
 typedef struct {
     int32_t contact; ///< in the order of the manifolds
@@ -23,7 +24,7 @@ typedef struct {
     bt_gid gid_a, gid_b;
     int point;
     bt_idx a, b;
-    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound;
+    double nx, ny, ran, rbn, rat, rbt, bias, mu, ln, lt, bound, disc;
 } row;
 
 static int by_gids(const void *p, const void *q)
@@ -46,23 +47,33 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
     out[3] += s * (inv.m * c + inv.i * rt * qt);  // t·t'
 }
 
+/// Sheets that lie on each other: rows along x and y, after the points of the pair.
+static row sheets_of(const bt_world *w, const bt_tile *t, bt_idx j)
+{
+    const bt_unit *u = &t->units[j];
+    return (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = 2, .a = u->a, .b = u->b, .nx = u->nx, .ny = u->ny,
+                 .ran = u->ran[0], .rbn = u->rbn[0], .rat = u->rat, .rbt = u->rbt, .ln = u->ln[0], .lt = u->lt, .bound = INFINITY,
+                 .disc = t->limits[j].flat[0]};
+}
+
 /// Normal and tangential row of every contact point, in the order of the gids.
 static row *rows_of(const bt_world *w, int *n)
 {
     const bt_tiles *ts = w->tiles;
     int64_t most = 0;
-    for (bt_idx k = 0; k < ts->n; k++) most += ts->tile[k].n_points;
+    for (bt_idx k = 0; k < ts->n; k++) most += ts->tile[k].n_points + ts->tile[k].n_units;
     row *rows = bt_alloc((size_t)most, sizeof *rows);
     *n = 0;
     for (bt_idx k = 0; k < ts->n; k++)
         for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
             const bt_unit *u = &ts->tile[k].units[j];
             const double total = u->ln[0] + u->ln[1];
+            if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->tile[k], j);
             for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
                 rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = i, .a = u->a, .b = u->b, .nx = u->nx,
                                      .ny = u->ny, .ran = u->ran[i], .rbn = u->rbn[i], .rat = u->rat, .rbt = u->rbt, .bias = u->bias[i],
                                      .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
-                                     .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel) : INFINITY};
+                                     .disc = NAN, .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel) : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;
@@ -134,7 +145,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     double *val = bt_alloc(4 * (size_t)most, sizeof *val);
     double *q = bt_alloc(2 * (size_t)n, sizeof *q), *mu = bt_alloc((size_t)n, sizeof *mu);
     double *u = bt_alloc(2 * (size_t)n, sizeof *u), *r = bt_alloc(2 * (size_t)n, sizeof *r);
-    double *bound = bt_alloc((size_t)n, sizeof *bound);
+    double *bound = bt_alloc((size_t)n, sizeof *bound), *disc = bt_alloc((size_t)n, sizeof *disc);
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];
         const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
@@ -145,6 +156,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         r[2 * k + 1] = p->lt;
         mu[k] = p->mu;
         bound[k] = p->bound;
+        disc[k] = p->disc;
     }
     // Neighbours of a contact: the union of the contacts at its two bodies, in the order of the contacts.
     touch *near = NULL;
@@ -185,9 +197,9 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         q[i] = u[i] - wr;
     }
     const bt_fclib_places places = places_of(w, rows, n);
-    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_crush_on(w) ? bound : NULL, &places, "bergtow",
+    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_laws_on(&w->par) ? bound : NULL, bt_law_on(&w->par, BT_LAW_RAFTING) ? disc : NULL, &places, "bergtow",
                                               "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
+    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, disc, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

@@ -8,7 +8,8 @@
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
-//     /bound, /places                              of our own: bounds of the normal impulses; where contacts and bodies are
+//     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc about 0 that both
+//                                                  components of a contact lie in (mu is 0), NaN = it is no such contact; where contacts and bodies are
 // A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 
@@ -109,7 +110,7 @@ static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
 
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
                                  const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound, const bt_fclib_places *places,
+                                 const double *solution_u, const double *solution_r, const double *bound, const double *disc, const bt_fclib_places *places,
                                  const char *title, const char *description, bt_errors *err)
 {
     bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
@@ -128,6 +129,7 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
         bt_h5_write_text(&h, "/fclib_local/info/math_info",
                          "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent");
         if (bound) bt_h5_write(&h, "/bound", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, bound);
+        if (disc) bt_h5_write(&h, "/disc", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, disc);
         if (places) write_places(&h, places, (hsize_t)n_contacts);
         if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
         if (solution_r) {
@@ -149,5 +151,5 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
                                const double *solution_u, const double *solution_r, const char *title,
                                const char *description, bt_errors *err)
 {
-    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, NULL, title, description, err);
+    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, NULL, NULL, title, description, err);
 }

@@ -43,6 +43,9 @@ static double added_energy(const bt_sample *s) { return s->contact_work > WORK_R
 
 #define TOTAL(type, member, rule_, from) \
     {.at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)}
+#define LATER(type, member, rule_, from) \
+    {.at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from), \
+     .later = true}
 const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
@@ -56,6 +59,13 @@ const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, max_crushed_depth, MAX, crushed_depth),
     TOTAL(F64, max_crushing, MAX, crushing),
     TOTAL(I64, crushing_steps, STEPS, crushing),
+    LATER(F64, rafting, LAST, rafting),
+    LATER(F64, rafted_area, LAST, rafted_area),
+    LATER(F64, rafted_energy, LAST, rafted_energy),
+    LATER(F64, max_rafted_area, MAX, rafted_area),
+    LATER(F64, rafted_largest, MAX, rafted_largest),
+    LATER(F64, raft_edge_work, SUM, raft_edge_work),
+    LATER(F64, raft_friction_work, SUM, raft_friction_work),
     TOTAL(I64, unconverged, STEPS, unconverged),
     TOTAL(I64, unprojected, STEPS, unprojected),
     {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)}, .rule = BT_TOTAL_STEPS, .of = added_energy},
@@ -78,7 +88,7 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
         memcpy(at, &whole, sizeof whole);
     } else {
         memcpy(&sum, at, sizeof sum);
-        sum = t->rule == BT_TOTAL_MAX ? bt_max_seen(sum, x) : sum + x;
+        sum = t->rule == BT_TOTAL_MAX ? bt_max_seen(sum, x) : t->rule == BT_TOTAL_LAST ? x : sum + x;
         memcpy(at, &sum, sizeof sum);
     }
 }
@@ -86,7 +96,7 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
 {
     if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", bt_history_columns[k].name);
-    else snprintf(name, BT_HISTORY_NAME, "history/added/%s", bt_added(k - BT_N_COLUMNS)->name);
+    else snprintf(name, BT_HISTORY_NAME, "history/added_%s", bt_added(k - BT_N_COLUMNS)->name);
     return name;
 }
 

@@ -29,15 +29,19 @@ typedef struct bt_history {
     double max_overlap, max_momentum_residual, max_residual;
     double crushed_work, max_crushed_depth, max_crushing; ///< J, m, contact points
     int64_t crushing_steps;
+    double rafting, rafted_area, rafted_energy;  ///< in the last step, as in bt_sample
+    double max_rafted_area, rafted_largest, raft_edge_work, raft_friction_work; ///< m², m², J, J
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
-enum { BT_N_TOTALS = 18, BT_HISTORY_NAME = 80 };
+enum { BT_N_TOTALS = 25, BT_HISTORY_NAME = 80 };
 
 /// A running total: its member of bt_history, what it takes of a step, and how.
 typedef struct bt_total {
     bt_state_row at;                      ///< name in the checkpoint, under history
-    enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS } rule; ///< STEPS: those in which the number is not 0
+    /// STEPS: those in which the number is not 0; LAST: what it was in the last step
+    enum { BT_TOTAL_SUM, BT_TOTAL_MAX, BT_TOTAL_STEPS, BT_TOTAL_LAST } rule;
+    bool later;                           ///< not in checkpoints of before there were such numbers: then 0
     size_t offset;                        ///< of the number in bt_sample
     double (*of)(const bt_sample *s);     ///< or a function of it
 } bt_total;

@@ -2,11 +2,12 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + (J_ice + J_drag + J_Coriolis + J_tilt)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt)
+//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the table of force laws)
 // On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
 #include "output/observe.h"
+#include "output/force_quantities.h"
 
 #include <math.h>
 
@@ -41,7 +42,7 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];
         const double normal = u->ln[0] + u->ln[1];
-        if (normal == 0) continue;
+        if (normal == 0 && u->lt == 0) continue;
         const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
         if (u->a == towed || u->b == towed) {
             const bool is_b = u->b == towed;
@@ -118,6 +119,14 @@ static void observe_line(const bt_tow *tow, bt_sample *s)
     s->vessel_line = s->tow_force; // both along the course
 }
 
+/// What holds the body back beside ice and inertia, in the order of the table: water, air, Coriolis, tilt, ….
+static double add_forces(const bt_world *w, double sum)
+{
+    for (int k = 0; k < w->forces->n_series; k++)
+        if (!bt_force_series_of[k].part) sum += bt_force_against(w, k);
+    return sum;
+}
+
 static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
 {
     const bt_bodies *b = &w->bodies;
@@ -125,15 +134,14 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
     const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
-    const bt_external e = bt_forces_external(w, t);
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
-    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
+    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt;
     s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
-    s->drag_force = 0.0 - (e.drag[0] * dx + e.drag[1] * dy) / dt;
-    s->coriolis_force = 0.0 - (e.coriolis[0] * dx + e.coriolis[1] * dy) / dt;
-    s->tilt_force = 0.0 - (e.tilt[0] * dx + e.tilt[1] * dy) / dt;
+    s->drag_force = bt_force_against(w, bt_force_series_find("drag"));
+    s->coriolis_force = bt_force_against(w, bt_force_series_find("coriolis"));
+    s->tilt_force = bt_force_against(w, bt_force_series_find("tilt"));
     s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
@@ -144,7 +152,7 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     if (bt_tow_has_line(tow)) {
         observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {
-        s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
+        s->tow_force = add_forces(w, s->ice_resistance) + s->inertia_force;
     } else {
         s->tow_force = 0;
     }
@@ -218,6 +226,12 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .crushing = (double)st->n_crushing,
         .crushed_work = st->crushed_work,
         .crushed_depth = st->crushed_depth,
+        .rafting = (double)st->n_rafting,
+        .rafted_area = st->rafted_area,
+        .rafted_largest = st->rafted_largest,
+        .rafted_energy = st->rafted_energy,
+        .raft_edge_work = st->raft_edge_work,
+        .raft_friction_work = st->raft_friction_work,
         .current_x = w->par.water_u,
         .current_y = w->par.water_v,
         .wind_x = w->par.air_u,
@@ -239,12 +253,23 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         if (!(has & 1u << bt_series(k)->applies)) bt_sample_set(s, bt_series(k), NAN);
 }
 
+double bt_observe_ice_area(const bt_world *w)
+{
+    const bt_bodies *b = &w->bodies;
+    bt_totals t = {.n_sums = 1};
+    for (bt_idx i = 0; i < b->n; i++)
+        if (b->thickness[i] > 0 && b->gid[i] != w->towed && bt_domain_owns(w, i)) bt_sum_add(&t.sum[0], b->area[i]);
+    bt_domain_reduce(w, &t);
+    return bt_sum_value(&t.sum[0]);
+}
+
 void bt_observe_contact_force(const bt_world *w, double *force)
 {
     for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;
     for (bt_idx k = 0; k < w->tiles->n; k++)
         for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
             const bt_unit *u = &w->tiles->tile[k].units[j];
+            if (u->n == 0) continue; // friction of sheets is spread over them
             const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
             force[u->a] = bt_max(force[u->a], f);
             force[u->b] = bt_max(force[u->b], f);

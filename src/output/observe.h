@@ -12,6 +12,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s);
 /// What the numbers of this world's samples apply to: bit 1 << k for each bt_applies k.
 unsigned bt_observe_applies(const bt_world *w);
 
+/// Collective. Area of all floes, m².
+double bt_observe_ice_area(const bt_world *w);
+
 /// Largest normal contact force on each body of this rank in the step just done, N. force: [n bodies]. Collective.
 void bt_observe_contact_force(const bt_world *w, double *force);
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The registry of quantities: the program's own table (record_series.c) and what has been registered beside it.
 //
-// A layer that has a table of its own which may grow, as force laws have, contributes a quantity for each entry through
-// bt_quantity_register: of_world is one function for all of them, and context tells it the entry.
+// Force laws have a table of their own which may grow: force_quantities.c registers a quantity for each entry, before
+// anybody looks.
 #include "bergtow/quantity.h"
 
 #include <ctype.h>
@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "output/force_quantities.h"
 #include "output/record.h"
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
@@ -29,9 +30,14 @@ static bt_quantity added[BT_MAX_ADDED];
 static char added_keys[BT_MAX_ADDED][MOST_KEY];
 static int n_added;
 
-int bt_n_series(void) { return bt_n_own_series + n_added; }
+int bt_n_series(void) { return bt_n_own_series + bt_n_added(); }
 const bt_quantity *bt_series(int k) { return k < bt_n_own_series ? &bt_own_series[k] : &added[k - bt_n_own_series]; }
-int bt_n_added(void) { return n_added; }
+int bt_n_added(void)
+{
+    bt_force_quantities();
+    return n_added;
+}
+
 const bt_quantity *bt_added(int k) { return &added[k]; }
 
 const bt_quantity *bt_series_find(const char *name)

@@ -9,6 +9,7 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 #include "bergtow/event.h"
+#include "bergtow/forces.h"
 #include "bergtow/field.h"
 #include "bergtow/quantity.h"
 #include "field/lead.h"
@@ -16,7 +17,7 @@
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
-/// tow = ice + drag + Coriolis + tilt + inertia.
+/// tow = ice + drag + Coriolis + tilt + other laws + inertia.
 typedef struct bt_sample {
     double time;            ///< s, end of the step
     double tow_force;       ///< N along
@@ -58,6 +59,12 @@ typedef struct bt_sample {
     double crushing;        ///< contact points that crush (crush.h)
     double crushed_work;    ///< taken by them in the step, J
     double crushed_depth;   ///< deepest crush of a pair in contact, m
+    double rafting;         ///< pairs of floes that lie over each other (raft.h)
+    double rafted_area;     ///< of theirs that overlaps, at the start of the step, m²
+    double rafted_largest;  ///< the largest of one pair, m²
+    double rafted_energy;   ///< potential energy of the sheets on each other, J
+    double raft_edge_work;  ///< taken in the step by edges at their bound, J
+    double raft_friction_work; ///< and by friction between sheets, J
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
@@ -127,6 +134,7 @@ typedef struct bt_run_totals {
     double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
     double concentration;        ///< as made
     bt_lead_stats lead;          ///< what was cut into it then
+    double ice_area;             ///< of all floes in the run, m²
     double tolerance;            ///< absolute, m/s
     int64_t floes_outside;       ///< left an open domain
     bt_stall stall;              ///< of the towed body

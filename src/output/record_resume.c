@@ -63,7 +63,12 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 /// n: steps done; each has a value.
 static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
-    for (int k = 0; k < BT_N_TOTALS; k++) bt_snapshot_take_rows(s, "history", &bt_history_totals[k].at, 1, h);
+    for (int k = 0; k < BT_N_TOTALS; k++) {
+        const bt_total *t = &bt_history_totals[k];
+        char name[BT_HISTORY_NAME];
+        snprintf(name, sizeof name, "history/%s", t->at.name);
+        if (!t->later || bt_snapshot_find(s, name)) bt_snapshot_take_rows(s, "history", &t->at, 1, h);
+    }
     h->n = h->cap = n;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < h->n_columns; k++) {

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/contacts.h"
+#include "contact/law.h"
 #include "loads/impact.h"
 #include "space/tiles.h"
 #include "tow/tow.h"
@@ -218,13 +218,34 @@ _Static_assert(sizeof(bt_trace) % sizeof(double) == 0, "a trace is a row of doub
 
 static const bt_state_row trace_columns[] = {
     MEMBER(bt_trace, "a", I64, 1, a), MEMBER(bt_trace, "b", I64, 1, b), MEMBER(bt_trace, "part", U16, 2, part), MEMBER(bt_trace, "points", I32, 1, n_points),
-    MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "impulse", F64, 2, ln), MEMBER(bt_trace, "friction", F64, 1, lt), MEMBER(bt_trace, "crushed", U8, 1, scar),
+    MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "value", F64, 4, value), MEMBER(bt_trace, "law", U16, 1, law),
 };
+
+/// A checkpoint of before laws had numbers: impulse [2], friction, and whether the row is not that but the depths that the pair has crushed.
+static void renew_contacts(bt_snapshot *s)
+{
+    if (bt_snapshot_find(s, "contacts/law") || !bt_snapshot_find(s, "contacts/crushed")) return;
+    const int64_t n = bt_snapshot_rows(s, "contacts/a");
+    double *impulse = bt_alloc(2 * (size_t)n, sizeof *impulse), *friction = bt_alloc((size_t)n, sizeof *friction);
+    uint8_t *crushed = bt_alloc((size_t)n, 1);
+    bt_snapshot_take(s, "contacts/impulse", BT_ITEM_F64, n, 2, impulse);
+    bt_snapshot_take(s, "contacts/friction", BT_ITEM_F64, n, 1, friction);
+    bt_snapshot_take(s, "contacts/crushed", BT_ITEM_U8, n, 1, crushed);
+    double *value = bt_snapshot_add(s, "contacts/value", BT_ITEM_F64, n, 4, NULL);
+    uint16_t *law = bt_snapshot_add(s, "contacts/law", BT_ITEM_U16, n, 1, NULL);
+    for (int64_t k = 0; k < n && !s->faulty; k++) {
+        value[4 * k] = impulse[2 * k], value[4 * k + 1] = impulse[2 * k + 1], value[4 * k + 2] = friction[k];
+        law[k] = crushed[k] ? BT_LAW_CRUSHING : BT_LAW_RIGID;
+    }
+    free(impulse);
+    free(friction);
+    free(crushed);
+}
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
 static void blank(bt_trace *t)
 {
-    if (t->n_points < 2) t->feature[1] = 0, t->ln[1] = 0;
+    if (t->n_points < 2) t->feature[1] = 0, t->value[1] = 0;
 }
 
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
@@ -333,6 +354,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     w->events.event = load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
     w->events.cap = w->events.n;
     int64_t n = -1;
+    renew_contacts(s);
     bt_trace *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
     if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);

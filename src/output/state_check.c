@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "loads/impact.h"
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
@@ -19,16 +19,6 @@
 #include "step/window.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
-
-int bt_trace_by_names(const void *p, const void *q)
-{
-    const bt_trace *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    if (a->b != b->b) return a->b < b->b ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
-    return a->scar - b->scar;
-}
 
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
 static const int32_t FAR = 1000000000; // tiles, periods: as labels of tiles are limited (tiles.c)
@@ -196,9 +186,11 @@ static void check_contacts(const bt_world *w, const bt_trace *trace, int64_t n, 
         bt_snapshot_want(s, can_meet(w, i, j), "contacts/a", k, "and b are bodies that cannot touch");
         bt_snapshot_want(s, has_part(b, i, t->part[0]) && has_part(b, j, t->part[1]), "contacts/part", k, "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
-        bt_snapshot_want(s, all_finite(t->ln, 2), "contacts/impulse", k, "is not finite");
-        bt_snapshot_want(s, isfinite(t->lt), "contacts/friction", k, "is not finite");
-        bt_snapshot_want(s, !t->scar || bt_crush_on(w), "contacts/crushed", k, "and the ice of this case is not crushed");
+        bt_snapshot_want(s, all_finite(t->value, 4), "contacts/value", k, "is not finite");
+        bt_snapshot_want(s, t->law < BT_LAWS, "contacts/law", k, "is no contact law");
+        if (s->faulty) return;
+        const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_laws[t->law].applies(w, i, j));
+        bt_snapshot_want(s, on, "contacts/law", k, "is a contact law that does not apply to the pair");
         bt_snapshot_want(s, k == 0 || bt_trace_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
     }
 }

@@ -13,7 +13,4 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
 /// The same for a world before it is dealt, and for traces [n]; impacts: those were taken too.
 void bt_state_check(const bt_world *w, const bt_trace *trace, int64_t n, bool impacts, bt_snapshot *s);
 
-/// The order of traces in a checkpoint, for qsort.
-int bt_trace_by_names(const void *p, const void *q);
-
 #endif

@@ -174,7 +174,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (t->stall.windows)
         bt_errors_add(&s->warnings, "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a path of a "
                       "mean floe size: a jam%s", t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
-                      c->ice.crushing_pressure > 0 ? "" : "; rigid contact has no largest force: consider ice.crushing.pressure");
+                      c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0 ? "" : "; rigid contact has no largest force: consider ice.rafting.kappa or ice.crushing.pressure");
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
         bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);

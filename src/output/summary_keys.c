@@ -26,6 +26,11 @@ static double n_floes(const view *v) { return v->n_floes; }
 static double memory_per_floe(const view *v) { return number_or_nan(v->n_floes > 0, v->t->memory / (double)v->n_floes); }
 static double overlap_relative(const view *v) { return number_or_nan(v->t->mean_size > 0, v->h->max_overlap / v->t->mean_size); }
 
+static double rafted_share(const view *v)
+{
+    return number_or_nan(v->t->ice_area > 0, v->h->rafted_area / v->t->ice_area);
+}
+
 static const bt_lead_stats *lead(const view *v) { return &v->t->lead; }
 static bool has_lead(const view *v) { return lead(v)->mode != BT_LEAD_NONE; }
 static bool is_channel(const view *v) { return lead(v)->mode == BT_LEAD_CHANNEL; }
@@ -321,6 +326,16 @@ const bt_json_key bt_summary_keys[] = {
     OF_HISTORY("max_crushed_depth_m", max_crushed_depth, "m", "deepest crush of a pair of bodies"),
     OF_HISTORY("crushing_steps", crushing_steps, "1", "steps with contact points that crush"),
     OF_HISTORY("max_crushing_contacts", max_crushing, "1", "most of them at once"),
+    OF_HISTORY("rafting_pairs", rafting, "1", "pairs of floes that lie over each other, at the end"),
+    OF_HISTORY("rafted_area_m2", rafted_area, "m2", "area in which they do, pair by pair, at the end"),
+    NUMBER("rafted_share_of_ice", rafted_share, "1", "the same over the area of all ice"),
+    OF_HISTORY("max_rafted_area_m2", max_rafted_area, "m2", "the largest such area of a step"),
+    OF_HISTORY("largest_rafted_pair_m2", rafted_largest, "m2", "the largest area of one pair"),
+    OF_HISTORY("rafted_energy_j", rafted_energy, "J",
+        "potential energy of floes that lie over each other, above that of floes side by side, at the end"),
+    OF_HISTORY("raft_edge_work_j", raft_edge_work, "J", "work taken by edges that raft"),
+    OF_HISTORY("raft_friction_work_j", raft_friction_work, "J",
+        "work taken by friction between floes that lie over each other"),
     OF_TOTALS("stalled_s", stall.time, "s", "time in which the body stood still while the tow asked for motion"),
     OF_TOTALS("stalled_windows", stall.windows, "1", "stretches of time in which it did"),
     OF_HISTORY("positive_work_steps", positive_work, "1", "steps in which the contacts added energy"),

@@ -8,6 +8,7 @@
 
 #include "case/case_derived.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
 #include "space/tiles.h"
@@ -47,16 +48,20 @@ static drivers drivers_of(const bt_case *c)
 static double ratio(double a, double b) { return a > 0 ? a / b : 0; }
 
 /// v of body i, m/s.
-static double driven_speed(const drivers *d, const bt_bodies *b, bt_idx i)
+static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
 {
+    const bt_bodies *b = &w->bodies;
     const bt_drag *k = &b->drag[i];
+    bt_load load;
+    bt_forces_load(w, i, &b->vel[i], &load);
+    const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i], drawn = ratio(hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
     const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));
     const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);
     const double wind = share <= 1 ? d->wind * share / (1 + share) : d->wind;
-    const double terminal = sqrt(ratio(mass * d->slope, k->water_skin + k->water_form * b->area[i] / width));
-    const double slope = bt_min(d->slope * d->duration, bt_max(d->slope * d->dt, terminal));
-    return bt_max(d->prescribed, d->water + wind + slope);
+    const double terminal = sqrt(ratio(mass * pushed, k->water_skin + k->water_form * b->area[i] / width));
+    const double push = bt_min(pushed * d->duration, bt_max(pushed * d->dt, terminal));
+    return bt_max(d->prescribed, d->water + wind + push + drawn);
 }
 
 static double energy_of(double mass, double inertia, double vx, double vy, double turn) { return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn); }
@@ -75,7 +80,7 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
         if (b->gid[i] == w->towed) start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy), c->body.yaw_rate);
         else if (by_hand >= 0 && by_hand < c->n_floes)
             start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx), bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
-        bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, b, i), 0, 0)) / UNIT);
+        bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, w, i), 0, 0)) / UNIT);
     }
     bt_domain_reduce(w, &t);
     return UNIT * bt_sum_value(&t.sum[0]);

@@ -14,7 +14,7 @@
 //
 // Energy. The limit is guard.energy × (E_0 + Σ ½ M v²), E_0 the kinetic energy that the case starts with and v the
 // speed that the body can be driven to:
-//     v = max(v_p, U_w + v_a + v_s)        v_p: tow, closing walls, reference speed of the solver; U_w: fastest current, twice where Coriolis acts about it
+//     v = max(v_p, U_w + v_a + v_s + v_l)  v_p: tow, closing walls, reference speed of the solver; U_w: fastest current, twice where Coriolis acts about it
 // Contacts take energy out, so no distribution of it among the bodies exceeds the sum, but for the work of what has a
 // prescribed velocity and of the line, both of the order of v_p; guard.energy leaves room for that, as for the speed of
 // a floe squeezed out of a wedge.
@@ -26,7 +26,8 @@
 // Rejected: U_a itself, which is a bound, too, but fifty times what ice does in wind: energy of 10⁴ times that is a
 // pack at a hundred times the speed of the wind.
 // Slope. An acceleration a = g |∇η| against drag ends at √(M a / k_w), or after the run at a T: v_s is the smaller one,
-// at least a Δt; k_w for the least width that the outline can have, area over diameter.
+// at least a Δt; k_w for the least width that the outline can have, area over diameter. Explicit forces of other laws
+// (forces.h), as they are at the start, add to a; a linear one draws the body to the velocity v_l = |j|/g.
 //
 // The state before the step. No step keeps one, which would cost more than a step where ice rests. A run repeats itself
 // to the bit, so the state is made again, from the last checkpoint or from the start, up to the step before (run.c).

@@ -189,6 +189,7 @@ static void total_up(run *r)
     r->totals.events = &r->w->events;
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
     r->totals.floes_outside = count_outside(r);
+    r->totals.ice_area = bt_observe_ice_area(r->w);
     measure_memory(r);
     r->totals.state_hash = bt_world_hash(r->w);
     r->totals.window = r->w->window;

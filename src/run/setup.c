@@ -30,6 +30,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
     double water[2], air[2]; // at time zero; where they change, each step sets its own
     bt_environment_at(c, true, 0, water);
     bt_environment_at(c, false, 0, air);
+    const double rise = c->ice.density * (1 - c->ice.density / c->water.density) * GRAVITY; // of potential energy: contact/raft.h
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -48,6 +49,9 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .size = size,
         .crush_pressure = c->ice.crushing_pressure,
         .crush_least = c->ice.crushing_least,
+        .raft_line = c->ice.rafting_kappa * 0.5 * rise,
+        .raft_sheet = (c->water.density - c->ice.density) * GRAVITY,
+        .raft_rise = rise,
         .water_u = water[0],
         .water_v = water[1],
         .air_u = air[0],
@@ -192,6 +196,7 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
     if (c->ice.start != BT_START_DRIFT) return;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    bt_forces_setup(w, c);
     double v[2 * BT_MAX_VERTICES], thicknesses[2];
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
@@ -388,6 +393,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     w->environment = bt_environment_create(c);
+    bt_forces_setup(w, c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;

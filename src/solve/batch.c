@@ -13,14 +13,18 @@ enum { LANES = 4, OPEN = 8 }; // OPEN: batches that wait for more units, when a 
 typedef double vec __attribute__((vector_size(LANES * sizeof(double))));
 typedef int64_t mask __attribute__((vector_size(LANES * sizeof(int64_t))));
 
+typedef enum { RIGID, BOUNDED, SHEETS } kind_of_units; // of a batch
+
 /// Names as in bt_unit; lanes without a unit are zero.
 typedef struct bt_batch {
     vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2], mu;
     vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
     vec x[3], before[3], y[3]; // impulses: now, before the last sweep, after the move
+    vec bound[2];              // of the normals; bound[0] of sheets: the radius of their disc
     bt_idx a[LANES], b[LANES], unit[LANES];
     bool moves_a[LANES], moves_b[LANES];
     int n;
+    kind_of_units kind;
 } bt_batch;
 
 // One copy for each instruction set that the program is built for, chosen when it starts.
@@ -31,9 +35,11 @@ typedef struct bt_batch {
 #endif
 #define INLINE static inline __attribute__((always_inline))
 
-bool bt_batch_is_for(const bt_tile *tile) { return !tile->limits && tile->phase != BT_COLOURS; }
+bool bt_batch_is_for(const bt_tile *tile) { return !(tile->limits && tile->rising) && tile->phase != BT_COLOURS; }
 
 // --- packing ---------------------------------------------------------------------------------------------------------
+
+static kind_of_units kind_of(const bt_tile *tile, const bt_unit *u) { return !tile->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS; }
 
 static bool holds(const bt_batch *o, bt_idx body)
 {
@@ -58,6 +64,7 @@ static void put(bt_batch *o, const bt_tile *tile, bt_idx i, const bt_inv *inv)
     o->x[2][l] = u->lt;
     for (int c = 0; c < 3; c++) o->before[c][l] = tile->before[i][c];
     o->ma[l] = inv[u->a].m, o->ia[l] = inv[u->a].i, o->mb[l] = inv[u->b].m, o->ib[l] = inv[u->b].i;
+    for (int c = 0; tile->limits && c < 2; c++) o->bound[c][l] = tile->limits[i].flat[c];
     o->a[l] = u->a, o->b[l] = u->b, o->unit[l] = i;
     o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
 }
@@ -74,11 +81,18 @@ static bt_batch *begin_batch(bt_tile *tile, const bt_unit *u)
     }
     bt_batch *o = &tile->batch[tile->n_batches++];
     memset(o, 0, sizeof *o);
+    o->kind = kind_of(tile, u);
     for (int l = 0; l < LANES; l++) o->a[l] = u->a, o->b[l] = u->b; // of lanes that stay empty: read, never written
     return o;
 }
 
-/// Each unit goes into the first of the last OPEN batches that is not full and has none of its bodies. Those that filled up leave the window.
+/// May a unit stand in a batch?
+static bool fits(const bt_batch *o, const bt_unit *u, kind_of_units kind, const bt_inv *inv)
+{
+    return o->kind == kind && !(inv[u->a].m > 0 && holds(o, u->a)) && !(inv[u->b].m > 0 && holds(o, u->b));
+}
+
+/// Each unit goes into the first of the last OPEN batches that is not full, is of its kind and has none of its bodies. Those that filled up leave the window.
 static void pack(bt_tile *tile, const bt_inv *inv)
 {
     bt_idx open[OPEN];
@@ -88,7 +102,8 @@ static void pack(bt_tile *tile, const bt_inv *inv)
     for (bt_idx j = 0; j < tile->n_list; j++) {
         const bt_unit *u = &tile->units[tile->list[j]];
         int k = 0;
-        while (k < n_open && ((inv[u->a].m > 0 && holds(&tile->batch[open[k]], u->a)) || (inv[u->b].m > 0 && holds(&tile->batch[open[k]], u->b)))) k++;
+        const kind_of_units kind = kind_of(tile, u);
+        while (k < n_open && !fits(&tile->batch[open[k]], u, kind, inv)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
             begin_batch(tile, u);
@@ -178,12 +193,77 @@ INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b, v
     *l2 = choose(both, both2, choose(first, zero, only2));
 }
 
+INLINE bool any_of(mask m) { return (m[0] | m[1] | m[2] | m[3]) != 0; }
+
+/// As bt_limit_rim.
+INLINE void rim(const bt_batch *o, const vec b[2], vec l[2])
+{
+    const vec zero = {0}, endless = {INFINITY, INFINITY, INFINITY, INFINITY}, half = {0.5, 0.5, 0.5, 0.5};
+    vec least = endless;
+    mask done = {0};
+    for (int side = 0; side < 4; side++) {
+        const int i = side >> 1, k = 1 - i;
+        vec x[2];
+        x[i] = side & 1 ? o->bound[i] : zero;
+        x[k] = larger(zero, smaller(o->bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
+        const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
+        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) + x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
+        const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless), take = open & (right | (value < least));
+        l[0] = choose(take, x[0], l[0]);
+        l[1] = choose(take, x[1], l[1]);
+        least = choose(take, value, least);
+        done |= open & right;
+    }
+}
+
+/// As bt_limit_normals where no bound rises.
+INLINE void bound_normals(const bt_batch *o, const motion *p, const motion *q, vec *l1, vec *l2)
+{
+    const mask over = (*l1 > o->bound[0]) | (*l2 > o->bound[1]);
+    if (!any_of(over)) return;
+    const vec zero = {0}, un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
+    vec b[2], l[2] = {*l1, *l2};
+    for (int i = 0; i < 2; i++) b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
+    const vec alone = larger(zero, smaller(-b[0] * o->mn[0], o->bound[0]));
+    rim(o, b, l);
+    const mask one = o->mn[1] == zero;
+    *l1 = choose(over, choose(one, alone, l[0]), *l1);
+    *l2 = choose(over & ~one, l[1], *l2);
+}
+
+/// As bt_update_sheets; lanes without a unit have a disc of 0 and no step.
+INLINE vec update_sheets(bt_batch *o, bt_vel *v)
+{
+    motion a = load(v, o->a), b = load(v, o->b);
+    const vec dvx = b.x - a.x, dvy = b.y - a.y;
+    vec x = o->x[0] - (o->nx * dvx + o->ny * dvy + o->rbn[0] * b.w - o->ran[0] * a.w) * o->mn[0];
+    vec y = o->x[2] - (o->nx * dvy - o->ny * dvx + o->rbt * b.w - o->rat * a.w) * o->mt, far = {0};
+    const vec square = x * x + y * y, one = {1, 1, 1, 1};
+    for (int l = 0; l < LANES; l++) far[l] = sqrt(square[l]); // one instruction for all
+    const vec scale = choose(far > o->bound[0], o->bound[0] / far, one);
+    x *= scale;
+    y *= scale;
+    const vec dx = x - o->x[0], dy = y - o->x[2], jx = dx * o->nx - dy * o->ny, jy = dx * o->ny + dy * o->nx;
+    a.x -= o->ma * jx;
+    a.y -= o->ma * jy;
+    a.w -= o->ia * (dx * o->ran[0] + dy * o->rat);
+    b.x += o->mb * jx;
+    b.y += o->mb * jy;
+    b.w += o->ib * (dx * o->rbn[0] + dy * o->rbt);
+    o->x[0] = x, o->x[2] = y;
+    store(v, o->a, o->moves_a, a);
+    store(v, o->b, o->moves_b, b);
+    return larger(size_of(dx), size_of(dy)) * o->wt;
+}
+
 /// As bt_update_unit; the largest corrections, m/s.
 INLINE vec update(bt_batch *o, bt_vel *v)
 {
+    if (o->kind == SHEETS) return update_sheets(o, v);
     motion a = load(v, o->a), b = load(v, o->b);
     vec l1, l2;
     solve_normals(o, &a, &b, &l1, &l2);
+    if (o->kind == BOUNDED) bound_normals(o, &a, &b, &l1, &l2);
     const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
     a.x -= o->ma * jx;
     a.y -= o->ma * jy;

@@ -10,7 +10,8 @@
 //
 // Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever instructions it is
 // translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for AVX2 and for any, and the loader takes the one that fits.
-// The scalar update of src/solve/kernel.h remains for contacts with a large body, which share it, and for bounded impulses (src/contact/limit.h).
+// The scalar update of src/solve/kernel.h remains for contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch
+// holds units of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
 //
 // Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the units.
 #ifndef BERGTOW_BATCH_H

@@ -5,37 +5,8 @@
 
 #include <math.h>
 
-#include "space/tiles.h"
-
-static inline double bt_normal_velocity(const bt_unit *u, int i, const bt_vel *va, const bt_vel *vb)
-{
-    return u->nx * (vb->x - va->x) + u->ny * (vb->y - va->y) + u->rbn[i] * vb->w - u->ran[i] * va->w;
-}
-
-static inline double bt_tangent_velocity(const bt_unit *u, const bt_vel *va, const bt_vel *vb)
-{
-    return u->nx * (vb->y - va->y) - u->ny * (vb->x - va->x) + u->rbt * vb->w - u->rat * va->w;
-}
-
-/// Add impulses to both velocities: normal total jn = Σ λ, its moments Σ λ ra×n and Σ λ rb×n, tangential jt.
-static inline void bt_apply(const bt_unit *u, double jn, double ma, double mb, double jt, bt_inv ia, bt_inv ib, bt_vel *va, bt_vel *vb)
-{
-    const double jx = jn * u->nx - jt * u->ny, jy = jn * u->ny + jt * u->nx;
-    va->x -= ia.m * jx;
-    va->y -= ia.m * jy;
-    va->w -= ia.i * (ma + jt * u->rat);
-    vb->x += ib.m * jx;
-    vb->y += ib.m * jy;
-    vb->w += ib.i * (mb + jt * u->rbt);
-}
-
-static inline double bt_clamp(double x, double bound) { return bt_max(-bound, bt_min(bound, x)); }
-
-/// Bodies of infinite mass are never written: they are shared by tiles that are done at once.
-static inline void bt_store(bt_vel *v, bt_inv inv, const bt_vel *x)
-{
-    if (inv.m > 0) *v = *x;
-}
+#include "solve/limit.h"
+#include "contact/row.h"
 
 /// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them,
 /// none). Two points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
@@ -74,22 +45,71 @@ static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va
     return bt_max(bt_max(fabs(d1) * u->w[0], fabs(d2) * u->w[1]), fabs(dt) * u->wt);
 }
 
-/// Gauss–Seidel update of a manifold: its normals together, then its friction.
-static inline double bt_update_unit(bt_unit *u, bt_vel *v, const bt_inv *inv)
+/// The nearest point of a disc about 0.
+static inline void bt_onto_disc(double radius, double *x, double *y)
 {
-    const bt_vel va = v[u->a], vb = v[u->b];
-    double l1, l2;
-    bt_solve_normals(u, &va, &vb, &l1, &l2);
-    return bt_take_normals(u, l1, l2, va, vb, v, inv);
+    const double far = sqrt(*x * *x + *y * *y), scale = far > radius ? radius / far : 1;
+    *x *= scale;
+    *y *= scale;
 }
 
-/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential).
-static inline double bt_unit_residual(const bt_unit *u, const bt_vel *v, double *sum)
+/// What the friction of sheets would be after a step of its own (contact/raft.h).
+static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x, double *y)
 {
+    *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * u->mn[0];
+    *y = u->lt - bt_tangent_velocity(u, va, vb) * u->mt;
+    bt_onto_disc(k->flat[0], x, y);
+}
+
+static inline double bt_update_sheets(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+{
+    const bt_inv ia = inv[u->a], ib = inv[u->b];
+    bt_vel va = v[u->a], vb = v[u->b];
+    double x, y;
+    bt_sheets_map(u, k, &va, &vb, &x, &y);
+    const double dx = x - u->ln[0], dy = y - u->lt;
+    bt_apply(u, dx, dx * u->ran[0], dx * u->rbn[0], dy, ia, ib, &va, &vb);
+    u->ln[0] = x, u->lt = y;
+    bt_store(&v[u->a], ia, &va);
+    bt_store(&v[u->b], ib, &vb);
+    return bt_max(fabs(dx), fabs(dy)) * u->wt;
+}
+
+/// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
+static inline double bt_update_unit(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+{
+    if (u->n == 0) return bt_update_sheets(u, k, v, inv);
+    const bt_vel va = v[u->a], vb = v[u->b];
+    double l[2];
+    bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
+    if (k) bt_limit_normals(k, u, &va, &vb, l);
+    return bt_take_normals(u, l[0], l[1], va, vb, v, inv);
+}
+
+/// What the normal impulse of point i would be with all others held.
+static inline double bt_normal_map(const bt_unit *u, const bt_limit *k, int i, const bt_vel *va, const bt_vel *vb)
+{
+    const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
+    return k ? bt_limit_point(k, u, i, w - u->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * u->mn[i]);
+}
+
+static inline double bt_sheets_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+{
+    double x, y;
+    bt_sheets_map(u, k, &v[u->a], &v[u->b], &x, &y);
+    x = (x - u->ln[0]) * u->wt, y = (y - u->lt) * u->wt;
+    *sum += x * x + y * y;
+    return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
+}
+
+/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential; two of sheets).
+static inline double bt_unit_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+{
+    if (u->n == 0) return bt_sheets_residual(u, k, v, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double worst = 0, total = 0;
     for (int i = 0; i < u->n; i++) {
-        const double r = (bt_max(0, u->ln[i] - (bt_normal_velocity(u, i, va, vb) + u->bias[i]) * u->mn[i]) - u->ln[i]) * u->w[i];
+        const double r = (bt_normal_map(u, k, i, va, vb) - u->ln[i]) * u->w[i];
         worst = bt_max(worst, fabs(r));
         *sum += r * r;
         total += u->ln[i];

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "solve/solver.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
@@ -29,7 +29,7 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
         for (int i = 0; i < u->n; i++) {
             g->push[i] = 0;
             g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (tile->limits) g->after[i] += tile->limits[j].grown[i]; // crushed in this step
+            if (tile->limits) g->after[i] += tile->limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->after[i]);
         }
     }

@@ -13,6 +13,7 @@
 #include "bergtow/sum.h"
 #include "space/tiles.h"
 #include "partition/domain.h"
+#include "contact/work.h"
 #include "contact/pack.h"
 
 typedef struct bt_islands {
@@ -105,8 +106,8 @@ bool bt_restitution_lower(bt_world *w)
         for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
             const bt_unit *u = &ts->tile[k].units[j];
             const double normal = u->ln[0] + u->ln[1];
-            if (normal == 0) continue;
-            bt_sum_add(&s->surplus[island_of(w, u)], bt_solver_work(w, u) - allowed * (normal + fabs(u->lt)));
+            if (normal == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
+            bt_sum_add(&s->surplus[island_of(w, u)], bt_contacts_work(w, u) - allowed * (normal + fabs(u->lt)));
         }
     if (w->domain) bt_domain_add_by_name(w, s->root, s->name, s->surplus);
     double any = 0;

@@ -10,7 +10,6 @@
 #include "solve/batch.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
-#include "contact/limit.h"
 #include "contact/pack.h"
 #include "space/phases.h"
 #include "solve/restitution.h"
@@ -50,7 +49,8 @@ static void start_impulses(bt_tile *tile)
     for (bt_idx i = 0; i < tile->n_units; i++) {
         bt_unit *u = &tile->units[i];
         for (int j = 0; tile->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], tile->limits[i].most[j]);
-        u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+        if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
+        else bt_onto_disc(tile->limits[i].flat[0], &u->ln[0], &u->lt);
         double *x = tile->before[i];
         x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
     }
@@ -97,12 +97,13 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
-        const double r = tile->limits ? bt_limited_residual(u, &tile->limits[i], v, &sum) : bt_unit_residual(u, v, &sum);
+        const double r = bt_unit_residual(u, tile->limits ? &tile->limits[i] : NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
-        rows += u->n + 1;
+        rows += u->n > 0 ? u->n + 1 : 2;
         const double *x = tile->before[i];
         bool on = p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt; // or did before the last sweep
+        if (u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) tile->list[tile->n_list++] = i;
     }
@@ -152,13 +153,10 @@ static double update_list(bt_tile *tile, bt_vel *v, const bt_inv *inv)
 {
     enum { AHEAD = 3 };
     double most = 0;
-    for (bt_idx j = 0; !tile->limits && j < tile->n_list; j++) {
-        fetch_ahead(tile, j + AHEAD);
-        most = bt_max(most, bt_update_unit(&tile->units[tile->list[j]], v, inv));
-    }
-    for (bt_idx j = 0; tile->limits && j < tile->n_list; j++) {
+    for (bt_idx j = 0; j < tile->n_list; j++) {
         const bt_idx i = tile->list[j];
-        most = bt_max(most, bt_update_limited(&tile->units[i], &tile->limits[i], v, inv));
+        fetch_ahead(tile, j + AHEAD);
+        most = bt_max(most, bt_update_unit(&tile->units[i], tile->limits ? &tile->limits[i] : NULL, v, inv));
     }
     return most;
 }
@@ -309,27 +307,4 @@ void bt_solver_solve(bt_world *w)
         if (!lowered) break;
         st->restitution_cut = true;
     }
-}
-
-/// Velocity without contacts: U*, and for the towed body what the line adds to it.
-static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
-{
-    bt_vel v = w->bodies.vel_free[i];
-    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow)) bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
-    return v;
-}
-
-double bt_solver_normal_work(const bt_world *w, const bt_unit *u, int i)
-{
-    const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
-    return 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
-}
-
-double bt_solver_work(const bt_world *w, const bt_unit *u)
-{
-    const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
-    const bt_vel *va = &w->bodies.vel[u->a], *vb = &w->bodies.vel[u->b];
-    double work = 0.5 * u->lt * (bt_tangent_velocity(u, &fa, &fb) + bt_tangent_velocity(u, va, vb));
-    for (int i = 0; i < u->n; i++) work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
-    return work;
 }

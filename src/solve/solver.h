@@ -21,8 +21,8 @@
 // berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over all units, as the reference; both end
 // on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
 //
-// With ice.crushing.pressure the normal impulses have an upper bound, too, λ_n <= L(w_n) (contact/crush.h, src/contact/limit.h): the sweep over a tile
-// is another one then, and in the natural map the projection is on [0, L].
+// Where a contact law applies (contact/law.h) the normal impulses have an upper bound, too, λ_n <= L(w_n) (src/solve/limit.h), and in the natural map
+// the projection is on [0, L].
 //
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
@@ -32,6 +32,7 @@
 #define BERGTOW_SOLVER_H
 
 #include "contact/contacts.h"
+#include "contact/work.h"
 #include "space/tiles.h"
 #include "tow/tow.h"
 #include "bergtow/world.h"
@@ -64,14 +65,6 @@ void bt_solver_project(bt_world *w);
 
 /// Natural-map residual at the present velocities and impulses: largest, and root mean square (or NULL), m/s. Collective.
 double bt_solver_residual(bt_world *w, double *rms);
-
-/// Work of the impulses of unit u in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
-/// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of two impulses that
-/// act at once the line's comes first, or the pull of the line into the ice would count as work of the ice.
-double bt_solver_work(const bt_world *w, const bt_unit *u);
-
-/// The part of it of the normal impulse of point i, J.
-double bt_solver_normal_work(const bt_world *w, const bt_unit *u, int i);
 
 /// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
 bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #include "body/bodies.h"
-#include "contact/crush.h"
 #include "space/exchange.h"
+#include "space/margin.h"
 
 #define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
 
@@ -22,7 +22,7 @@ static void free_tile(bt_tile *t)
     free(t->units);
     free(t->gaps);
     free(t->limits);
-    free(t->scars);
+    free(t->memory);
     free(t->list);
     free(t->before);
     free(t->batch);
@@ -61,13 +61,6 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y)
     x -= t->low_x, y -= t->low_y;
     if (x < 0 || y < 0 || x >= t->n_x || y >= t->n_y) return -1;
     return t->at[(int64_t)y * t->n_x + x];
-}
-
-bool bt_tiles_calm(const bt_world *w)
-{
-    const bt_params *p = &w->par;
-    const bool balanced = p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
-    return balanced && p->tilt_ax == 0 && p->tilt_ay == 0 && p->air_u == p->water_u && p->air_v == p->water_v;
 }
 
 // --- busy tiles ------------------------------------------------------------------------------------------------------
@@ -352,27 +345,46 @@ static void make_tiles(bt_world *w)
 
 // --- what the contacts were ------------------------------------------------------------------------------------------
 
+int bt_trace_by_names(const void *p, const void *q)
+{
+    const bt_trace *a = p, *b = q;
+    if (a->a != b->a) return a->a < b->a ? -1 : 1;
+    if (a->b != b->b) return a->b < b->b ? -1 : 1;
+    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
+    if (a->part[1] != b->part[1]) return a->part[1] < b->part[1] ? -1 : 1;
+    return a->law - b->law;
+}
+
+void bt_tiles_remember(bt_tile *t, const bt_trace *r)
+{
+    if (t->n_memory == t->cap_memory) {
+        t->cap_memory = t->cap_memory ? 2 * t->cap_memory : 8;
+        t->memory = bt_realloc(t->memory, (size_t)t->cap_memory, sizeof *t->memory);
+    }
+    t->memory[t->n_memory++] = *r;
+}
+
+static bt_trace trace_of(const bt_gid *gid, const bt_pair *p)
+{
+    return (bt_trace){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = p->n_points,
+                      .feature = {p->feature[0], p->feature[1]}, .value = {p->ln[0], p->ln[1], p->lt}};
+}
+
 bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n)
 {
     const bt_tiles *t = w->tiles;
-    const bt_gid *gid = w->bodies.gid;
     int64_t cap = 0;
     for (bt_idx k = 0; k < t->n; k++) {
         for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) cap += t->tile[k].pairs[i].n_points > 0;
-        if (t->tile[k].own) cap += t->tile[k].n_scars;
+        if (t->tile[k].own) cap += t->tile[k].n_memory;
     }
     bt_trace *trace = bt_alloc((size_t)cap, sizeof *trace);
     *n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_scars; i++) {
-            const bt_scar *s = &t->tile[k].scars[i];
-            trace[(*n)++] = (bt_trace){s->a, s->b, {s->part[0], s->part[1]}, s->n, {s->feature[0], s->feature[1]}, {s->depth[0], s->depth[1]}, 0, true};
-        }
-        for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) {
-            const bt_pair *p = &t->tile[k].pairs[i];
-            if (p->n_points > 0)
-                trace[(*n)++] = (bt_trace){gid[p->a], gid[p->b], {p->part[0], p->part[1]}, p->n_points, {p->feature[0], p->feature[1]}, {p->ln[0], p->ln[1]}, p->lt, false};
-        }
+        const bt_tile *tile = &t->tile[k];
+        for (bt_idx i = 0; tile->own && i < tile->n_memory; i++) trace[(*n)++] = tile->memory[i];
+        for (bt_idx i = 0; tile->own && i < tile->n_pairs; i++)
+            if (tile->pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &tile->pairs[i]);
     }
     return trace;
 }
@@ -389,25 +401,16 @@ bt_idx bt_tiles_of_pair(const bt_world *w, bt_idx a, bt_idx b)
     return bt_tiles_at(t, at[0], at[1]);
 }
 
-static int by_gids(const void *p, const void *q)
-{
-    const bt_trace *a = p, *b = q;
-    if (a->a != b->a) return a->a < b->a ? -1 : 1;
-    if (a->b != b->b) return a->b < b->b ? -1 : 1;
-    if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
-    return a->part[1] < b->part[1] ? -1 : a->part[1] > b->part[1];
-}
-
 void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
 {
     bt_tiles *t = w->tiles;
-    if (n > 0) qsort(trace, (size_t)n, sizeof *trace, by_gids);
+    if (n > 0) qsort(trace, (size_t)n, sizeof *trace, bt_trace_by_names);
     for (int64_t k = 0; k < n; k++) {
         const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
         if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
         bt_tile *tile = &t->tile[bt_tiles_of_pair(w, a, b)];
-        if (trace[k].scar) {
-            bt_crush_add(tile, &(bt_scar){trace[k].a, trace[k].b, {trace[k].part[0], trace[k].part[1]}, trace[k].n_points, {trace[k].feature[0], trace[k].feature[1]}, {trace[k].ln[0], trace[k].ln[1]}});
+        if (trace[k].law != 0) {
+            bt_tiles_remember(tile, &trace[k]);
             continue;
         }
         if (tile->n_pairs == tile->cap_pairs) {
@@ -415,10 +418,10 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
             tile->pairs = bt_realloc(tile->pairs, (size_t)tile->cap_pairs, sizeof *tile->pairs);
         }
         bt_pair *p = &tile->pairs[tile->n_pairs++];
-        *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].lt};
+        *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
         memcpy(p->part, trace[k].part, sizeof p->part);
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
-        memcpy(p->ln, trace[k].ln, sizeof p->ln);
+        memcpy(p->ln, trace[k].value, sizeof p->ln);
     }
 }
 
@@ -486,7 +489,6 @@ void bt_tiles_begin(bt_world *w)
     } else if (w->exchange && w->exchange->due(w)) {
         deal(w, false, 0);
     }
-    t->calm = bt_tiles_calm(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_tiles_wake_all(t);
 }

@@ -20,7 +20,7 @@
 // four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on every rank.
 //
 // Rest. A tile T is idle, and costs nothing, when every floe in its block and in a ring of tiles around it has exactly the
-// velocity of the water, there is no other force (bt_tiles_calm), no large body that moves is near, and the position projection
+// velocity of the water, there is no other force (bt_forces_rest), no large body that moves is near, and the position projection
 // moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
 // never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
 // caught after the solve (step.c).
@@ -64,7 +64,7 @@ typedef struct bt_unit {
     double bias[2];        ///< b of the normals, m/s
     double mu;
     double ln[2], lt;      ///< impulse on b, N s
-    int32_t n, spare;      ///< points, 1 or 2
+    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
 } bt_unit;
 _Static_assert(sizeof(bt_unit) == 192, "three cache lines");
 
@@ -75,6 +75,16 @@ typedef struct bt_gaps {
     double push[2];        ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the tile
 } bt_gaps;
+
+/// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).
+typedef struct bt_trace {
+    bt_gid a, b;
+    uint16_t part[2];    ///< as in bt_pair
+    int32_t n_points;
+    uint32_t feature[2]; ///< of the points
+    double value[4];     ///< rigid: impulses as in bt_pair (ln, lt), N s; of other laws: see there
+    uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
+} bt_trace;
 
 typedef struct bt_tile {
     int32_t x, y;                   ///< coordinates
@@ -101,10 +111,11 @@ typedef struct bt_tile {
     bt_idx n_units, cap_units;
     int64_t n_points;
     double overlap;                 ///< deepest, m
-    // crushing (crush.h); NULL in rigid contact
-    struct bt_limit *limits;        ///< [n_units] bounds of the units
-    struct bt_scar *scars;          ///< [n_scars] what pairs of this tile have crushed
-    bt_idx cap_limits, n_scars, cap_scars;
+    // contact laws (contact/law.h)
+    struct bt_limit *limits;        ///< [n_units] bounds of the units; NULL where contacts are rigid
+    bt_trace *memory;               ///< [n_memory] what laws remember of pairs of this tile, sorted by bt_trace_by_names
+    bt_idx cap_limits, n_memory, cap_memory;
+    bool rising;                    ///< some bounds have a rising part
     // units that are swept (src/solve/rounds.h)
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_units] unknowns before the last sweep
@@ -165,7 +176,6 @@ typedef struct bt_tiles {
     bt_idx n_shares, cap_shares;    ///< threads
     bt_idx n_units;                 ///< on this rank
     bool relabel;                   ///< some floe stands too far outside its tile: renew before the next step
-    bool calm;                      ///< nothing but contacts moves a floe that drifts with the water
     bool still;                     ///< the water is at rest
     int64_t n_labellings, n_listings;
 } bt_tiles;
@@ -202,17 +212,12 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y);
 /// May the bodies of tile k have another velocity, or pose, than by drifting with the water?
 static inline bool bt_tiles_moves(const bt_tiles *t, bt_idx k) { return !t->rest[k] || t->awake[k]; }
 
-/// What the last step left in a pair, by the names that last.
-typedef struct bt_trace {
-    bt_gid a, b;
-    uint16_t part[2];
-    int32_t n_points;
-    uint32_t feature[2];
-    double ln[2], lt;
-    bool scar;           ///< not a contact but what the pair has crushed (crush.h): ln are the depths, m
-} bt_trace;
+/// In the order of (a, b, part, law).
+int bt_trace_by_names(const void *p, const void *q);
+/// Append a record to the memory of a tile.
+void bt_tiles_remember(bt_tile *t, const bt_trace *r);
 
-/// Traces of the pairs in contact, and of those that have crushed each other, that this rank owns, [*n]; the caller frees.
+/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller frees.
 bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n);
 /// Collective. Tiles as another run left them: their geometry and the labels of all bodies, which every rank holds, have been set, and the
 /// traces [n], which are released, are those of all ranks. A domain has been created, but nothing is dealt yet.
@@ -222,9 +227,5 @@ void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n);
 
 /// Tile that owns the contacts of bodies a and b, −1 = not here.
 bt_idx bt_tiles_of_pair(const bt_world *w, bt_idx a, bt_idx b);
-
-/// True when only contacts can move a floe that has the velocity of the water: no wind of another velocity, no Coriolis force
-/// or tilt out of balance.
-bool bt_tiles_calm(const bt_world *w);
 
 #endif

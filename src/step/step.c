@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 // One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
 #include <math.h>
+#include <string.h>
 
+#include "contact/work.h"
 #include "contact/contacts.h"
-#include "contact/crush.h"
+#include "contact/law.h"
 #include "force/environment.h"
 #include "bergtow/forces.h"
 #include "loads/impact.h"
@@ -80,6 +82,7 @@ static void advance(bt_world *w)
     bt_environment_advance(w);
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
+    const bool calm = bt_forces_rest(w);
     double farthest = 0, out = 0;
 #pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_TILES))
     for (bt_idx j = 0; j < ts->n_busy; j++) {
@@ -96,7 +99,7 @@ static void advance(bt_world *w)
         ts->moved[k] += path;
         if (!last) farthest = bt_max(farthest, path);
         if (!moves || last) continue;
-        if (!ts->calm || !at_rest(w, t)) ts->rest[k] = BT_REST_NO;
+        if (!calm || !at_rest(w, t)) ts->rest[k] = BT_REST_NO;
         else if (!ts->rest[k]) ts->rest[k] = BT_REST_NEW; // where forces have been told, they would find what they found
     }
     ts->moved_any += farthest;
@@ -127,9 +130,9 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
     for (bt_idx j = 0; j < tile->n_units; j++) {
         const bt_unit *u = &tile->units[j];
         const double normal = u->ln[0] + u->ln[1];
-        if (normal == 0) continue;
-        bt_sum_add(&t->sum[EXCHANGED], normal);
-        bt_sum_add(&t->sum[WORK], bt_solver_work(w, u));
+        if (normal == 0 && u->lt == 0) continue;
+        bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
+        bt_sum_add(&t->sum[WORK], bt_contacts_work(w, u));
         const double sign = (b->inv[u->b].m > 0) - (b->inv[u->a].m > 0);
         if (sign == 0) continue;
         bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
@@ -240,15 +243,17 @@ void bt_world_step(bt_world *w)
     bt_window_begin(w);
     bt_tiles_begin(w);
     clock_phase(w, &st->detect_s, &t0);
+    if (w->tow) memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     clock_phase(w, &st->forces_s, &t0);
     solve_contacts(w); // U2
     t0 = bt_clock();
-    bt_crush_grow(w);
+    bt_laws_grow(w);
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
+    bt_forces_record(w); // of the towed body, at X1
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
     bt_window_advance(w);

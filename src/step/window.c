@@ -30,7 +30,8 @@ typedef struct candidate {
     bool stays;
 } candidate;
 
-/// Mean floe: its drag as that of all floes together over their number. Mean width of a convex outline: perimeter / π (Cauchy).
+/// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has no direction has a width of
+/// its own. Mean width of a convex outline: perimeter / π (Cauchy).
 static void mean_floe(const bt_world *w, bt_window *v)
 {
     const bt_bodies *b = &w->bodies;
@@ -42,15 +43,20 @@ static void mean_floe(const bt_world *w, bt_window *v)
         for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
         v->mass += b->mass[i];
         v->share += b->share[i] * b->mass[i];
-        v->water += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
-        v->air += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
+        v->inertia += b->inertia[i];
+        v->radius += b->radius[i];
+        v->area += b->area[i];
+        v->thickness += b->thickness[i];
+        v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
+        v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
         v->vel.x += b->vel[i].x;
         v->vel.y += b->vel[i].y;
         n++;
     }
     if (n == 0) return;
     v->share /= v->mass;
-    v->mass /= n, v->water /= n, v->air /= n;
+    v->mass /= n, v->drag.water_skin /= n, v->drag.air_skin /= n;
+    v->inertia /= n, v->radius /= n, v->area /= n, v->thickness /= n;
     v->vel.x /= n, v->vel.y /= n;
 }
 
@@ -358,26 +364,21 @@ void bt_window_begin(bt_world *w)
     let_go(w);
 }
 
-/// One step of the free drift of the mean floe, as bt_forces_predict does it for every floe: linearised drag, implicit; so what has the velocity
-/// of the water keeps it to the last bit.
+/// A step of the free drift of the mean floe by the table of force laws, as of every floe; so what has the velocity of the water keeps it to the last
+/// bit.
 void bt_window_advance(bt_world *w)
 {
     bt_window *v = w->window;
     if (!v) return;
-    const bt_params *p = &w->par;
-    bt_vel u = v->vel;
-    const double water = v->water * hypot(p->water_u - u.x, p->water_v - u.y), air = v->air * hypot(p->air_u - u.x, p->air_v - u.y);
-    const bt_turning r = bt_forces_turning(p, v->share);
-    bt_forces_turn(p, &r, &u);
-    if (water + air > 0) {
-        const double per_mass = 1 / (v->mass + p->dt * (water + air));
-        u.x = (v->mass * u.x + p->dt * (water * p->water_u + air * p->air_u)) * per_mass;
-        u.y = (v->mass * u.y + p->dt * (water * p->water_v + air * p->air_v)) * per_mass;
-    }
+    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
+    const bt_bodies one = {.n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
+    bt_force_body mean = {.drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
+    bt_vel u = bt_forces_drift(w, &mean);
+    u.w = 0;
     if (v->held) u.y = 0;
     v->vel = u;
-    v->drift_x += p->dt * u.x;
-    v->drift_y += p->dt * u.y;
+    v->drift_x += w->par.dt * u.x;
+    v->drift_y += w->par.dt * u.y;
 }
 
 uint64_t bt_window_hash(const bt_window *v)

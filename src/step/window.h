@@ -33,7 +33,8 @@ typedef struct bt_window {
     double zone;          ///< depth of the front zone, m
     bt_gid n_floes;       ///< bodies below this id are renewed
     bool held;            ///< walls at the sides: the mother field does not drift across
-    double mass, water, air; ///< mean floe: kg; drag per squared velocity of water and air, kg/m
+    double mass, inertia, radius, area, thickness; ///< mean floe
+    bt_drag drag;         ///< its drag, that along the outline as part of the skin's
     double share;         ///< m/M of all floes together
     // state
     double start, rear;   ///< σx of the rear end at first and now, m

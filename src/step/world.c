@@ -6,8 +6,8 @@
 #include <string.h>
 
 #include "body/bodies.h"
-#include "contact/crush.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "loads/impact.h"
 #include "partition/domain.h"
 #include "solve/solver.h"
@@ -23,6 +23,7 @@ bt_world *bt_world_create(const bt_params *p)
     w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
     w->tiles = bt_tiles_create();
     w->solver = bt_solver_create();
+    w->forces = bt_forces_create();
     return w;
 }
 
@@ -32,6 +33,7 @@ void bt_world_free(bt_world *w)
     bt_bodies_free(&w->bodies);
     bt_tiles_free(w->tiles);
     bt_solver_free(w->solver);
+    bt_forces_free(w->forces);
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
@@ -64,11 +66,13 @@ static uint64_t mix_double(uint64_t h, double x)
     return mix(h ^ u);
 }
 
-static uint64_t hash_scar(const bt_scar *s)
+/// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their names.
+static uint64_t hash_trace(const bt_trace *r)
 {
-    uint64_t h = mix(mix(mix((uint64_t)s->a) ^ (uint64_t)s->b) ^ ((uint64_t)s->part[0] << 16 | s->part[1]));
-    for (int i = 0; i < s->n; i++) h = mix_double(mix(h ^ s->feature[i]), s->depth[i]);
-    return h;
+    const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
+    uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ where);
+    for (int i = 0; i < r->n_points; i++) h = mix_double(mix(h ^ r->feature[i]), r->value[i]);
+    return r->law > 1 ? mix_double(mix_double(h, r->value[2]), r->value[3]) : h;
 }
 
 uint64_t bt_world_hash(const bt_world *w)
@@ -85,7 +89,8 @@ uint64_t bt_world_hash(const bt_world *w)
         sum += h;
     }
     for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_scars; i++) sum += hash_scar(&w->tiles->tile[k].scars[i]);
+        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_memory; i++)
+            sum += hash_trace(&w->tiles->tile[k].memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);

@@ -54,7 +54,8 @@ def test_every_number_of_a_case_says_where_it_is_from(name):
     """Every key has a mark [P], [R] or [A], but for the seed, the body's place, and words that choose a form."""
     plain = {"x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type", "conversion"}
     told = 0
-    for line in (FIELD / f"{name}.yml").read_text().splitlines():
+    lists_on_one_line = re.sub(r"\],\n\s+\[", "], [", (FIELD / f"{name}.yml").read_text())
+    for line in lists_on_one_line.splitlines():
         match = re.match(r"\s*(?:- )?(\w+): ", line)
         if not match or match[1] in plain or line.startswith("#"):
             continue

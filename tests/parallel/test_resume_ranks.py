@@ -61,7 +61,7 @@ def test_everything_at_once(tmp_path):
     done(1, "run", path, "-o", "whole", "--quiet", "--threads", 1, cwd=tmp_path)
     done(2, "run", path, "-o", "cut", "--quiet", "--threads", 1, "--steps", 131, cwd=tmp_path)
     with h5py.File(tmp_path / "cut/checkpoint.h5") as f:
-        assert f["contacts/crushed"][:].any() and f["bodies/copy"][:].any() and f["contacts/part"][:].any()
+        assert f["contacts/law"][:].any() and f["bodies/copy"][:].any() and f["contacts/part"][:].any()
     done(3, "resume", "cut", "--quiet", "--threads", 1, "--steps", 97, cwd=tmp_path)
     done(1, "resume", "cut", "--quiet", "--threads", 2, cwd=tmp_path)
     assert_same_result(tmp_path / "whole", tmp_path / "cut")

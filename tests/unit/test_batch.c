@@ -14,6 +14,7 @@ enum { BODIES = 60, UNITS = 230, LANES = 4 };
 typedef struct {
     bt_tile tile;
     bt_unit units[UNITS];
+    bt_limit limits[UNITS];
     double before[UNITS][3];
     bt_idx list[UNITS];
     bt_vel v[BODIES];
@@ -50,6 +51,31 @@ static bt_unit random_unit(uint64_t *rng, const bt_inv *inv)
     return u;
 }
 
+/// Sheets between the bodies of a unit: two components, one step length.
+static void make_sheets(bt_unit *u, const bt_inv *inv, uint64_t *rng)
+{
+    const bt_inv p = inv[u->a], q = inv[u->b];
+    *u = (bt_unit){.a = u->a, .b = u->b, .nx = 1, .ran = {any(rng)}, .rbn = {any(rng)}, .rat = any(rng), .rbt = any(rng), .ln = {any(rng)}, .lt = any(rng)};
+    u->w[0] = u->wt = p.m + q.m + p.i * (u->ran[0] * u->ran[0] + u->rat * u->rat) + q.i * (u->rbn[0] * u->rbn[0] + u->rbt * u->rbt);
+    u->mn[0] = u->mt = 1 / u->wt;
+}
+
+/// Flat bounds for all units; a third of them become sheets.
+static void bind(knot_of_floes *s, uint64_t *rng)
+{
+    s->tile.limits = s->limits;
+    for (bt_idx i = 0; i < UNITS; i++) {
+        bt_limit *l = &s->limits[i];
+        *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
+        if (scene_uniform(rng) < 0.35) {
+            make_sheets(&s->units[i], s->inv, rng);
+            l->flat[0] = scene_uniform(rng) < 0.1 ? 0 : scene_uniform(rng);
+        } else if (scene_uniform(rng) < 0.8) {
+            for (int c = 0; c < s->units[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
+        }
+    }
+}
+
 static void fill(knot_of_floes *s, uint64_t *rng, double listed)
 {
     memset(s, 0, sizeof *s);
@@ -76,7 +102,10 @@ static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
-        for (bt_idx j = 0; j < s->tile.n_list; j++) largest = bt_max(largest, bt_update_unit(&s->units[order[j]], s->v, s->inv));
+        for (bt_idx j = 0; j < s->tile.n_list; j++) {
+            const bt_limit *l = s->tile.limits ? &s->limits[order[j]] : NULL;
+            largest = bt_max(largest, bt_update_unit(&s->units[order[j]], l, s->v, s->inv));
+        }
         if (n == 0) *most = largest;
     }
     double against = 0;
@@ -97,6 +126,7 @@ static void batches_do_what_single_updates_do(void **state)
     uint64_t rng = 5;
     for (int k = 0; k < 300; k++) {
         fill(&four, &rng, k % 3 ? 0.8 : 0.03);
+        if (k % 5 > 1) bind(&four, &rng);
         one = four;
         const bt_sweep o = {.moves = k % 2, .beta = k % 4 == 1 ? 0.7 : 0};
         const int times = 1 + k % 3;

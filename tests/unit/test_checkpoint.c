@@ -49,7 +49,7 @@ static void write_file(const char *name, const char *text)
 enum { LATER = 3 };
 
 // What each case must show in its steps, or it tests nothing.
-enum { LINE_PULLS = 1, BREAKS = 2, RENEWS = 4, CRUSHES = 8, COLLIDES = 16, PARTS = 32, WRAPS = 64, RELABELS = 128, RESTS = 256, WAYPOINT = 512 };
+enum { LINE_PULLS = 1, BREAKS = 2, RENEWS = 4, CRUSHES = 8, COLLIDES = 16, PARTS = 32, WRAPS = 64, RELABELS = 128, RESTS = 256, WAYPOINT = 512, RAFTS = 1024 };
 
 static const struct scenario {
     const char *name, *text;
@@ -104,6 +104,14 @@ static const struct scenario {
      "lead: {mode: managed, width: 2.4, length: 4, floe_size: 0.4}\n"
      "solver: {tile: 2.5, max_sweeps: 60}\n",
      10, 50, CRUSHES | LINE_PULLS},
+    {"rafting and crushing in a moving window",
+     "run: {dt: 0.1, duration: 20}\n"
+     "domain: {length: 16, width: 8, ends: moving}\n"
+     "ice: {concentration: 0.75, size: 0.8, friction: 0.35, restitution: 0.1, thickness: 0.04, thickness_law: lognormal, crushing: {pressure: 100 Pa}, rafting: {kappa: 6}}\n"
+     "body: {length: 2}\n"
+     "tow: {mode: line, speed: 0.8, ramp: 1, line_length: 2}\n"
+     "solver: {tile: 2.5, max_sweeps: 60}\n",
+     90, 60, RAFTS | CRUSHES | RENEWS},
     {"walls that close on a periodic pack, rebounding",
      "run: {dt: 0.1, duration: 10}\n"
      "domain: {length: 16, width: 10, ends: periodic, sides_closing: 0.4}\n"
@@ -206,6 +214,7 @@ static int seen_in(const bt_world *w)
     for (int64_t k = 0; k < w->events.n; k++) seen |= w->events.event[k].kind == BT_EVENT_LINE_BROKEN ? BREAKS : WAYPOINT;
     if (w->window && w->window->renewed > 0) seen |= RENEWS;
     if (w->stats.n_crushing > 0) seen |= CRUSHES;
+    if (w->stats.n_rafting > 0 && w->stats.raft_friction_work > 0) seen |= RAFTS;
     if (w->impacts && w->impacts->n_closed + w->impacts->n_open > 0) seen |= COLLIDES;
     if (w->tiles->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// The sweep's arithmetic for units whose normal impulses are bounded (private to the solver); equations in contact/crush.h.
+// Normal impulses of a unit under bounds (private to the solver); the shape of a bound is in contact/law.h.
 #ifndef BERGTOW_LIMIT_H
 #define BERGTOW_LIMIT_H
 
-#include "contact/crush.h"
-#include "solve/kernel.h"
+#include <math.h>
+
+#include "contact/law.h"
+#include "contact/row.h"
 
 /// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising part of the bound,
 /// λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 + slope W), where it is above the flat part
@@ -58,36 +60,14 @@ static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const doubl
         for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, i, b[i] + u->w12 * l[1 - i]);
 }
 
-/// bt_update_unit with bounds. The solution without them is the one with them where it keeps below their flat parts: nearly everywhere.
-static inline double bt_update_limited(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+/// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is below the flat parts.
+static inline void bt_limit_normals(const bt_limit *k, const bt_unit *u, const bt_vel *va, const bt_vel *vb, double l[2])
 {
-    const bt_vel va = v[u->a], vb = v[u->b];
-    double l[2];
-    bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
-    if (l[0] > k->flat[0] || l[1] > k->flat[1]) {
-        double b[2];
-        for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, &va, &vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
-        if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
-        else bt_limit_two(k, u, b, l);
-    }
-    return bt_take_normals(u, l[0], l[1], va, vb, v, inv);
-}
-
-/// bt_unit_residual with bounds: a row is judged by what it would be with all others held.
-static inline double bt_limited_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
-{
-    const bt_vel *va = &v[u->a], *vb = &v[u->b];
-    double worst = 0, total = 0;
-    for (int i = 0; i < u->n; i++) {
-        const double b = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i];
-        const double r = (bt_limit_point(k, u, i, b) - u->ln[i]) * u->w[i];
-        worst = bt_max(worst, fabs(r));
-        *sum += r * r;
-        total += u->ln[i];
-    }
-    const double wt = bt_tangent_velocity(u, va, vb), r = (bt_clamp(u->lt - wt * u->mt, u->mu * total) - u->lt) * u->wt;
-    *sum += r * r;
-    return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY;
+    if (!(l[0] > k->flat[0] || l[1] > k->flat[1])) return;
+    double b[2] = {0};
+    for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
+    if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
+    else bt_limit_two(k, u, b, l);
 }
 
 #endif

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// The table of contact laws, and what is the same for all of them; contact/law.h.
+#include "contact/law.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#include "contact/crush.h"
+#include "contact/raft.h"
+#include "partition/domain.h"
+#include "contact/row.h"
+
+const bt_law bt_laws[BT_LAWS] = {
+    [BT_LAW_RIGID] = {.name = "rigid", .what = "a contact bears any load"},
+    [BT_LAW_CRUSHING] = {.name = "crushing", .keys = "ice.crushing", .on = bt_crush_on,
+                         .what = "ice bears a pressure, and what cannot be borne is crushed", .applies = bt_crush_applies,
+                         .bound = bt_crush_bound, .keeps = bt_crush_keeps, .gives_way = bt_crush_gives_way,
+                         .give_way = bt_crush_give_way, .remember = bt_crush_remember, .count = bt_crush_count},
+    [BT_LAW_RAFTING] = {.name = "rafting", .keys = "ice.rafting", .on = bt_raft_on,
+                        .what = "edges bear a line load, and floes that are pressed together harder slide over each other",
+                        .applies = bt_raft_applies, .contact = bt_raft_contact, .bound = bt_raft_bound, .keeps = bt_raft_keeps,
+                        .gives_way = bt_raft_gives_way, .give_way = bt_raft_give_way, .remember = bt_raft_remember,
+                        .count = bt_raft_count},
+};
+
+bool bt_law_on(const bt_params *p, int law) { return bt_laws[law].on && bt_laws[law].on(p); }
+
+bool bt_laws_on(const bt_params *p)
+{
+    for (int law = 0; law < BT_LAWS; law++)
+        if (bt_law_on(p, law)) return true;
+    return false;
+}
+
+bool bt_laws_rise(const bt_params *p) { return bt_law_on(p, BT_LAW_CRUSHING); }
+
+// --- memory ----------------------------------------------------------------------------------------------------------
+
+void bt_laws_prune(const bt_world *w, bt_tile *t)
+{
+    bt_idx kept = 0;
+    for (bt_idx k = 0; k < t->n_memory; k++)
+        if (bt_laws[t->memory[k].law].keeps(w, &t->memory[k])) t->memory[kept++] = t->memory[k];
+    t->n_memory = kept;
+}
+
+// --- bounds ----------------------------------------------------------------------------------------------------------
+
+void bt_laws_reserve(bt_tile *t)
+{
+    if (t->n_units <= t->cap_limits) return;
+    t->cap_limits = t->n_units + t->n_units / 4;
+    free(t->limits);
+    t->limits = bt_alloc_aligned((size_t)t->cap_limits, sizeof *t->limits);
+}
+
+void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+{
+    bt_limit *l = &t->limits[j];
+    *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}, .trace = {-1, -1, -1}};
+    // The last first: what has rafted is not measured from what was crushed before.
+    for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {
+        if (m->n_points == 0 && !bt_laws[law].contact) continue; // sheets are of one law alone
+        if (bt_law_on(&w->par, law) && bt_laws[law].applies(w, m->a, m->b)) bt_laws[law].bound(w, t, j, p, m);
+    }
+    for (int i = 0; i < m->n_points; i++) l->place[i] = bt_max(t->gaps[j].gap[i], 0) / w->par.dt;
+}
+
+double bt_laws_overlap(const bt_tile *t)
+{
+    // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it alone.
+    double deepest = 0;
+    for (bt_idx j = 0; j < t->n_units; j++)
+        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);
+    return deepest;
+}
+
+// --- growth ----------------------------------------------------------------------------------------------------------
+
+/// Where each number of a step comes from.
+static void tell(bt_step_stats *st, const bt_totals *t, const double most[BT_LAWS])
+{
+    st->crushed_work = bt_sum_value(&t->sum[BT_CRUSHED_WORK]);
+    st->n_crushing = (int64_t)bt_sum_value(&t->sum[BT_CRUSHING_POINTS]);
+    st->raft_edge_work = bt_sum_value(&t->sum[BT_RAFT_EDGE_WORK]);
+    st->raft_friction_work = bt_sum_value(&t->sum[BT_RAFT_FRICTION_WORK]);
+    st->n_rafting = (int64_t)bt_sum_value(&t->sum[BT_RAFTING_PAIRS]);
+    st->rafted_area = bt_sum_value(&t->sum[BT_RAFTED_AREA]);
+    st->rafted_energy = bt_sum_value(&t->sum[BT_RAFTED_ENERGY]);
+    st->crushed_depth = most[BT_LAW_CRUSHING];
+    st->rafted_largest = most[BT_LAW_RAFTING];
+}
+
+static void grow_unit(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
+{
+    const bt_unit *u = &t->units[j];
+    const bt_vel *v = w->bodies.vel;
+    bt_limit *l = &t->limits[j];
+    for (int i = 0; i < u->n; i++) {
+        const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
+        if (!(approach > 0)) continue;
+        int law = BT_LAWS - 1;
+        while (law > BT_LAW_RIGID && !bt_laws[law].gives_way(u, l, i)) law--;
+        if (law == BT_LAW_RIGID) continue;
+        l->grown[i] = w->par.dt * approach;
+        bt_laws[law].give_way(w, t, j, i, totals);
+    }
+}
+
+static void grow_tile(bt_world *w, bt_idx k, const void *context, bt_totals *totals)
+{
+    (void)context;
+    bt_tile *t = &w->tiles->tile[k];
+    const bt_idx before = t->n_memory;
+    double most[BT_LAWS] = {0};
+    for (bt_idx j = 0; j < t->n_units; j++) {
+        grow_unit(w, t, j, totals);
+        for (int law = 0; law < BT_LAWS; law++)
+            if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law].remember(w, t, j, totals));
+    }
+    if (t->n_memory > before) qsort(t->memory, (size_t)t->n_memory, sizeof *t->memory, bt_trace_by_names);
+    // One maximum is what a pass carries; of other laws all that counts is in their records.
+    totals->most = bt_max(totals->most, most[BT_LAW_CRUSHING]);
+}
+
+/// All records of this rank, also of pairs that have come to rest against each other and have no units.
+static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *totals)
+{
+    const bt_tiles *ts = w->tiles;
+    for (bt_idx k = 0; k < ts->n; k++)
+        for (bt_idx i = 0; ts->tile[k].own && i < ts->tile[k].n_memory; i++) {
+            const bt_trace *r = &ts->tile[k].memory[i];
+            if (r->law == BT_LAW_CRUSHING && ts->tile[k].n_units > 0) continue;
+            most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
+        }
+}
+
+void bt_laws_grow(bt_world *w)
+{
+    bt_totals t = {.n_sums = BT_LAW_SUMS};
+    double most[BT_LAWS] = {0};
+    if (bt_laws_on(&w->par)) {
+        bt_phases_any_order(w, grow_tile, NULL, &t);
+        most[BT_LAW_CRUSHING] = t.most;
+        count_records(w, most, &t);
+        bt_domain_reduce(w, &t);
+        bt_domain_maxima(w, most, BT_LAWS);
+    }
+    tell(&w->stats, &t, most);
+}

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: MIT
+// Floes that slide over each other, against closed forms: the load on two squares pushed together and apart, a row of floes, a plough, momentum and energy.
+//
+// What turns these tests red: the moment of the gradient with the other sign, a largest area that is forgotten, friction of the largest area instead of the present one, sides that
+// lie on each other and push, a towed body that rafts, a projection that takes rafted overlap back. Each was tried.
+#include "scene.h"
+
+#include "contact/raft.h"
+
+static const double ice = 910, water = 1027, gravity = 9.81, kappa = 8, mu = 0.3, h = 1;
+
+static double rise(void) { return ice * (1 - ice / water) * gravity; }                             // Pa/m
+static double edge_load(void) { return kappa * 0.5 * ice * (1 - ice / water) * gravity * h * h; } // N/m
+static double sheet_load(void) { return mu * (water - ice) * gravity * h; }                        // N/m²
+
+static bt_params params(double dt)
+{
+    bt_params p = scene_params(dt, 10);
+    p.slop = 0.01;
+    p.tolerance = 1e-8;
+    p.raft_line = kappa * 0.5 * rise(), p.raft_rise = rise(), p.raft_sheet = (water - ice) * gravity;
+    return p;
+}
+
+static bt_gid add(bt_world *w, bt_motion motion, int n, double *v, double x, double y, double yaw, double thickness)
+{
+    bt_body_def d = scene_prism(n, v, ice * (thickness > 0 ? thickness : 1));
+    d.motion = motion;
+    d.x = x, d.y = y, d.yaw = yaw;
+    d.thickness = thickness;
+    d.friction = thickness > 0 ? mu : 0;
+    return bt_world_add(w, &d);
+}
+
+static bt_gid add_box(bt_world *w, bt_motion motion, double length, double width, double x, double y, double thickness)
+{
+    double v[8] = {0, 0, length, 0, length, width, 0, width};
+    return add(w, motion, 4, v, x, y, 0, thickness);
+}
+
+static bt_vel *vel(bt_world *w, bt_gid g) { return &w->bodies.vel[bt_world_index(w, g)]; }
+static bt_pose *pose(bt_world *w, bt_gid g) { return &w->bodies.pose[bt_world_index(w, g)]; }
+
+static void set_speed(bt_world *w, bt_gid g, double x)
+{
+    vel(w, g)->x = x;
+    w->bodies.stirred[bt_world_index(w, g)] = 1;
+    w->tiles->relabel = true; // it may lie in a tile that rests
+}
+
+/// Sum of the normal impulses on body g over dt, N.
+static double load_on(const bt_world *w, bt_gid g)
+{
+    double sum = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++)
+        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
+            const bt_unit *u = &w->tiles->tile[k].units[j];
+            if (w->bodies.gid[u->a] == g || w->bodies.gid[u->b] == g) sum += u->ln[0] + u->ln[1];
+        }
+    return sum / w->par.dt;
+}
+
+/// What a step must not break: momentum, work, the size of what is booked.
+static void check_step(const bt_world *w)
+{
+    const bt_step_stats *st = &w->stats;
+    assert_true(st->converged);
+    assert_true(st->momentum_residual < 1e-9);
+    assert_true(st->contact_work <= 1e-6 * (1 + fabs(st->contact_work)));
+    assert_true(st->raft_edge_work >= 0 && st->raft_friction_work >= -1e-9);
+}
+
+/// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more than half under; another pushes it back, where friction
+/// alone resists; pushed again it meets the edge at the depth where it was.
+static void two_squares(void **state)
+{
+    (void)state;
+    const double a = 10, v = 0.05, dt = 0.1;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
+    const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 1e-6, h); // sides that all but lie on each other
+    const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), left = add_box(w, BT_KINEMATIC, 1, 4, -9.5, 0, 0);
+    set_speed(w, right, -v);
+    double work = 0, edge = 0, friction = 0, depth = 0;
+    while (depth < 0.8 * a) {
+        bt_world_step(w);
+        check_step(w);
+        const double f = load_on(w, right);
+        depth = 0.5 * a - pose(w, floe)->x;
+        if (depth > 0) work += f * v * dt;
+        edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+        if (depth > 0.1) CHECK_CLOSE(f, a * (edge_load() + sheet_load() * (depth - v * dt)), 0.002 * f);
+        if (depth > 0.1) CHECK_CLOSE(w->stats.rafted_area, a * (depth - v * dt), 1e-6 * a);
+        assert_true(w->stats.overlap < 0.02);
+    }
+    CHECK_CLOSE(edge, edge_load() * a * depth, 0.01 * edge);
+    CHECK_CLOSE(friction, 0.5 * sheet_load() * a * depth * depth, 0.01 * friction);
+    CHECK_CLOSE(edge + friction, work, 0.01 * work);
+    CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * a * depth, 0.01 * w->stats.rafted_energy);
+    CHECK_CLOSE(pose(w, floe)->y, 0, 2e-4); // such sides do not push
+    // Back: friction alone.
+    set_speed(w, right, 0.08);
+    set_speed(w, left, v);
+    const double deepest = depth;
+    int touched = 0; // steps: the first ones set the floe in motion
+    for (int s = 0; s < 800; s++) {
+        bt_world_step(w);
+        check_step(w);
+        depth = 0.5 * a - pose(w, floe)->x;
+        if (touched > 3) CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
+        if (touched > 3) assert_true(w->stats.raft_edge_work == 0);
+        touched += load_on(w, left) > 0;
+    }
+    assert_true(deepest - depth > 2);
+    // In again: the edge bears nothing until it is where it was.
+    set_speed(w, left, -0.5);
+    set_speed(w, right, -v);
+    touched = 0;
+    for (int s = 0; s < 4000 && depth < deepest + 1; s++) {
+        bt_world_step(w);
+        check_step(w);
+        depth = 0.5 * a - pose(w, floe)->x;
+        const double f = load_on(w, right), sheets = a * sheet_load() * depth;
+        touched += f > 0;
+        if (touched > 3 && depth < deepest - 0.1) CHECK_CLOSE(f, sheets, 0.01 * sheets);
+        if (depth > deepest + 0.1) CHECK_CLOSE(f, sheets + a * edge_load(), 0.01 * f);
+    }
+    assert_true(depth >= deepest + 1);
+    bt_world_free(w);
+}
+
+/// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they meet as at first.
+static void out_behind(void **state)
+{
+    (void)state;
+    const double a = 4, v = 0.1, dt = 0.1;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
+    const bt_gid floe = add_box(w, BT_DYNAMIC, 3, 2, 1.52, 0, h);
+    const bt_gid plate = add_box(w, BT_KINEMATIC, 1, 2, 3.55, 0, 0);
+    set_speed(w, plate, -v);
+    bool under = false, parted = false;
+    for (int s = 0; s < 1000 && !parted; s++) {
+        bt_world_step(w);
+        check_step(w);
+        const double x = pose(w, floe)->x, f = load_on(w, plate);
+        if (x < -1.6 && x > -2.4) {
+            under = true;
+            CHECK_CLOSE(f, 6 * sheet_load(), 0.01 * f); // no edge crosses another
+        }
+        if (x < -2.6 && x > -5.4) CHECK_CLOSE(f, 2 * sheet_load() * (x + 1.5 + a + v * dt), 0.01 * f + 2);
+        if (x < -5.6) {
+            assert_true(w->stats.n_rafting == 0 && w->stats.rafted_area == 0);
+            parted = true;
+        }
+    }
+    assert_true(under && parted);
+    bt_idx records = 0;
+    for (bt_idx k = 0; k < w->tiles->n; k++) records += w->tiles->tile[k].n_memory;
+    assert_int_equal(records, 0);
+    bt_world_free(w);
+}
+
+/// A row of equal floes between a plate and a wall gives way at its weakest contact, and the contacts take turns: shortened by s over m contacts
+/// F = q0 a + μ (ρ_w − ρ_i) g h a s/m.
+static void confined_row(void **state)
+{
+    (void)state;
+    enum { N = 5 };
+    const double a = 8, v = 0.05, dt = 0.1;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    for (int i = 0; i < N; i++) add_box(w, BT_DYNAMIC, a, a, (0.5 + i) * a + 0.001 * i, 0, h);
+    scene_wall(w, -5, -20, 0, 20, 0);
+    scene_wall(w, 0, 0.5 * a + 0.001, N * a, 10, 0);
+    scene_wall(w, 0, -10, N * a, -0.5 * a - 0.001, 0);
+    const double end = N * a + 0.001 * N;
+    const bt_gid plate = add_box(w, BT_KINEMATIC, 2, 30, end + 1, 0, 0);
+    set_speed(w, plate, -v);
+    double s = 0, sum = 0, want = 0;
+    for (int k = 0; k < 2400; k++) {
+        bt_world_step(w);
+        check_step(w);
+        s += v * dt;
+        if (s < 4) continue; // while all begin
+        sum += load_on(w, plate);
+        want += a * (edge_load() + sheet_load() * s / (N - 1));
+    }
+    CHECK_CLOSE(sum, want, 0.02 * want);
+    double least = INFINITY, most = 0;
+    for (int i = 0; i + 1 < N; i++) {
+        const double depth = a - (pose(w, i + 1)->x - pose(w, i)->x);
+        least = bt_min(least, depth), most = bt_max(most, depth);
+    }
+    assert_true(least > 0.5 * most);
+    bt_world_free(w);
+}
+
+/// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that
+/// a hull drives into the pack: the hull itself does not raft, and its load is that of the edge behind.
+static void apex_under_an_edge(void **state)
+{
+    (void)state;
+    const double v = 0.02, dt = 0.1, base = 6, height = 5, slope = 0.5 * base / height;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    add_box(w, BT_STATIC, 20, 20, -10, 0, h);
+    double corners[6] = {0, 0, height, -0.5 * base, height, 0.5 * base};
+    const bt_gid floe = add(w, BT_DYNAMIC, 3, corners, 2.0 / 3 * height + 0.01, 0, 0, 1.5 * h); // the thinner of the two counts
+    const bt_gid hull = add_box(w, BT_KINEMATIC, 2, 2, height + 1.02, 0, 2 * h);
+    w->towed = hull; // it carries ice, but is towed
+    w->tow = bt_alloc(1, sizeof *w->tow);
+    *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = -1, .speed = v, .dt = dt};
+    set_speed(w, hull, -v);
+    double depth = 0;
+    while (depth < 4) {
+        bt_world_step(w);
+        check_step(w);
+        const double f = load_on(w, hull);
+        const double in = depth; // at the start of the step, where the bounds are formed
+        depth = 2.0 / 3 * height - pose(w, floe)->x;
+        if (in < 0.05) continue;
+        const double length = bt_max(h, 2 * in * slope);
+        CHECK_CLOSE(f, edge_load() * length + sheet_load() * in * in * slope, 0.002 * f);
+        assert_true(w->stats.n_rafting == 1); // not floe and hull
+    }
+    bt_world_free(w);
+}
+
+/// A plough as wide as its channel, closed at the end, pushes floes in two lanes, half a floe apart. What it needs for a metre of advance is what goes under on it: the
+/// work of the plough is that of edges and sheets, edges take q0 for the area that went under, and as the channel grows shorter by s its width times s lies twice.
+static void plough_in_a_channel(void **state)
+{
+    (void)state;
+    enum { LANE = 5 };
+    const double a = 6, v = 0.05, dt = 0.1, width = 2 * a;
+    bt_params p = params(dt);
+    bt_world *w = bt_world_create(&p);
+    for (int lane = 0; lane < 2; lane++) {
+        const double y = lane ? 0.5 * a + 0.001 : -0.5 * a - 0.001;
+        for (int i = 0; i < LANE; i++) add_box(w, BT_DYNAMIC, a, a, (0.5 + i + 0.5 * lane) * a, y, h);
+        add_box(w, BT_DYNAMIC, 0.5 * a, a, lane ? 0.25 * a : (LANE + 0.25) * a, y, h);
+    }
+    const double end = (LANE + 0.5) * a;
+    scene_wall(w, -5, -20, -0.001, 20, 0);
+    scene_wall(w, -5, a + 0.003, end + 5, 20, 0);
+    scene_wall(w, -5, -20, end + 5, -a - 0.003, 0);
+    const bt_gid plough = add_box(w, BT_KINEMATIC, 2, 2 * a, end + 1, 0, 0);
+    set_speed(w, plough, -v);
+    double work = 0, edge = 0, friction = 0, way = 0;
+    while (way < 3) {
+        bt_world_step(w);
+        check_step(w);
+        way += v * dt;
+        work += load_on(w, plough) * v * dt;
+        edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+    }
+    CHECK_CLOSE(edge + friction, work, 0.02 * work);
+    CHECK_CLOSE(w->stats.rafted_area, width * way, 0.02 * width * way);
+    CHECK_CLOSE(edge, edge_load() * width * way, 0.03 * edge);
+    CHECK_CLOSE(w->stats.rafted_energy, rise() * h * h * w->stats.rafted_area, 1e-9 * w->stats.rafted_energy);
+    bt_world_free(w);
+}
+
+/// Random floes driven at each other with spin and friction: momentum to round-off, no work gained, and what the contacts take is what the kinetic energy loses.
+static void energy_is_booked(void **state)
+{
+    (void)state;
+    uint64_t rng = 11;
+    int rafted = 0;
+    for (int c = 0; c < 20; c++) {
+        bt_params p = params(0.05);
+        p.tolerance = 1e-9;
+        bt_world *w = bt_world_create(&p);
+        for (int i = 0; i < 9; i++) {
+            double v[2 * BT_MAX_VERTICES];
+            const int n = scene_random_polygon(&rng, 5, v);
+            add(w, BT_DYNAMIC, n, v, 15 * (i % 3), 15 * (i / 3), 6 * scene_uniform(&rng), 0.3 + scene_uniform(&rng));
+            *vel(w, i) = (bt_vel){-0.08 * (15 * (i % 3) - 15), -0.08 * (15 * (i / 3) - 15) + 0.3 * scene_uniform(&rng), 0.1 * scene_uniform(&rng), 0};
+        }
+        double before = 0, edge = 0, friction = 0, all = 0;
+        for (int s = 0; s < 400; s++) {
+            bt_world_step(w);
+            check_step(w);
+            if (s == 0) before = w->stats.kinetic_energy - w->stats.contact_work;
+            all += w->stats.contact_work, edge += w->stats.raft_edge_work, friction += w->stats.raft_friction_work;
+            CHECK_CLOSE(w->stats.kinetic_energy, before + all, 1e-6 * before);
+            assert_true(w->stats.overlap < 0.05);
+        }
+        assert_true(edge + friction <= -all * (1 + 1e-6) + 1e-6);
+        rafted += w->stats.n_rafting > 0;
+        if (w->stats.rafted_area > 1) assert_true(edge > 0 && friction > 0);
+        bt_world_free(w);
+    }
+    assert_true(rafted > 10);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(two_squares),
+        cmocka_unit_test(out_behind),
+        cmocka_unit_test(confined_row),
+        cmocka_unit_test(apex_under_an_edge),
+        cmocka_unit_test(plough_in_a_channel),
+        cmocka_unit_test(energy_is_booked),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
