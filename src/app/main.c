@@ -4,6 +4,7 @@
 #include "app/cmd.h"
 #include "revision.h"
 #include "base/suggest.h"
+#include "output/quantity_list.h"
 
 #include <omp.h>
 #include <sched.h>
@@ -40,6 +41,7 @@ static void print_help(FILE *out)
           "Simulate a body, such as an iceberg, that is towed through broken sea ice.\n\n", out);
     for (int i = 0; i < N_COMMANDS; i++) fprintf(out, "  %-12s %s\n", commands[i].name, commands[i].summary);
     fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
+          "  --list-quantities  the numbers that a run leaves: series, summary, estimates, with units and meaning; --json too\n"
           "  --version    version, revision and compiler\n"
           "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
@@ -87,6 +89,22 @@ static void start_with_settings(char **argv)
     if (set) execv("/proc/self/exe", argv);
 }
 
+static const struct {
+    const char *option;
+    void (*text)(void *), (*json)(void *);
+} lists[] = {
+    {"--list-keys", bt_case_list_keys, bt_case_list_keys_json},
+    {"--list-quantities", bt_quantities_list, bt_quantities_list_json},
+};
+
+/// The list that an option asks for, −1 = none.
+static int list_of(const char *word)
+{
+    for (int i = 0; i < (int)(sizeof lists / sizeof *lists); i++)
+        if (!strcmp(word, lists[i].option)) return i;
+    return -1;
+}
+
 // Exit code of this rank.
 static int bergtow(int argc, char **argv)
 {
@@ -103,14 +121,15 @@ static int bergtow(int argc, char **argv)
     bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
     if (help) print_help(stdout);
     else if (version) print_version(stdout, NULL);
-    else if (!strcmp(word, "--list-keys")) {
+    const int list = list_of(word);
+    if (list >= 0) {
         const bool json = argc == 3 && !strcmp(argv[2], "--json");
         if (argc > 2 && !json) return refuse_word("option", argv[2], (const char *const[]){"--json", NULL});
-        (json ? bt_case_list_keys_json : bt_case_list_keys)(stdout);
+        (json ? lists[list].json : lists[list].text)(stdout);
     }
-    if (help || version || !strcmp(word, "--list-keys")) return fflush(stdout) ? BT_ERR_IO : BT_OK;
+    if (help || version || list >= 0) return fflush(stdout) ? BT_ERR_IO : BT_OK;
 
-    if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
+    if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", "--list-quantities", NULL});
     const char *names[N_COMMANDS + 1] = {NULL};
     for (int i = 0; i < N_COMMANDS; i++) names[i] = commands[i].name;
     return refuse_word("command", word, names);

@@ -50,7 +50,7 @@ static void curves(bt_json *j, const bt_estimate_input *in)
 typedef struct estimate_item {
     bt_estimate e;
     double ratio;
-    const char *label, *kind, *formula, *source;
+    const char *formula, *source;
 } estimate_item;
 
 typedef struct conditions_item {
@@ -69,8 +69,6 @@ const bt_json_key bt_estimate_keys[] = {
     OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
     OF_ESTIMATE("formula", formula, "", "the formula"),
     OF_ESTIMATE("source", source, "", "where it is from"),
-    OF_ESTIMATE("label", label, "", "what pictures and tables call it"),
-    OF_ESTIMATE("kind", kind, "", "ice resistance, or on top: to be added to the others"),
 };
 const int bt_n_estimate_keys = sizeof bt_estimate_keys / sizeof *bt_estimate_keys;
 
@@ -102,12 +100,25 @@ void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in,
     for (int k = 0; k < bt_n_estimates(); k++) {
         const bt_estimate_def *d = bt_estimate_of(k);
         const bt_estimate e = bt_estimate_at(k, in);
-        const estimate_item item = {e, ratio_of(d, &e, simulated), d->label, d->on_top ? "on top" : "ice resistance", d->formula, d->source};
+        const estimate_item item = {e, ratio_of(d, &e, simulated), d->formula, d->source};
         bt_json_open(j, d->name, '{');
         bt_json_keys_write(j, bt_estimate_keys, bt_n_estimate_keys, NULL, (const void *const[]){&item});
         bt_json_close(j, '}');
     }
     curves(j, in);
+    bt_json_close(j, '}');
+}
+
+void bt_estimate_labels_json(bt_json *j, const char *key)
+{
+    bt_json_open(j, key, '{');
+    for (int k = 0; k < bt_n_estimates(); k++) {
+        const bt_estimate_def *d = bt_estimate_of(k);
+        bt_json_open(j, d->name, '{');
+        bt_json_string(j, "label", d->label);
+        bt_json_string(j, "kind", bt_estimate_kind_name(d));
+        bt_json_close(j, '}');
+    }
     bt_json_close(j, '}');
 }
 

@@ -15,6 +15,12 @@ extern const int bt_n_condition_keys;
 /// resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
 void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated);
 
+/// An object "estimate_labels": of each estimate, in the order of the registry, its label and kind. Which of the members of "estimates" are
+/// estimates follows from it.
+void bt_estimate_labels_json(bt_json *j, const char *key);
+
+static inline const char *bt_estimate_kind_name(const bt_estimate_def *d) { return d->on_top ? "on top" : "ice resistance"; }
+
 /// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime. full: with formula and
 /// source.
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full);

@@ -119,6 +119,13 @@ static void write_estimates(bt_json *j, const char *key, const view *v, const vo
     else bt_json_string(j, key, NULL);
 }
 
+static void write_labels(bt_json *j, const char *key, const view *v, const void *source)
+{
+    (void)source;
+    if (v->s->body) bt_estimate_labels_json(j, key);
+    else bt_json_string(j, key, NULL);
+}
+
 static void write_added(bt_json *j, const char *key, const view *v, const void *source)
 {
     (void)key, (void)source;
@@ -309,6 +316,7 @@ const bt_json_key bt_summary_keys[] = {
     WRITTEN("impacts.exceedance", write_exceedance, "how often a peak is reached or exceeded, by rank"),
     WRITTEN("estimates", write_estimates,
         "published and derived estimates for the conditions of the run; null without a towed body"),
+    WRITTEN("estimate_labels", write_labels, "of each estimate its label in pictures and tables, and its kind"),
     {.key = "", .kind = BT_JSON_ADDED, .write = write_added},
     OF_HISTORY("max_overlap_m", max_overlap, "m", "deepest overlap of two bodies"),
     NUMBER("max_overlap_relative", overlap_relative, "1", "the same over the mean floe size"),
@@ -416,8 +424,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
 
 static bt_meaning meaning_of(const bt_json_key *k)
 {
-    if (!k) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = ""};
-    return (bt_meaning){.known = true, .machine = k->machine, .units = k->units, .description = k->description, .estimate = "", .label = ""};
+    if (!k) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
+    return (bt_meaning){.known = true, .machine = k->machine, .units = k->units, .description = k->description, .estimate = "", .label = "", .kind = ""};
 }
 
 /// A key "estimates.NAME.key", or one of the conditions.
@@ -429,7 +437,7 @@ static bt_meaning meaning_of_estimate(const char *key)
         const bt_estimate_def *d = bt_estimate_of(k);
         if (strncmp(d->name, key, (size_t)(dot - key)) || d->name[dot - key]) continue;
         bt_meaning m = meaning_of(bt_json_keys_find(bt_estimate_keys, bt_n_estimate_keys, dot + 1));
-        m.estimate = d->name, m.label = d->label, m.on_top = d->on_top;
+        m.estimate = d->name, m.label = d->label, m.kind = bt_estimate_kind_name(d);
         return m;
     }
     return meaning_of(NULL);
@@ -439,7 +447,7 @@ bt_meaning bt_summary_meaning(const char *key)
 {
     for (int k = 0; k < bt_n_added(); k++)
         if (!strcmp(bt_added(k)->summary, key))
-            return (bt_meaning){.known = true, .units = bt_added(k)->units, .description = bt_added(k)->description, .estimate = "", .label = ""};
+            return (bt_meaning){.known = true, .units = bt_added(k)->units, .description = bt_added(k)->description, .estimate = "", .label = "", .kind = ""};
     if (!strncmp(key, "estimates.", 10)) return meaning_of_estimate(key + 10);
     const char *dot = strrchr(key, '.');
     if (!strncmp(key, "window.series.", 14)) return meaning_of(bt_json_keys_find(bt_reported_keys, bt_n_reported_keys, dot + 1));

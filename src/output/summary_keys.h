@@ -25,12 +25,8 @@ typedef struct bt_meaning {
     bool known, machine;             ///< machine: as bt_json_key.machine
     const char *units, *description; ///< "" where there are none
     const char *estimate, *label;    ///< of an estimate: its name and label, else ""
-    bool on_top;                     ///< of an estimate: as bt_estimate_def.on_top
+    const char *kind;                ///< of an estimate, as in "estimate_labels", else ""
 } bt_meaning;
 bt_meaning bt_summary_meaning(const char *key);
-
-/// Everything that is registered, for people and for programs: series, keys of summary.json, estimates.
-void bt_list_quantities(void *stream);
-void bt_list_quantities_json(void *stream);
 
 #endif

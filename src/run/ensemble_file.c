@@ -6,7 +6,8 @@
 //                                                        result is not sound
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or machine; nested ones as A_B; NaN where
-//                                                        there is none
+//                                                        there is none; attributes: key (A.B), order, and as registered units, description; of an estimate
+//                                                        also estimate (its name), label, kind
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members, n_finished, n_failed
 //
@@ -28,18 +29,17 @@
 #include "base/h5util.h"
 #include "case/schema.h"
 #include "base/seal.h"
+#include "bergtow/quantity.h"
+#include "output/summary_keys.h"
 #include "base/units.h"
 #include "case/value.h"
 
-// Of the machine and the moment, not of the result.
-static const char *const left_out[] = {"wall_time_s", "ranks", "threads", "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
-                                       "edge_cut", "halo_share", "memory_per_floe_b", "sweep_bytes_per_contact", "ns_per_floe_step", "phases_s", NULL};
 static const char *const series[] = {"time", "ice_resistance", "tow_force"};
 enum { N_SERIES = sizeof series / sizeof *series };
 
 typedef struct {
-    char *name;
-    double *value; ///< [M]
+    char *name, *key; ///< A_B, and A.B as it is registered
+    double *value;    ///< [M]
 } column;
 
 typedef struct {
@@ -50,31 +50,31 @@ typedef struct {
     int n_columns;
 } table;
 
-static double *column_of(table *t, const char *name)
+static double *column_of(table *t, const char *name, const char *key)
 {
     for (int k = 0; k < t->n_columns; k++)
         if (!strcmp(t->column[k].name, name)) return t->column[k].value;
     t->column = bt_realloc(t->column, (size_t)t->n_columns + 1, sizeof *t->column);
     column *c = &t->column[t->n_columns++];
-    *c = (column){strdup(name), bt_alloc((size_t)t->n, sizeof(double))};
+    *c = (column){strdup(name), strdup(key), bt_alloc((size_t)t->n, sizeof(double))};
     for (int64_t m = 0; m < t->n; m++) c->value[m] = NAN;
     return c->value;
 }
 
+/// prefix: of the registered key, with its dots.
 static void take_numbers(table *t, int64_t m, const json_t *object, const char *prefix)
 {
     const char *key;
     json_t *value;
     json_object_foreach((json_t *)object, key, value)
     {
-        bool skip = false;
-        for (int k = 0; left_out[k] && !skip; k++) skip = !*prefix && !strcmp(left_out[k], key);
-        if (skip) continue;
-        char name[200];
-        snprintf(name, sizeof name, "%s%s%.80s", prefix, *prefix ? "_" : "", key);
-        if (json_is_object(value)) take_numbers(t, m, value, name);
-        else if (json_is_number(value)) column_of(t, name)[m] = json_number_value(value);
-        else if (json_is_boolean(value)) column_of(t, name)[m] = json_is_true(value);
+        char path[200], name[200];
+        snprintf(path, sizeof path, "%s%s%.80s", prefix, *prefix ? "." : "", key);
+        if (bt_summary_meaning(path).machine) continue;
+        for (size_t i = 0; i <= strlen(path); i++) name[i] = (char)(path[i] == '.' ? '_' : path[i]);
+        if (json_is_object(value)) take_numbers(t, m, value, path);
+        else if (json_is_number(value)) column_of(t, name, path)[m] = json_number_value(value);
+        else if (json_is_boolean(value)) column_of(t, name, path)[m] = json_is_true(value);
     }
 }
 
@@ -157,7 +157,8 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
         }
         free(row);
         if (set >= 0) H5Dclose(set);
-        bt_h5_attr_text(h, name, "units", k == 0 ? "s" : "N");
+        bt_h5_attr_text(h, name, "units", bt_series_find(series[k])->units);
+        bt_h5_attr_text(h, name, "description", bt_series_find(series[k])->description);
         free(name);
     }
 }
@@ -254,10 +255,23 @@ static void release(table *t)
     }
     for (int k = 0; k < t->n_columns; k++) {
         free(t->column[k].name);
+        free(t->column[k].key);
         free(t->column[k].value);
     }
     void *arrays[] = {t->id, t->condition, t->repeat, t->seed, t->status, t->name, t->hash, t->reason, t->column};
     for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++) free(arrays[k]);
+}
+
+/// What is registered of a number, as attributes.
+static void describe(bt_h5 *h, const char *name, const char *key, int order)
+{
+    const bt_meaning m = bt_summary_meaning(key);
+    bt_h5_attr_text(h, name, "key", key);
+    bt_h5_attr_int(h, name, "order", order);
+    if (!m.known) return;
+    const struct { const char *name, *text; } texts[] = {{"units", m.units}, {"description", m.description}, {"estimate", m.estimate}, {"label", m.label}, {"kind", m.kind}};
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        if (*texts[i].text) bt_h5_attr_text(h, name, texts[i].name, texts[i].text);
 }
 
 static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
@@ -284,6 +298,7 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     for (int k = 0; k < t->n_columns; k++) {
         char *name = bt_file_join("/summary", t->column[k].name);
         bt_h5_write(h, name, H5T_NATIVE_DOUBLE, n, 0, t->column[k].value);
+        describe(h, name, t->column[k].key, k);
         free(name);
     }
     write_series(h, t, s, dir);
