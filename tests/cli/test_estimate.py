@@ -150,7 +150,7 @@ LOOSE = changed(TOW, run__duration=60, tow={"mode": "line", "speed": 0.13, "line
 
 def dimensionless(a, b, L, tolerance):
     """Every series and pose of b is that of a, scaled by the dimension of its units."""
-    exponents = {"m": 1, "rad": 0, "m/s": 0.5, "rad/s": -0.5, "s": 0.5, "N": 3, "N m": 4, "J": 4, "1": 0}
+    exponents = {"m": 1, "rad": 0, "m/s": 0.5, "rad/s": -0.5, "s": 0.5, "N": 3, "N m": 4, "J": 4, "m2": 2, "1": 0}
     import h5py
     with h5py.File(a.dir / "result.h5") as f, h5py.File(b.dir / "result.h5") as g:
         for name in f["series"]:
