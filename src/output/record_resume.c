@@ -14,7 +14,7 @@
 
 #include "base/fileio.h"
 #include "output/record_parts.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_errors *err)
 {
@@ -46,7 +46,7 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
         bt_record_flush(r);
         status = r->h5.status;
         if (status == BT_OK) status = bt_file_copy(part, copy, err);
-        if (status == BT_OK) status = bt_seal_write(copy, BT_SEAL_RESULT, err);
+        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);
         if (status == BT_OK) status = bt_file_rename(copy, path, err);
         char *xdmf = bt_record_xdmf(r);
         if (status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
@@ -161,7 +161,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
         load_history(&r->history, s, step);
-        if (!s->faulty) bt_h5_open(&old, path, BT_SEAL_RESULT, err);
+        if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
         if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);
