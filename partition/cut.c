@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The cut of a tile graph: groups contracted, heavy vertices set apart, ways to cut it compared, labels kept close to the old.
+// The cut of a cell graph: groups contracted, heavy vertices set apart, ways to cut it compared, labels kept close to the old.
 //
 //   1. Every group becomes one vertex; edges between the same two vertices are added up.
 //   2. While the heaviest vertex weighs a share (what is left / parts left) or more, it gets a part of its own. What remains
@@ -7,11 +7,11 @@
 //      given one, misses the balance of all others.
 //   3. Three cuts: the labels before, METIS, and coordinate bisection, which costs a tenth of METIS, cannot fail and
 //      has the smaller cut where the field is even; each refined (refine.c). Of those in balance the smallest edge cut
-//      wins, but the labels before are kept while their cut is at most KEEP times that: METIS starts anew each time, and half of the tiles would change hands
+//      wins, but the labels before are kept while their cut is at most KEEP times that: METIS starts anew each time, and half of the cells would change hands
 //      because a heavy spot has moved on by one.
 //   4. Labels of a new cut are exchanged so that little moves: the (new part, old part) overlaps in falling order, each taken
 //      if both are free. Such a matching keeps at least half of the weight that the best one would. The best (Hungarian
-//      method) costs n_parts³, 7·10¹⁰ operations at 4,096 parts, against n log n here with n tiles.
+//      method) costs n_parts³, 7·10¹⁰ operations at 4,096 parts, against n log n here with n cells.
 #include "partition/cut.h"
 
 #include <limits.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A weighted graph of tiles and its cut into parts of equal work: which rank owns which tile.
+// A weighted graph of cells and its cut into parts of equal work: which rank owns which cell.
 #ifndef BT_CUT_H
 #define BT_CUT_H
 
@@ -9,13 +9,13 @@
 /// Undirected graph in compressed rows: every edge stands in the rows of both of its ends, with the same weight. Sums of all
 /// weights and of all edges must fit into int64_t; loops (an edge from a vertex to itself) are ignored.
 typedef struct bt_graph {
-    int n;                 ///< vertices (tiles)
+    int n;                 ///< vertices (cells)
     const int *start;      ///< [n+1] first neighbour of each vertex
     const int *to;         ///< [start[n]] neighbours
     const int64_t *edge;   ///< [start[n]] >= 0: what is exchanged when the two ends lie in different parts (floes)
-    const int64_t *weight; ///< [n] >= 0: work; any unit
+    const int64_t *weight; ///< [n] >= 0: work; any contact
     const double (*at)[2]; ///< [n] m, position of the vertex
-    const int *group;      ///< [n] vertices of the same group >= 0 stay together (tiles under a large body), −1 = free; NULL = none
+    const int *group;      ///< [n] vertices of the same group >= 0 stay together (cells under a large body), −1 = free; NULL = none
 } bt_graph;
 
 typedef enum {

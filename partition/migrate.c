@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Bodies and traces of contacts to the ranks that own or hold them.
 //
-// Every owned body is sent, complete, to all ranks that hold its tile under the new map; ghosts are dropped first and come back the
+// Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and come back the
 // same way. So after a migration every copy of a body is that of its owner.
 #include <stdlib.h>
 #include <string.h>
@@ -171,13 +171,13 @@ static void move_bodies(bt_world *w)
             continue;
         }
         if (d->dealt && !d->owned[i]) continue;
-        int rank[BT_MAX_HOLDERS];
-        const int n = bt_division_holders(w, b->tile[i][0], b->tile[i][1], rank);
+        int rank[BT_MAX_SHARERS];
+        const int n = bt_division_sharers(w, b->cell[i][0], b->cell[i][1], rank);
         for (int k = 0; k < n; k++) {
             if (rank[k] == me) keep[i] = 1;
             else if (d->dealt) pack(b, i, &p, rank[k]); // at first every rank has all
         }
-        d->stats.moved += d->dealt && bt_division_owner(w, b->tile[i][0], b->tile[i][1]) != me;
+        d->stats.moved += d->dealt && bt_division_owner(w, b->cell[i][0], b->cell[i][1]) != me;
     }
     for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;
     compact(b, keep);
@@ -198,12 +198,12 @@ static int solver_of(const bt_world *w, bt_idx a, bt_idx b)
     const bt_bodies *s = &w->bodies;
     if ((s->large[a] && s->motion[a] == BT_DYNAMIC) || (s->large[b] && s->motion[b] == BT_DYNAMIC)) return w->domain->large_owner;
     int32_t at[2];
-    bt_tiles_owner(w->tiles, s->tile[s->large[a] ? b : a], s->tile[s->large[b] ? a : b], at);
+    bt_cells_owner(w->cells, s->cell[s->large[a] ? b : a], s->cell[s->large[b] ? a : b], at);
     return bt_division_owner(w, at[0], at[1]);
 }
 
 /// Traces by the rank they go to; those that stay are kept in trace [*n].
-static void sort_traces(const bt_world *w, bt_trace *trace, int64_t *n, parcels *p)
+static void sort_traces(const bt_world *w, bt_memory *trace, int64_t *n, parcels *p)
 {
     const bt_domain *d = w->domain;
     int64_t kept = 0;
@@ -215,7 +215,7 @@ static void sort_traces(const bt_world *w, bt_trace *trace, int64_t *n, parcels 
     *n = kept;
 }
 
-bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n)
+bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n)
 {
     bt_domain *d = w->domain;
     if (!d) return trace;

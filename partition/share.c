@@ -14,12 +14,12 @@ void bt_domain_settle(bt_world *w, bt_vel *shift)
     bt_domain *d = w->domain;
     if (!d) return;
     bt_bodies *b = &w->bodies;
-    const bt_tiles *t = w->tiles;
-    const size_t most = 6 * (size_t)(b->n - t->n_tiled) + BT_MAX_BRANCHES;
+    const bt_cells *t = w->cells;
+    const size_t most = 6 * (size_t)(b->n - t->n_in_cells) + BT_MAX_BRANCHES;
     double *x = bt_alloc(most, sizeof *x);
     for (int pass = 0; pass < 2; pass++) {
         size_t n = 0;
-        for (bt_idx i = t->n_tiled; i < b->n; i++) {
+        for (bt_idx i = t->n_in_cells; i < b->n; i++) {
             if (b->motion[i] != BT_DYNAMIC) continue;
             double *from[6] = {&b->vel[i].x, &b->vel[i].y, &b->vel[i].w, NULL, NULL, NULL};
             if (shift) from[3] = &shift[i].x, from[4] = &shift[i].y, from[5] = &shift[i].w;
@@ -71,8 +71,8 @@ void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t
 /// Is body i held by another rank too?
 static bool shared(const bt_world *w, bt_idx i)
 {
-    int holder[BT_MAX_HOLDERS];
-    return w->bodies.large[i] || bt_division_holders(w, w->bodies.tile[i][0], w->bodies.tile[i][1], holder) > 1;
+    int holder[BT_MAX_SHARERS];
+    return w->bodies.large[i] || bt_division_sharers(w, w->bodies.cell[i][0], w->bodies.cell[i][1], holder) > 1;
 }
 
 typedef struct { bt_gid gid; double x; } value;
@@ -255,15 +255,15 @@ static int by_copy(const void *p, const void *q)
     return (a->state > b->state) - (a->state < b->state);
 }
 
-/// Least gid of a body that stands in the wrong tile here, or under the wrong name; INT64_MAX = none.
+/// Least gid of a body that stands in the wrong cell here, or under the wrong name; INT64_MAX = none.
 static bt_gid misplaced(const bt_world *w)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_gid bad = INT64_MAX;
     for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
-            const bool here = k == t->n - 1 ? b->large[i] : b->tile[i][0] == t->tile[k].x && b->tile[i][1] == t->tile[k].y;
+        for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
+            const bool here = k == t->n - 1 ? b->large[i] : b->cell[i][0] == t->cell[k].x && b->cell[i][1] == t->cell[k].y;
             if ((!here || bt_world_index(w, b->gid[i]) != i) && b->gid[i] < bad) bad = b->gid[i];
         }
     return bad;
@@ -278,12 +278,12 @@ static bt_gid find_fault(const bt_world *w)
     copy *mine = bt_alloc((size_t)b->n, sizeof *mine);
     size_t n = 0, n_all;
     for (bt_idx i = 0; i < b->n; i++) {
-        int holder[BT_MAX_HOLDERS];
-        const int holders = b->large[i] ? d->comm->size : bt_division_holders(w, b->tile[i][0], b->tile[i][1], holder);
+        int holder[BT_MAX_SHARERS];
+        const int holders = b->large[i] ? d->comm->size : bt_division_sharers(w, b->cell[i][0], b->cell[i][1], holder);
         if (holders == 1) continue;
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
-        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i], b->home[i].copy, b->home[i].lap};
+        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->disturbed[i], b->home[i].copy, b->home[i].lap};
         uint64_t h = 0;
         for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
             uint64_t u;

@@ -59,7 +59,7 @@ def write_member(folder, m):
 
 
 def seal(path, kind="ensemble 1"):
-    """The seal of a file with room for one, as src/base/seal.h has it."""
+    """The seal of a file with room for one, as src/base/checksum.h has it."""
     raw = path.read_bytes()
     text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw[soundness.SEAL_BYTES:])}\n".encode()
     path.write_bytes(text.ljust(soundness.SEAL_BYTES, b"\0") + raw[soundness.SEAL_BYTES:])

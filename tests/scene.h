@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "contact/contacts.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "bergtow/forces.h"
 #include "bergtow/shape.h"
 #include "solve/solver.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A case: everything a run depends on, as read from the YAML file, in SI units and radians.
+// A case: everything a run depends on, as read from the YAML file, in SI contacts and radians.
 //
-// The schema table in src/case/schema.c is the one place that names each key with its unit, default, range and one
+// The schema table in src/case/schema.c is the one place that names each key with its contact, default, range and one
 // sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
 // holds the values. Choices are indices into the name lists of the schema.
 #ifndef BERGTOW_CASE_H
@@ -192,9 +192,9 @@ typedef struct bt_case {
         double tolerance;        ///< natural-map residual / reference speed at which a step has converged
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
-        int64_t inner_sweeps;    ///< sweeps of a tile in its turn
+        int64_t inner_sweeps;    ///< sweeps of a cell in its turn
         int64_t turn_rows;       ///< without effect, of cases written for earlier versions
-        double tile;             ///< least side of a tile / mean floe size
+        double cell;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool warm_start;
         double slop;             ///< overlap left alone by the position projection / mean floe size
@@ -255,7 +255,7 @@ void bt_case_defaults(bt_case *c);
 /// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
 bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
-/// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
+/// Every key with its value and contact as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
 
 /// The same below comment lines of one's own. Caller frees.
@@ -297,11 +297,11 @@ double bt_case_reference_speed(const bt_case *c);
 
 void bt_case_free(bt_case *c);
 
-/// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream.
+/// Table of keys for --list-keys: key, contact, default, range, one sentence. Printed to the stream.
 void bt_case_list_keys(void *stream);
 
-/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows), unit, range, choices and meaning; numbers of
-/// the range in the unit of a number written without one.
+/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows), contact, range, choices and meaning; numbers of
+/// the range in the contact of a number written without one.
 void bt_case_list_keys_json(void *stream);
 
 #endif

@@ -16,7 +16,7 @@ typedef struct bt_mean {
 
 /// A straight line through a series.
 typedef struct bt_trend {
-    double change;      ///< of the line from the first sample to the last, in the unit of the series; NaN when n < BT_TREND_LEAST
+    double change;      ///< of the line from the first sample to the last, in the contact of the series; NaN when n < BT_TREND_LEAST
     double se;          ///< its standard error with correlation
     double low, high;   ///< the interval that a series without drift leaves in 5 % of all cases
     bool significant;   ///< it does not contain 0

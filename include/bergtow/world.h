@@ -4,10 +4,10 @@
 // Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
 // 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
 // path), and a cold part (mass, drag, polygon in its own frame). Each part is an array of its own over the
-// bodies in storage order, which is the order of the tiles (tiles.h): neighbours in space are neighbours in memory. Every
-// reference between bodies is a bt_idx into that order and changes when bodies change their tile; the name of a body
-// that stays is its global id (gid), and every order that the result depends on follows from gids and tiles, never from
-// storage or rank. A rank holds the bodies of its tiles, those of tiles beside them (ghosts), and all large or fixed bodies.
+// bodies in storage order, which is the order of the cells (cells.h): neighbours in space are neighbours in memory. Every
+// reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a body
+// that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never from
+// storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large or fixed bodies.
 //
 // Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
 // gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
@@ -58,7 +58,7 @@ typedef struct bt_mark {
 /// What bt_world_add needs of a body.
 typedef struct bt_body_def {
     bt_motion motion;
-    bool large;             ///< in no tile, on every rank, tested against all floes near its outline
+    bool large;             ///< in no cell, on every rank, tested against all floes near its outline
     int n_vertices;
     const double *vertices; ///< [n_vertices][2] m, anticlockwise, centroid at the origin; convex without parts
     const bt_parts *parts;  ///< of an outline that is not convex (bt_outline_split), or NULL
@@ -96,10 +96,10 @@ typedef struct bt_bodies {
     double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
-    uint8_t *large;       ///< [n] 1 = in no tile
-    uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
+    uint8_t *large;       ///< [n] 1 = in no cell
+    uint8_t *disturbed;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
                           ///< changes a pose or velocity by hand
-    int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
+    int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
     bt_home *home;        ///< [n]
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
@@ -112,15 +112,15 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every unit for each; with plain_sweeps, of sweeps
+    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every contact for each; with plain_sweeps, of sweeps
     bool warm_start;
     bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
-    int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
-    double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
+    int64_t inner_sweeps;  ///< times a cell is swept before the next one has its turn
+    double cell;           ///< least side of a cell in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
-    int64_t position_sweeps; ///< limit of the position projection: updates of every unit; with plain_sweeps, sweeps
+    int64_t position_sweeps; ///< limit of the position projection: updates of every contact; with plain_sweeps, sweeps
     double rest_speed;     ///< approach below this has no restitution, m/s
-    double size;           ///< mean floe diameter, sets tiles and skin, m
+    double size;           ///< mean floe diameter, sets cells and skin, m
     double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
     double crush_least;    ///< least length of a contact / ice thickness
     double raft_line;      ///< line load under which floes raft / thickness², Pa/m; 0 = they do not (raft.h)
@@ -134,7 +134,7 @@ typedef struct bt_params {
     bool tilt_moves_water;       ///< that is dU_w/dt (tilt: dynamic), which acts on the added mass, too
 } bt_params;
 
-struct bt_tiles;
+struct bt_cells;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
@@ -147,7 +147,7 @@ struct bt_forces;
 /// Numbers of the last step.
 typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
-    int64_t n_active;        ///< floes in tiles that were looked at (the others rest)
+    int64_t n_active;        ///< floes in cells that were looked at (the others rest)
     int64_t sweeps, position_sweeps;
     bool projected;          ///< the position projection came to its end, or there was nothing to do
     int64_t unit_updates;    ///< of contacts by the sweeps
@@ -176,7 +176,7 @@ typedef struct bt_step_stats {
 typedef struct bt_world {
     bt_params par;
     bt_bodies bodies;
-    struct bt_tiles *tiles;
+    struct bt_cells *cells;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still

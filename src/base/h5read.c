@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a sealed file, with one way to fail.
+// Reading back what this program wrote: a protected by a checksum file, with one way to fail.
 #include "base/h5read.h"
 
-#include "base/seal.h"
+#include "base/checksum.h"
 
 typedef struct { const char *path; bt_errors *err; } whole;
 
@@ -57,7 +57,7 @@ static void fail(bt_h5_reader *r, const char *name)
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
 {
     *r = (bt_h5_reader){.file = -1, .path = path, .err = err};
-    r->status = bt_seal_check(path, kind, NULL, err);
+    r->status = bt_checksum_check(path, kind, NULL, err);
     if (r->status != BT_OK) return r->status;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);

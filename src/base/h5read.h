@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a sealed file, with one way to fail.
+// Reading back what this program wrote: a protected by a checksum file, with one way to fail.
 #ifndef BT_H5READ_H
 #define BT_H5READ_H
 
@@ -20,7 +20,7 @@ typedef struct bt_h5_reader {
     bt_errors *err;
 } bt_h5_reader;
 
-/// Check the seal, open, and bt_h5_whole. path must stay valid. Errors: those of bt_seal_check and bt_h5_whole.
+/// Check the checksum, open, and bt_h5_whole. path must stay valid. Errors: those of bt_checksum_check and bt_h5_whole.
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
 bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 

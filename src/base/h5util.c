@@ -12,7 +12,7 @@
 
 #include "base/fileio.h"
 #include "base/h5driver.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
 {
@@ -80,7 +80,7 @@ static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_er
 }
 
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, 0, err); }
-bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, BT_SEAL_BYTES, err); }
+bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, BT_CHECKSUM_BYTES, err); }
 
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err)
 {
@@ -349,7 +349,7 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
         hsize_t size;
         if (H5Dget_chunk_info_by_coord(dataset, (hsize_t[3]){frame, row}, &mask, &address, &size) < 0) address = HADDR_UNDEF;
 #if !H5_VERSION_GE(1, 14, 4) // before that without the user block (HDF5 issue 3003)
-        if (address != HADDR_UNDEF) address += BT_SEAL_BYTES;
+        if (address != HADDR_UNDEF) address += BT_CHECKSUM_BYTES;
 #endif
     }
     check(h, address != HADDR_UNDEF);

@@ -70,7 +70,7 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// Into a sealed HDF5 file and back; errors as bt_seal_check, and BT_ERR_IO.
+/// Into a protected by a checksum HDF5 file and back; errors as bt_checksum_check, and BT_ERR_IO.
 bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err);
 bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
 

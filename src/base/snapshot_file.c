@@ -8,7 +8,7 @@
 
 #include "base/h5read.h"
 #include "base/h5util.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 
 static hid_t memory_type(bt_item_type type)
@@ -48,7 +48,7 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *e
         else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
     }
     status = bt_h5_close(&h);
-    return status == BT_OK ? bt_seal_write(path, BT_SEAL_CHECKPOINT, err) : status;
+    return status == BT_OK ? bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, err) : status;
 }
 
 enum { MOST_COLUMNS = 1000 };
@@ -124,7 +124,7 @@ bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err)
 {
     *s = (bt_snapshot){.path = path, .err = err};
     bt_h5_reader r;
-    if (bt_h5_open(&r, path, BT_SEAL_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
+    if (bt_h5_open(&r, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
     if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0) {
         bt_errors_add(err, "%s: holds what this program does not write; use the program that wrote it", path);
         r.status = BT_ERR_CASE;

@@ -230,7 +230,7 @@ bt_key bt_case_keys[] = {
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: six updates of every contact for each of so many sweeps, looks at contacts counted as updates; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "without effect: sweeps no longer follow each other through large fields; accepted in cases written for earlier versions, and to be taken out"),
-    REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
+    REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false", "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of sweeps"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
     REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]", "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the projection]"),

@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 
 #define SQUARE 0.98 // cosine, as for reference edges
 #define PLACE 0.01  // of the smaller radius, as for reference edges

@@ -112,7 +112,7 @@ static int by_code(const void *a, const void *b)
     return (p->i > q->i) - (p->i < q->i);
 }
 
-void bt_field_sort(bt_field *f, const bt_yard *y)
+void bt_field_sort(bt_field *f, const bt_region *y)
 {
     double side = bt_max(y->x1 - y->x0, y->y1 - y->y0);
     key *order = bt_alloc((size_t)f->n, sizeof *order);

@@ -166,13 +166,13 @@ static void check_bounds(const bt_case *c, const place *p, bt_idx i)
 }
 
 /// Ready for pairs of floes of f, wherever in the domain they lie.
-static void begin_places(place *p, bt_yard *y, const bt_case *c, const bt_field *f)
+static void begin_places(place *p, bt_region *y, const bt_case *c, const bt_field *f)
 {
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
     bt_errors ignored = {0}; // no room for ice is told by the reader
-    bt_yard_init(y, &whole, 0, &ignored);
+    bt_region_init(y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
     double size = 0;
@@ -188,7 +188,7 @@ static void begin_places(place *p, bt_yard *y, const bt_case *c, const bt_field 
     }
 }
 
-static void check_pairs(place *p, const bt_yard *y)
+static void check_pairs(place *p, const bt_region *y)
 {
     bt_field_visit_pairs(y, p->f, p->outline, 1, visit, p);
     if (p->overlapping <= 1) return;
@@ -197,13 +197,13 @@ static void check_pairs(place *p, const bt_yard *y)
 }
 
 /// Floes in the towed body or a floe given by hand.
-static void check_obstacles(const place *p, const bt_yard *y)
+static void check_obstacles(const place *p, const bt_region *y)
 {
     const bt_field *f = p->f;
     for (bt_idx i = 0; i < f->n; i++) {
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
         for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++) radius = bt_max(radius, hypot(p->outline[2 * k], p->outline[2 * k + 1]));
-        bt_yard_wrap(y, &x, &z);
+        bt_region_wrap(y, &x, &z);
         for (int o = 0; o < y->n_obstacles; o++) {
             const bt_obstacle *b = &y->obstacles[o];
             if (hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
@@ -221,7 +221,7 @@ static void check_places(const bt_case *c, const bt_field *f, const char *noun, 
 {
     double *outline = bt_field_outlines(f);
     place p = {.f = f, .outline = outline, .noun = noun, .r = r};
-    bt_yard y;
+    bt_region y;
     for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
     begin_places(&p, &y, c, f);
     check_pairs(&p, &y);
@@ -229,7 +229,7 @@ static void check_places(const bt_case *c, const bt_field *f, const char *noun, 
     for (bt_idx i = 0; i < f->n; i++) free(p.parts[i]);
     free(p.parts);
     free(outline);
-    bt_yard_free(&y);
+    bt_region_free(&y);
 }
 
 void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r) { check_places(c, f, noun, false, r); }

@@ -25,9 +25,9 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_yard y;
+    bt_region y;
     bt_errors ignored = {0};
-    bt_yard_init(&y, &whole, 0, &ignored);
+    bt_region_init(&y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
     double *outline = bt_field_outlines(f);
@@ -44,7 +44,7 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
             if (c->domain.sides == BT_BOUND_WALL)
                 s.deepest = bt_max(s.deepest, bt_max(y.y0 - (z + v[2 * k + 1]), z + v[2 * k + 1] - y.y1));
         }
-        bt_yard_wrap(&y, &x, &z);
+        bt_region_wrap(&y, &x, &z);
         for (int o = 0; o < y.n_obstacles; o++) {
             const bt_obstacle *b = &y.obstacles[o];
             double dx = b->x - x, dy = b->y - z, reach = radius + b->radius, rel[2 * BT_MAX_VERTICES];
@@ -54,6 +54,6 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
         }
     }
     free(outline);
-    bt_yard_free(&y);
+    bt_region_free(&y);
     return s.deepest;
 }

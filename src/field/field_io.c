@@ -8,7 +8,7 @@
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes
 //     /case             the resolved case the field was made from
-// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a seal (seal.h): of such a file
+// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a checksum (checksum.h): of such a file
 // any damage is refused before HDF5, which crashes on some, reads a byte. A file without one, made by h5py say, is let through to the
 // checks of its values; what damage does to HDF5 itself it cannot be kept from.
 #include <errno.h>
@@ -27,7 +27,7 @@
 #include "base/h5util.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 // ---- write ----
 
@@ -66,7 +66,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         free(text);
         bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h);
-        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_FIELD, err);
+        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_FIELD, err);
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
@@ -250,7 +250,7 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err) { return 
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     bool bare;
-    const bt_status sealed = bt_seal_check(path, BT_SEAL_FIELD, &bare, err);
+    const bt_status sealed = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (sealed != BT_OK) return sealed;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     if (H5Fis_hdf5(path) <= 0) {

@@ -72,7 +72,7 @@ static double total_area(const bt_field *f)
     return sum;
 }
 
-static double mean_gap(const bt_yard *y, const bt_field *f, double *size)
+static double mean_gap(const bt_region *y, const bt_field *f, double *size)
 {
     double d = 0, area = total_area(f);
     for (bt_idx i = 0; i < f->n; i++) d += 2 * sqrt(f->area[i] / BT_PI) / f->n;
@@ -84,22 +84,22 @@ static double mean_gap(const bt_yard *y, const bt_field *f, double *size)
 }
 
 // Cells of the case's kind. wanted: area of all floes, m².
-static bt_cells make_cells(const bt_case *c, const bt_yard *y, bt_idx n, const double *target, double wanted)
+static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n, const double *target, double wanted)
 {
-    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_cells_tessellate(y, n, target, c->ice.seed);
+    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_tessellation_tessellate(y, n, target, c->ice.seed);
     double aspect = c->ice.aspect > 0 ? bt_max(c->ice.aspect, 1 / c->ice.aspect) : 1;
     // Around an obstacle rectangles stay rectangles, unless that wastes too much water.
     for (int effort = 0;; effort++) {
-        bt_cells cells = bt_cells_saw(y, n, target, aspect, c->ice.seed, effort);
+        bt_tessellation cells = bt_tessellation_saw(y, n, target, aspect, c->ice.seed, effort);
         double fill = 0;
         for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
         if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
-        bt_cells_free(&cells);
+        bt_tessellation_free(&cells);
     }
 }
 
 // One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
-static bt_status floes_from_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
+static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted, bt_field *f,
                                   bt_errors *err)
 {
     double *room = bt_alloc((size_t)cells->n, sizeof *room);
@@ -107,7 +107,7 @@ static bt_status floes_from_cells(const bt_case *c, const bt_yard *y, const bt_c
         if (cells->nv[i] < 3) continue;
         bt_idx k = f->n;
         bt_field_add(f, cells->nv[i], cells->v[i], 0, 0, 0, 0);
-        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         double s = sqrt(cells->target[i] / f->area[k]);
         bt_field_scale(f, k, s);
         room[k] = (1 - 1e-6) / s;
@@ -132,7 +132,7 @@ static double fit_into(int nc, const double *cell, double x, double y, int n, co
 }
 
 // Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
-static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
+static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted, bt_field *f,
                                    bt_errors *err)
 {
     int sides = (int)c->ice.sides;
@@ -155,14 +155,14 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
         bt_shape_regular(sides, goal[k], v);
         double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, cos(yaw), sin(yaw));
         bt_field_add(f, sides, v, m.cx, m.cy, yaw, 0);
-        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         bt_field_scale(f, k, bt_min(1, 0.999 * t));
     }
     bt_status status = BT_OK;
     double best_area = 0, best_least = 0;
     int idle = 0;
     for (int stage = 1; status == BT_OK; stage++) {
-        bt_field_room(y, f, 2, room);
+        bt_field_growth(y, f, 2, room);
         double least = 1; // part of its goal that the smallest floe has
         for (bt_idx i = 0; i < f->n; i++) {
             if (room[i] < 1) bt_field_scale(f, i, TOUCH * room[i]);
@@ -192,10 +192,10 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
 }
 
 // Take out what overlap the shake has left, and bring the area back to what was asked.
-static bt_status settle(const bt_case *c, const bt_yard *y, bt_field *f, double wanted, bt_errors *err)
+static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, double wanted, bt_errors *err)
 {
     double *room = bt_alloc((size_t)f->n, sizeof *room);
-    bt_field_room(y, f, 1.2, room);
+    bt_field_growth(y, f, 1.2, room);
     bt_status status = BT_OK;
     for (bt_idx i = 0; i < f->n && status == BT_OK; i++) {
         room[i] *= TOUCH;
@@ -232,17 +232,17 @@ static void set_thickness(const bt_case *c, bt_field *f)
     for (bt_idx i = 0; i < f->n; i++) f->thickness[i] = bt_field_thickness(c, i);
 }
 
-static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
+static bt_status make(const bt_case *c, const bt_region *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
 {
     double wanted = c->ice.concentration * y->ice_area, *target;
     bt_idx n;
     bt_status status = draw_targets(c, sizes, wanted, &target, &n, err);
     if (status != BT_OK) return status;
-    bt_cells cells = make_cells(c, y, n, target, wanted);
+    bt_tessellation cells = make_cells(c, y, n, target, wanted);
     free(target);
     status = c->ice.shape == BT_ICE_POLYGONS ? polygons_in_cells(c, y, &cells, wanted, f, err)
                                              : floes_from_cells(c, y, &cells, wanted, f, err);
-    bt_cells_free(&cells);
+    bt_tessellation_free(&cells);
     if (status != BT_OK) return status;
     bt_field_sort(f, y);
     double size, gap = mean_gap(y, f, &size);
@@ -262,12 +262,12 @@ bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
     bt_sizes sizes;
     bt_status status = bt_sizes_init(&sizes, c, err);
     if (status != BT_OK) return status;
-    bt_yard y;
-    status = bt_yard_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
+    bt_region y;
+    status = bt_region_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
     if (status == BT_OK && c->ice.concentration > 0) status = make(c, &y, &sizes, f, err);
     f->ice_area = y.ice_area;
     f->concentration = y.ice_area > 0 ? total_area(f) / y.ice_area : 0;
-    bt_yard_free(&y);
+    bt_region_free(&y);
     if (status != BT_OK) {
         bt_field_free(f);
         bt_field_init(f);

@@ -19,7 +19,7 @@
 #include "base/rng.h"
 
 enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
-static const double LARGE = 4; // floes of more than this many mean diameters are in no tile: tiles fit the rest
+static const double LARGE = 4; // floes of more than this many mean diameters are in no cell: cells fit the rest
 
 static void add_static(bt_world *w, int n, double *v)
 {
@@ -34,7 +34,7 @@ static void add_box(bt_world *w, double x0, double x1, double y0, double y1)
     add_static(w, 4, v);
 }
 
-static void add_surroundings(bt_world *w, const bt_yard *y, double thick)
+static void add_surroundings(bt_world *w, const bt_region *y, double thick)
 {
     // Walls reach past the corners, and past a periodic edge: a floe that lies across it meets the nearest image of the wall.
     if (!y->periodic_x) {
@@ -61,7 +61,7 @@ static int ascending(const void *a, const void *b)
     return (*p > *q) - (*p < *q);
 }
 
-bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double length, double stride, int64_t stage,
+bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
                          bt_errors *err)
 {
     if (f->n < 1 || !(length > 0) || !(stride > 0)) return BT_OK;
@@ -122,7 +122,7 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         for (bt_idx i = 0; i < f->n; i++) {
             const bt_idx at = bt_world_index(w, i);
             w->bodies.vel[at] = (bt_vel){0};
-            w->bodies.stirred[at] = 1; // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
+            w->bodies.disturbed[at] = 1; // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
         }
         bt_world_step(w);
         if (w->stats.overlap <= 3 * par.slop) break;
@@ -140,7 +140,7 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         f->pose[3 * i] = p->x;
         f->pose[3 * i + 1] = p->y;
         f->pose[3 * i + 2] = remainder(p->yaw, 2 * BT_PI);
-        bt_yard_wrap(y, &f->pose[3 * i], &f->pose[3 * i + 1]);
+        bt_region_wrap(y, &f->pose[3 * i], &f->pose[3 * i + 1]);
     }
     bt_world_free(w);
     return status;

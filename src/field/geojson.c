@@ -444,14 +444,14 @@ static void choose_coordinates(reader *s, const json_t *root)
 
 static void set_concentration(reader *s)
 {
-    bt_yard y;
-    const bt_status status = bt_yard_init(&y, s->c, 0, s->r.err);
+    bt_region y;
+    const bt_status status = bt_region_init(&y, s->c, 0, s->r.err);
     if (status != BT_OK) s->r.status = status;
     double sum = 0;
     for (bt_idx i = 0; i < s->f->n; i++) sum += s->f->area[i];
     s->f->ice_area = y.ice_area;
     s->f->concentration = status == BT_OK ? sum / y.ice_area : 0;
-    bt_yard_free(&y);
+    bt_region_free(&y);
 }
 
 /// What the floes are together: far too small or large, they are in other units.

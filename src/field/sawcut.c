@@ -33,13 +33,13 @@ static void shape_piece(double *v, double area, double aspect)
     memcpy(v, (double[8]){cx - hx, cy - hy, cx + hx, cy - hy, cx + hx, cy + hy, cx - hx, cy + hy}, 8 * sizeof *v);
 }
 
-static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double y0, double y1, double target, double aspect,
+static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x1, double y0, double y1, double target, double aspect,
                      int effort, int halved)
 {
-    double v[2 * 8 * BT_CELL_VERTICES];
+    double v[2 * 8 * BT_TESSELLATION_VERTICES];
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
-    int n = bt_cell_clear(y, 4, v, effort == 0);
-    if (n >= 3) n = bt_cell_clean(n, v, 0);
+    int n = bt_tessellation_clear(y, 4, v, effort == 0);
+    if (n >= 3) n = bt_tessellation_clean(n, v, 0);
     double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_moments(n, v).area : 0;
     // Halves waste less water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {
@@ -104,9 +104,9 @@ static bt_idx deal(bt_idx n, const piece *p, double share, double aspect, double
     return n_strips;
 }
 
-bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort)
+bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort)
 {
-    bt_cells c = {0};
+    bt_tessellation c = {0};
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
     piece *p = bt_alloc((size_t)n, sizeof *p), *strip = bt_alloc((size_t)n, sizeof *strip);
     for (bt_idx i = 0; i < n; i++) {

@@ -14,7 +14,7 @@
 // quadratic in v = U_ref − U, and skin drag is smooth: Newton's method, with steps that lower the residual. It exists
 // and is the only one: both drags are monotone in U but for the change of width with direction, Coriolis is skew. Begun
 // at the velocity at which the water's drag alone would bear the force on a body that moves with the water; where that
-// force is 0, the body has exactly the velocity of the water, and rests in it (tiles.h).
+// force is 0, the body has exactly the velocity of the water, and rests in it (cells.h).
 #ifndef BERGTOW_DRIFT_H
 #define BERGTOW_DRIFT_H
 

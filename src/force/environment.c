@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "base/table.h"
 
 /// One of the two fluids.
@@ -118,8 +118,8 @@ void bt_environment_begin(bt_world *w)
     p->balance_u = balance[0], p->balance_v = balance[1];
     p->tilt_ax = tilt[0], p->tilt_ay = tilt[1];
     if (same) return;
-    bt_tiles_wake_all(w->tiles);
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NO;
+    bt_cells_wake_all(w->cells);
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_AWAKE;
 }
 
 void bt_environment_advance(bt_world *w)

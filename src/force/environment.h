@@ -19,8 +19,8 @@
 //                   t = 0 in the first) to the middle of this one, and Coriolis acts about the current of the last step: so it is
 //                   exact in the scheme of forces.h, U' = U_b + R (U1 − U_b) + Δt (−g∇η)
 //
-// Rest. A floe is at rest when it has the water's velocity of that step (tiles.h). When water, wind or balance differ from those of the
-// step before, no tile rests: every body is looked at and feels the forces again. Tiles move along with the water:
+// Rest. A floe is at rest when it has the water's velocity of that step (cells.h). When water, wind or balance differ from those of the
+// step before, no cell rests: every body is looked at and feels the forces again. Cells move along with the water:
 // by its displacement since t = 0, the sum of Δt U_w over the steps, which every rank forms alike.
 #ifndef BERGTOW_ENVIRONMENT_H
 #define BERGTOW_ENVIRONMENT_H

@@ -6,7 +6,7 @@
 
 #include "force/laws.h"
 #include "force/load.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 
 /// All laws of a body: those of the list inline, those that a program has added through the table.
 static inline void load_of(const bt_forces *f, bool added, bt_force_body *b, bt_load *l)
@@ -42,19 +42,19 @@ __attribute__((always_inline)) static inline void predict(bt_world *w, bt_idx i,
 void bt_forces_predict(bt_world *w)
 {
     bt_bodies *b = &w->bodies;
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bool added = w->forces->n > BT_LISTED_LAWS;
     bt_turning r = BT_TURNING_NONE;
-#pragma omp parallel for schedule(dynamic, 16) firstprivate(r) if (BT_MANY(t->n_busy, BT_FEW_TILES))
+#pragma omp parallel for schedule(dynamic, 16) firstprivate(r) if (BT_MANY(t->n_busy, BT_FEW_CELLS))
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
-        if (t->rest[k] == BT_REST_KNOWN) continue;
-        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
+        if (t->asleep[k] == BT_ASLEEP) continue;
+        for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
             if (b->motion[i] != BT_DYNAMIC) b->vel_free[i] = b->vel[i];
             else if (added) predict(w, i, true, &r);
             else predict(w, i, false, &r);
         }
-        if (t->rest[k]) t->rest[k] = BT_REST_KNOWN;
+        if (t->asleep[k]) t->asleep[k] = BT_ASLEEP;
     }
 }
 

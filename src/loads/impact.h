@@ -38,7 +38,7 @@
 #include "bergtow/world.h"
 
 /// One manifold on the towed body in one step. Numbers only, so that ranks can hand it on as a row.
-typedef struct bt_touch {
+typedef struct bt_body_contact {
     double gid;           ///< of the other body
     double x, y;          ///< pressure centre, m, body frame
     double nx, ny;        ///< direction of the normal force on the towed body, body frame; the tangent is (−ny, nx)
@@ -50,7 +50,7 @@ typedef struct bt_touch {
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
     double px[2], py[2], point[2]; ///< contact points, m, body frame, and the normal impulse of each, N s
-} bt_touch;
+} bt_body_contact;
 
 /// A collision.
 typedef struct bt_impact {
@@ -92,7 +92,7 @@ typedef struct bt_impacts {
     double body_height;   ///< thickness of the towed body, for contacts with walls, m
     bt_panels panels;
     // the last step
-    bt_touch *touch;      ///< [n_touch] by gid
+    bt_body_contact *touch;      ///< [n_touch] by gid
     int64_t n_touch;
     bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
     int64_t n_closed, cap_closed;

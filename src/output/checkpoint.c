@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 
 bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
@@ -20,7 +20,7 @@ bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char 
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // One that has been damaged meanwhile must not take the place of a sound one.
         bt_errors unheard = {0};
-        const bool sound = bt_seal_check(path, BT_SEAL_CHECKPOINT, NULL, &unheard) == BT_OK;
+        const bool sound = bt_checksum_check(path, BT_CHECKSUM_CHECKPOINT, NULL, &unheard) == BT_OK;
         status = bt_file_rename(path, sound ? before : damaged, err);
         bt_errors_free(&unheard);
     }

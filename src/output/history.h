@@ -21,7 +21,7 @@ extern const bt_column_def bt_history_columns[BT_N_COLUMNS];
 /// What the summary keeps of every step, whatever output.sample_every says: 120 bytes a step.
 typedef struct bt_history {
     int64_t n, cap;
-    double *column[BT_N_COLUMNS];    ///< [n] each, units as in bt_sample; NaN where a step has no such number
+    double *column[BT_N_COLUMNS];    ///< [n] each, contacts as in bt_sample; NaN where a step has no such number
     double *law[BT_MAX_FORCE_LAWS];  ///< [n] each of the first n_laws: bt_sample.law_force
     int n_laws;
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, contact_work;

@@ -14,7 +14,7 @@
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
 #include "partition/domain.h"
@@ -22,15 +22,15 @@
 
 enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
 
-/// One tile's share of the sums over contacts and floes.
-static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
+/// One cell's share of the sums over contacts and floes.
+static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_tile *tile = &w->tiles->tile[k];
+    const bt_cell *cell = &w->cells->cell[k];
     const bt_idx towed = bt_world_towed(w);
     const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
     const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
-    for (bt_idx i = tile->first; i < tile->end; i++) {
+    for (bt_idx i = cell->first; i < cell->end; i++) {
         if (b->motion[i] != BT_DYNAMIC || i == towed) continue;
         const bt_vel *v = &b->vel[i];
         if (v->x * v->x + v->y * v->y > slow2) bt_sum_add(&t->sum[MOVING], 1);
@@ -38,8 +38,8 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
         if (prescribed && (ux != 0 || uy != 0)) bt_sum_add(&t->sum[BUDGET], -(ux * dx + uy * dy) / b->inv[i].m);
     }
     if (towed < 0) return;
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_unit *u = &tile->units[j];
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
         const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
@@ -58,17 +58,17 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
     }
 }
 
-static bt_totals observe_tiles(const bt_world *w, double slow2)
+static bt_totals observe_cells(const bt_world *w, double slow2)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     bt_totals all = {.n_sums = N_SEEN};
-#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
     {
         bt_totals t = {.n_sums = N_SEEN};
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx j = 0; j < ts->n_busy; j++) {
             const bt_idx k = ts->busy[j];
-            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || ts->tile[k].n_units > 0 || !ts->still)) observe_tile(w, k, slow2, &t);
+            if (ts->cell[k].own && (k == ts->n - 1 || bt_cells_moves(ts, k) || ts->cell[k].n_contacts > 0 || !ts->still)) observe_cell(w, k, slow2, &t);
         }
 #pragma omp critical
         bt_totals_merge(&all, &t);
@@ -222,7 +222,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .wind_y = w->par.air_v,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
-    const bt_totals seen = observe_tiles(w, slow2);
+    const bt_totals seen = observe_cells(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
     const unsigned has = bt_observe_applies(w);
     if (has & 1u << BT_APPLIES_BODY) observe_body(w, &seen, s);
@@ -249,9 +249,9 @@ double bt_observe_ice_area(const bt_world *w)
 void bt_observe_contact_force(const bt_world *w, double *force)
 {
     for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-            const bt_unit *u = &w->tiles->tile[k].units[j];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+            const bt_contact *u = &w->cells->cell[k].contacts[j];
             if (u->n == 0) continue; // friction of sheets is spread over them
             const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
             force[u->a] = bt_max(force[u->a], f);

@@ -3,7 +3,7 @@
 //
 // result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to then, so that a
 // calculation can be watched; killed within a flush, some series have its length and some that of the last, all rows whole (h5driver.c). Under its
-// final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint (record_resume.c), and at the end the
+// final name, result.h5, stands only what is complete and protected by a checksum (checksum.h): a copy of it at each checkpoint (record_resume.c), and at the end the
 // file itself (attribute "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and renamed.
 #include "output/record.h"
 
@@ -16,7 +16,7 @@
 #include "base/fileio.h"
 #include "base/provenance.h"
 #include "output/record_parts.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "output/xdmf.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
@@ -286,7 +286,7 @@ static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_er
 static bt_status hand_in(const bt_record *r, bt_errors *err)
 {
     char *part = bt_file_join(r->dir, BT_RESULT_PART), *path = bt_file_join(r->dir, BT_RESULT_FILE);
-    bt_status status = bt_seal_write(part, BT_SEAL_RESULT, err);
+    bt_status status = bt_checksum_write(part, BT_CHECKSUM_RESULT, err);
     if (status == BT_OK) status = bt_file_rename(part, path, err);
     free(part);
     free(path);

@@ -41,7 +41,7 @@ typedef struct bt_sample {
     double unprojected;     ///< 1 if the position projection met its limit
     double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
     double residual_rms;    ///< the same, root mean square over the rows, m/s
-    double active;          ///< floes in tiles whose contacts were looked at; the others rest
+    double active;          ///< floes in cells whose contacts were looked at; the others rest
     double unconverged;     ///< 1 if the limit of work came before the tolerance
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
@@ -182,7 +182,7 @@ struct bt_snapshot;
 /// its end is. The status is that of rank 0.
 bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, bt_errors *err);
 
-/// Collective. result.h5 and frames.xdmf as they are now: a sealed copy of the file under way, in place of what was there.
+/// Collective. result.h5 and frames.xdmf as they are now: a protected by a checksum copy of the file under way, in place of what was there.
 bt_status bt_record_publish(bt_record *r, bt_errors *err);
 
 /// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from result.h5, which may

@@ -14,7 +14,7 @@
 
 #include "base/fileio.h"
 #include "output/record_parts.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 #define HISTORY(type, member) {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}
 static const bt_state_row history_rows[] = {
@@ -63,7 +63,7 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
         bt_record_flush(r);
         status = r->h5.status;
         if (status == BT_OK) status = bt_file_copy(part, copy, err);
-        if (status == BT_OK) status = bt_seal_write(copy, BT_SEAL_RESULT, err);
+        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);
         if (status == BT_OK) status = bt_file_rename(copy, path, err);
         char *xdmf = bt_record_xdmf(r);
         if (status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
@@ -176,7 +176,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
         load_history(&r->history, s, step);
-        if (!s->faulty) bt_h5_open(&old, path, BT_SEAL_RESULT, err);
+        if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
         if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);

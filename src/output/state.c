@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a world as named arrays: bodies by id, tiles, contacts, tow, window, collisions, events.
+// The state of a world as named arrays: bodies by id, cells, contacts, tow, window, collisions, events.
 #include "output/state.h"
 
 #include <assert.h>
@@ -11,7 +11,7 @@
 
 #include "contact/law.h"
 #include "loads/impact.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
 #include "partition/domain.h"
@@ -32,11 +32,11 @@ static const bt_state_row par_rows[] = {
     PAR(coriolis), PAR(balance_u), PAR(balance_v), PAR(tilt_ax), PAR(tilt_ay),
 };
 
-#define TILES(type, member) MEMBER(bt_tiles, #member, type, 1, member)
-static const bt_state_row tiles_rows[] = {
-    TILES(F64, x0), TILES(F64, y0), TILES(F64, side_x), TILES(F64, side_y), TILES(F64, allowance), TILES(F64, reach), TILES(F64, heaviest), TILES(U8, rebounds),
-    TILES(F64, margin_max), TILES(I32, low_x), TILES(I32, low_y), TILES(I32, n_x), TILES(I32, n_y), TILES(I32, wrap_x), TILES(I32, wrap_y), TILES(U8, relabel),
-    TILES(I64, n_labellings),
+#define CELLS(type, member) MEMBER(bt_cells, #member, type, 1, member)
+static const bt_state_row cells_rows[] = {
+    CELLS(F64, x0), CELLS(F64, y0), CELLS(F64, side_x), CELLS(F64, side_y), CELLS(F64, allowance), CELLS(F64, reach), CELLS(F64, heaviest), CELLS(U8, rebounds),
+    CELLS(F64, margin_max), CELLS(I32, low_x), CELLS(I32, low_y), CELLS(I32, n_x), CELLS(I32, n_y), CELLS(I32, wrap_x), CELLS(I32, wrap_y), CELLS(U8, relabel),
+    CELLS(I64, n_labellings),
 };
 
 #define TOW(type, member) MEMBER(bt_tow, #member, type, 1, member)
@@ -100,16 +100,16 @@ void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
 /// What a body carries from step to step, as it travels to rank 0. Everything else about it follows from the case and the field.
 typedef struct {
     double pose[3], vel[3], path;
-    int32_t tile[2], copy, lap;
-    int64_t stirred;
+    int32_t cell[2], copy, lap;
+    int64_t disturbed;
 } body_row;
 enum { BODY_WIDTH = sizeof(body_row) / sizeof(double) };
 _Static_assert(sizeof(body_row) % sizeof(double) == 0, "a body is a row of doubles");
 
 /// Its columns in the file.
 static const bt_state_row body_columns[] = {
-    MEMBER(body_row, "pose", F64, 3, pose), MEMBER(body_row, "velocity", F64, 3, vel), MEMBER(body_row, "path", F64, 1, path), MEMBER(body_row, "tile", I32, 2, tile),
-    MEMBER(body_row, "copy", I32, 1, copy), MEMBER(body_row, "lap", I32, 1, lap), MEMBER(body_row, "stirred", I64, 1, stirred),
+    MEMBER(body_row, "pose", F64, 3, pose), MEMBER(body_row, "velocity", F64, 3, vel), MEMBER(body_row, "path", F64, 1, path), MEMBER(body_row, "tile", I32, 2, cell),
+    MEMBER(body_row, "copy", I32, 1, copy), MEMBER(body_row, "lap", I32, 1, lap), MEMBER(body_row, "stirred", I64, 1, disturbed),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -118,10 +118,10 @@ static body_row row_of(const bt_bodies *b, bt_idx i)
         .pose = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw},
         .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
         .path = b->path[i],
-        .tile = {b->tile[i][0], b->tile[i][1]},
+        .cell = {b->cell[i][0], b->cell[i][1]},
         .copy = b->home[i].copy,
         .lap = b->home[i].lap,
-        .stirred = b->stirred[i],
+        .disturbed = b->disturbed[i],
     };
 }
 
@@ -132,11 +132,11 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
     bt_bodies_turn(&w->bodies, i);
     b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
     b->path[i] = r->path;
-    b->tile[i][0] = r->tile[0];
-    b->tile[i][1] = r->tile[1];
+    b->cell[i][0] = r->cell[0];
+    b->cell[i][1] = r->cell[1];
     b->home[i].copy = r->copy;
     b->home[i].lap = r->lap;
-    b->stirred[i] = r->stirred != 0;
+    b->disturbed[i] = r->disturbed != 0;
 }
 
 /// A column of rows of `size` bytes, to or from an array of its own.
@@ -205,7 +205,7 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     assert(w->bodies.n == n); // nothing is dealt yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++) {
-        bt_snapshot_want(s, rows[g].stirred == 0 || rows[g].stirred == 1, "bodies/stirred", g, "is neither 0 nor 1");
+        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/stirred", g, "is neither 0 nor 1");
         put_row(w, bt_world_index(w, g), &rows[g]);
     }
     free(rows);
@@ -213,12 +213,12 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 
 // --- contacts --------------------------------------------------------------------------------------------------------
 
-enum { TRACE_WIDTH = sizeof(bt_trace) / sizeof(double) };
-_Static_assert(sizeof(bt_trace) % sizeof(double) == 0, "a trace is a row of doubles");
+enum { TRACE_WIDTH = sizeof(bt_memory) / sizeof(double) };
+_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a trace is a row of doubles");
 
 static const bt_state_row trace_columns[] = {
-    MEMBER(bt_trace, "a", I64, 1, a), MEMBER(bt_trace, "b", I64, 1, b), MEMBER(bt_trace, "part", U16, 2, part), MEMBER(bt_trace, "points", I32, 1, n_points),
-    MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "value", F64, 4, value), MEMBER(bt_trace, "law", U16, 1, law),
+    MEMBER(bt_memory, "a", I64, 1, a), MEMBER(bt_memory, "b", I64, 1, b), MEMBER(bt_memory, "part", U16, 2, part), MEMBER(bt_memory, "points", I32, 1, n_points),
+    MEMBER(bt_memory, "feature", U32, 2, feature), MEMBER(bt_memory, "value", F64, 4, value), MEMBER(bt_memory, "law", U16, 1, law),
 };
 
 /// A checkpoint of before laws had numbers: impulse [2], friction, and whether the row is not that but the depths that the pair has crushed.
@@ -243,7 +243,7 @@ static void renew_contacts(bt_snapshot *s)
 }
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
-static void blank(bt_trace *t)
+static void blank(bt_memory *t)
 {
     if (t->n_points < 2) t->feature[1] = 0, t->value[1] = 0;
 }
@@ -251,11 +251,11 @@ static void blank(bt_trace *t)
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
-    bt_trace *mine = bt_tiles_take_traces(w, &n);
-    bt_trace *trace = (bt_trace *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
+    bt_memory *mine = bt_cells_take_memory(w, &n);
+    bt_memory *trace = (bt_memory *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
     free(mine);
     if (c->rank == 0) {
-        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_trace_by_names);
+        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&trace[k]);
         save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
     }
@@ -278,7 +278,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
     bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
@@ -342,7 +342,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
     load_bodies(w, s);
-    bt_snapshot_take_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->impacts && c->rank == 0) {
@@ -355,7 +355,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     w->events.cap = w->events.n;
     int64_t n = -1;
     renew_contacts(s);
-    bt_trace *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
+    bt_memory *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
     if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
@@ -367,7 +367,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
         return status;
     }
     bt_domain_create(w, c);
-    bt_tiles_restore(w, trace, n);
+    bt_cells_restore(w, trace, n);
     if (bt_world_hash(w) == hash) return BT_OK;
     bt_errors_add(err, "%s: the state that was read does not have the hash it was saved with, %016" PRIx64 "; go on with the program that wrote it", s->path, hash);
     return BT_ERR_NUMERIC;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What a checkpoint may hold: the bounds within which every step leaves its state.
 //
-// The seal shows that a file is as it was written, not that it was written by a run: a file made by hand, or by a program with an error, can be sealed
+// The checksum shows that a file is as it was written, not that it was written by a run: a file made by hand, or by a program with an error, can be protected by a checksum
 // too, and the hash of the state leaves much of it out (labels, impulses, counters). Its numbers become indices, lengths of arrays and ends of
 // loops. So each that does is held against what steps keep true before it is used, and every other real number must be finite. Nothing here is an
 // estimate: a bound that a sound run could exceed would take its checkpoint away from it.
@@ -21,7 +21,7 @@
 #include "base/largest.h"
 
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
-static const int32_t FAR = 1000000000; // tiles, periods: as labels of tiles are limited (tiles.c)
+static const int32_t FAR = 1000000000; // cells, periods: as labels of cells are limited (cells.c)
 
 static bool all_finite(const double *x, int64_t n)
 {
@@ -91,14 +91,14 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
                      "field/read", -1, "and what was done to outlines are not all counts");
 }
 
-// --- tiles -----------------------------------------------------------------------------------------------------------
+// --- cells -----------------------------------------------------------------------------------------------------------
 
 typedef struct {
     const char *corner, *side, *wrap, *low, *n;
-} tile_names;
+} cell_names;
 
-/// One direction of the tiles: as src/space/tiles.c chooses them. tiled: there are floes in them.
-static void check_direction(bt_snapshot *s, const tile_names *name, bool tiled, double period, double corner, double side, int32_t wrap, int32_t low, int32_t n)
+/// One direction of the cells: as src/space/cells.c chooses them. in_cells: there are floes in them.
+static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cells, double period, double corner, double side, int32_t wrap, int32_t low, int32_t n)
 {
     bt_snapshot_want(s, isfinite(corner), name->corner, -1, "is not finite");
     bt_snapshot_want(s, side > 0 && isfinite(side), name->side, -1, "is no width of a tile");
@@ -106,23 +106,23 @@ static void check_direction(bt_snapshot *s, const tile_names *name, bool tiled, 
     if (s->faulty) return;
     bt_snapshot_want(s, wrap == 0 || side == period / wrap, name->side, -1, "does not go round the domain");
     bt_snapshot_want(s, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is no place of a tile");
-    bt_snapshot_want(s, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !tiled)), name->n, -1, "is no number of tiles");
+    bt_snapshot_want(s, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !in_cells)), name->n, -1, "is no number of tiles");
 }
 
-static void check_tiles(const bt_world *w, bt_snapshot *s)
+static void check_cells(const bt_world *w, bt_snapshot *s)
 {
-    static const tile_names x = {"tiles/x0", "tiles/side_x", "tiles/wrap_x", "tiles/low_x", "tiles/n_x"}, y = {"tiles/y0", "tiles/side_y", "tiles/wrap_y", "tiles/low_y", "tiles/n_y"};
-    const bt_tiles *t = w->tiles;
+    static const cell_names x = {"tiles/x0", "tiles/side_x", "tiles/wrap_x", "tiles/low_x", "tiles/n_x"}, y = {"tiles/y0", "tiles/side_y", "tiles/wrap_y", "tiles/low_y", "tiles/n_y"};
+    const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     double widest = 0;
-    bool tiled = false;
+    bool in_cells = false;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->large[i]) continue;
-        tiled = true;
+        in_cells = true;
         widest = bt_max(widest, b->radius[i]);
     }
-    check_direction(s, &x, tiled, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
-    check_direction(s, &y, tiled, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
+    check_direction(s, &x, in_cells, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
+    check_direction(s, &y, in_cells, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
     bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "tiles/n_x", -1, "and n_y are more tiles than are made for so many floes");
     bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "tiles/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.
@@ -137,7 +137,7 @@ static void check_tiles(const bt_world *w, bt_snapshot *s)
 
 // --- bodies, contacts ------------------------------------------------------------------------------------------------
 
-static bool in_box(const bt_tiles *t, const int32_t at[2])
+static bool in_box(const bt_cells *t, const int32_t at[2])
 {
     return at[0] >= t->low_x && at[0] - t->low_x < t->n_x && at[1] >= t->low_y && at[1] - t->low_y < t->n_y;
 }
@@ -155,8 +155,8 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, b->home[i].copy >= -FAR && b->home[i].copy <= FAR, "bodies/copy", g, "is out of range");
         bt_snapshot_want(s, b->home[i].lap >= -FAR && b->home[i].lap <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
-        bt_snapshot_want(s, in_box(w->tiles, b->tile[i]), "bodies/tile", g, "is outside the box of the tiles");
-        bt_snapshot_want(s, w->tiles->relabel || bt_tiles_outside(w, i) <= w->tiles->allowance, "bodies/tile", g, "is too far from where the floe is");
+        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the tiles");
+        bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/tile", g, "is too far from where the floe is");
     }
 }
 
@@ -167,19 +167,19 @@ static bool has_part(const bt_bodies *b, bt_idx i, int part)
     return false;
 }
 
-/// Can bodies i and j have a contact, and a tile that owns it?
+/// Can bodies i and j have a contact, and a cell that owns it?
 static bool can_meet(const bt_world *w, bt_idx i, bt_idx j)
 {
     const bt_bodies *b = &w->bodies;
     if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) return false;
-    return b->large[i] || b->large[j] || bt_tiles_adjacent(w->tiles, b->tile[i], b->tile[j]);
+    return b->large[i] || b->large[j] || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j]);
 }
 
-static void check_contacts(const bt_world *w, const bt_trace *trace, int64_t n, bt_snapshot *s)
+static void check_contacts(const bt_world *w, const bt_memory *trace, int64_t n, bt_snapshot *s)
 {
     const bt_bodies *b = &w->bodies;
     for (int64_t k = 0; k < n && !s->faulty; k++) {
-        const bt_trace *t = &trace[k];
+        const bt_memory *t = &trace[k];
         bt_snapshot_want(s, t->a >= 0 && t->a < t->b && t->b < b->n_global, "contacts/a", k, "and b are no pair of bodies");
         if (s->faulty) return;
         const bt_idx i = bt_world_index(w, t->a), j = bt_world_index(w, t->b);
@@ -191,7 +191,7 @@ static void check_contacts(const bt_world *w, const bt_trace *trace, int64_t n, 
         if (s->faulty) return;
         const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_laws[t->law].applies(w, i, j));
         bt_snapshot_want(s, on, "contacts/law", k, "is a contact law that does not apply to the pair");
-        bt_snapshot_want(s, k == 0 || bt_trace_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
+        bt_snapshot_want(s, k == 0 || bt_memory_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
     }
 }
 
@@ -244,7 +244,7 @@ static void check_events(const bt_world *w, bt_snapshot *s)
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 
-void bt_state_check(const bt_world *w, const bt_trace *trace, int64_t n, bool impacts, bt_snapshot *s)
+void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool impacts, bt_snapshot *s)
 {
     if (s->faulty) return; // then arrays are missing
     const bt_params *p = &w->par;
@@ -252,7 +252,7 @@ void bt_state_check(const bt_world *w, const bt_trace *trace, int64_t n, bool im
     bt_snapshot_want(s, w->step >= 0, "world/step", -1, "is negative");
     bt_snapshot_want(s, isfinite(w->drift_x) && isfinite(w->drift_y), "world/drift_x", -1, "and drift_y are not finite");
     bt_snapshot_want(s, all_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1, "and what else is of water and air are not all finite");
-    check_tiles(w, s);
+    check_cells(w, s);
     if (!s->faulty) check_bodies(w, s);
     if (!s->faulty) check_contacts(w, trace, n, s);
     if (w->tow && !s->faulty) check_tow(w, s);

@@ -10,7 +10,7 @@
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members, n_finished, n_failed
 //
-// Made whole each time under a temporary name, sealed and renamed: a reader finds the old or the new one. Only members whose files fit their
+// Made whole each time under a temporary name, protected by a checksum and renamed: a reader finds the old or the new one. Only members whose files fit their
 // record (ensemble_record.h) are taken in. Members are written in their order, columns in
 // that of their first appearance, so the file depends on the set of finished members alone.
 #include <errno.h>
@@ -27,7 +27,7 @@
 #include "base/fileio.h"
 #include "base/h5util.h"
 #include "case/schema.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/units.h"
 #include "case/value.h"
 
@@ -314,7 +314,7 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
     if (status == BT_OK) {
         write_all(&h, &t, s, dir);
         status = bt_h5_close(&h);
-        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_ENSEMBLE, err);
+        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
         if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
         if (status != BT_OK) unlink(part);
     }

@@ -11,7 +11,7 @@
 #include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "partition/domain.h"
 #include "output/state.h"
 
@@ -146,16 +146,16 @@ static void look_at(const bt_world *w, const range *r, bt_idx first, bt_idx end,
 
 static bool look_at_bodies(bt_guard *g, const bt_world *w, bool all)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const range r = range_of(g, w);
     double broken = -1, gone = -1;
     const bt_idx n = all ? ts->n : ts->n_busy;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_TILES))
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_CELLS))
     for (bt_idx j = 0; j < n; j++) {
         const bt_idx k = all ? j : ts->busy[j];
-        // As in the step: what drifts with water at rest has not moved. BT_REST_NEW has, and has come to rest in it.
-        const bool moved = k == ts->n - 1 || ts->rest[k] != BT_REST_KNOWN || ts->awake[k] || !ts->still;
-        if (ts->tile[k].own && (moved || all)) look_at(w, &r, ts->tile[k].first, ts->tile[k].end, &broken, &gone);
+        // As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
+        const bool moved = k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still;
+        if (ts->cell[k].own && (moved || all)) look_at(w, &r, ts->cell[k].first, ts->cell[k].end, &broken, &gone);
     }
     g->broken = broken;
     g->gone = gone;

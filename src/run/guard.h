@@ -9,8 +9,8 @@
 // take (bt_sample_fault). 0 or false switches the others off. The limits are assumed: far beyond what a run with warnings
 // shows (overlap of 30 % of a floe, 1,000 unconverged steps in a jam), and short of what happens before numbers overflow.
 //
-// Every guard looks at every step, and at the state after the last one. Bodies are looked at where their tile may have moved: a field at rest
-// costs a look at its tiles. What leaves the domain does so by moving; at the end all bodies are looked at all the same.
+// Every guard looks at every step, and at the state after the last one. Bodies are looked at where their cell may have moved: a field at rest
+// costs a look at its cells. What leaves the domain does so by moving; at the end all bodies are looked at all the same.
 //
 // Energy. The limit is guard.energy × (E_0 + Σ ½ M v²), E_0 the kinetic energy that the case starts with and v the
 // speed that the body can be driven to:

@@ -22,7 +22,7 @@
 #include "output/observe.h"
 #include "solve/solver.h"
 #include "output/stall.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "case/case_check.h"
 #include "case/cost.h"
 #include "partition/domain.h"
@@ -123,20 +123,20 @@ static void add_phases(bt_phases *p, const bt_step_stats *st)
     p->exchange += st->exchange_s;
 }
 
-/// Collective. Peak memory of all ranks, and the bytes of units and velocities that belong to a contact point.
+/// Collective. Peak memory of all ranks, and the bytes of contacts and velocities that belong to a contact point.
 static void measure_memory(run *r)
 {
-    const bt_tiles *t = r->w->tiles;
+    const bt_cells *t = r->w->cells;
     struct rusage u;
     getrusage(RUSAGE_SELF, &u);
-    double units = 0, points = 0;
+    double contacts = 0, points = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        units += t->tile[k].n_units;
-        points += (double)t->tile[k].n_points;
+        contacts += t->cell[k].n_contacts;
+        points += (double)t->cell[k].n_points;
     }
     bt_sum sums[3] = {{0}, {0}, {0}};
     bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
-    bt_sum_add(&sums[1], units * (double)(sizeof(bt_unit) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
+    bt_sum_add(&sums[1], contacts * (double)(sizeof(bt_contact) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
     bt_sum_add(&sums[2], points);
     bt_comm_reduce(r->comm, sums, 3, NULL, 0, NULL, 0);
     r->totals.memory = bt_sum_value(&sums[0]);
@@ -354,7 +354,7 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
             status = bt_running_load(&r, kept, err);
         } else {
             bt_domain_create(r.w, comm);
-            bt_tiles_begin(r.w);
+            bt_cells_begin(r.w);
         }
         r.first_step = r.w->step;
         // Only now: a case that is refused leaves nothing behind.

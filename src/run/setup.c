@@ -19,7 +19,7 @@
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
-#define LARGE_RATIO 8.0         // a floe with more than this times the mean radius is in no tile: tiles fit the largest of the others
+#define LARGE_RATIO 8.0         // a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
 
 bt_params bt_setup_params(const bt_case *c, double size)
 {
@@ -42,7 +42,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .warm_start = c->solver.warm_start,
         .plain_sweeps = c->solver.plain,
         .inner_sweeps = c->solver.inner_sweeps,
-        .tile = c->solver.tile,
+        .cell = c->solver.cell,
         .slop = c->solver.slop * size,
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
@@ -420,7 +420,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
 
     // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls may not be.
     if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
     return BT_OK;
 }
 

@@ -12,7 +12,7 @@
 
 #include "contact/contacts.h"
 #include "bergtow/forces.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
 #include "geometry/apart.h"
@@ -261,10 +261,10 @@ static void settle_places(const bt_world *w, candidate *list, size_t n, const sh
 /// What a contact knew of the last step is of the place the floe has left.
 static void forget_contacts(bt_world *w, const uint8_t *moved)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx j = 0; j < t->tile[k].n_pairs; j++) {
-            bt_pair *p = &t->tile[k].pairs[j];
+        for (bt_idx j = 0; j < t->cell[k].n_pairs; j++) {
+            bt_pair *p = &t->cell[k].pairs[j];
             if (moved[p->a] || moved[p->b]) p->n_points = 0;
         }
 }
@@ -279,7 +279,7 @@ static void put(bt_world *w, bt_idx i)
     h->copy += (int32_t)v->sign;
     h->lap = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = v->vel;
-    b->stirred[i] = 1;
+    b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
 }
 
@@ -312,7 +312,7 @@ static void renew(bt_world *w, const candidate *list, size_t n)
     }
     if (v->renewed_now > 0) {
         forget_contacts(w, moved);
-        w->tiles->relabel = true;
+        w->cells->relabel = true;
     }
     free(moved);
 }

@@ -17,7 +17,7 @@ void bt_fuzz_study(const uint8_t *data, size_t n);    ///< study file and its me
 void bt_fuzz_table(const uint8_t *data, size_t n);    ///< CSV table
 void bt_fuzz_outlines(const uint8_t *data, size_t n); ///< GeoJSON; the first byte chooses how it is read
 void bt_fuzz_field(const uint8_t *data, size_t n);    ///< numbers of an HDF5 field file
-void bt_fuzz_checkpoint(const uint8_t *data, size_t n); ///< arrays of a checkpoint, behind the seal: taken up, three steps
+void bt_fuzz_checkpoint(const uint8_t *data, size_t n); ///< arrays of a checkpoint, behind the checksum: taken up, three steps
 
 /// A case file with overrides: field, world, three steps, everything finite.
 void bt_fuzz_begin_run(const uint8_t *text, size_t n, const char *const *set, int n_set);

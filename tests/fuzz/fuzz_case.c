@@ -9,7 +9,7 @@
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "bergtow/world.h"
 #include "case/case_check.h"
 #include "partition/domain.h"
@@ -59,7 +59,7 @@ static void run_a_little(const bt_case *c, const bt_field *f, bt_errors *err)
     const bt_status status = bt_setup_world(c, f, &w, &roster, err);
     if (status == BT_OK) {
         bt_domain_create(w, &bt_comm_alone);
-        bt_tiles_begin(w);
+        bt_cells_begin(w);
         const int64_t n = bt_case_steps(c);
         for (int i = 0; i < 3 && i < n; i++) bt_world_step(w);
         for (bt_idx i = 0; i < w->bodies.n; i++)

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A checkpoint whose seal is sound and whose contents are anything: refused with a message, or a defined run.
+// A checkpoint whose checksum is sound and whose contents are anything: refused with a message, or a defined run.
 //
-// The seal, a digest of every byte, lets no altered byte through, so the arrays of real checkpoints are altered behind it. The input: a byte for the run that
-// left the checkpoint, one for the way in (most go in as arrays; some into a file with a new seal, which is then taken up as the program does it, with
+// The checksum, a digest of every byte, lets no altered byte through, so the arrays of real checkpoints are altered behind it. The input: a byte for the run that
+// left the checkpoint, one for the way in (most go in as arrays; some into a file with a new checksum, which is then taken up as the program does it, with
 // result.h5 and all), then edits of 12 bytes each: which array (2), what is done to it, where (2), and a value in a few forms. (Damaged HDF5 under a
-// sound seal is another matter, as for ice fields: the library is not made for hostile bytes.)
+// sound checksum is another matter, as for ice fields: the library is not made for hostile bytes.)
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

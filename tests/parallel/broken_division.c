@@ -63,8 +63,8 @@ int main(int argc, char **argv)
     if (!strcmp(how, "changed") && !mine) w->bodies.vel[i].w = nextafter(w->bodies.vel[i].w, 1);
     if (!strcmp(how, "missing") && !mine) w->bodies.index_of[g] = -1;
     if (!strcmp(how, "changed") || !strcmp(how, "missing")) bt_domain_validate(w);
-    w->tiles->relabel = true;
-    bt_tiles_begin(w);
+    w->cells->relabel = true;
+    bt_cells_begin(w);
     bt_domain_validate(w);
     if (c->rank == 0) printf("sound\n");
     bt_world_free(w);

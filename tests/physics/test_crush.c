@@ -35,8 +35,8 @@ static bt_pose *pose(bt_world *w, bt_gid g) { return &w->bodies.pose[bt_world_in
 static double pushed(const bt_world *w)
 {
     double sum = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) sum += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) sum += w->cells->cell[k].contacts[j].ln[0] + w->cells->cell[k].contacts[j].ln[1];
     return sum;
 }
 
@@ -224,20 +224,20 @@ static void memory(void **state)
     scene_wall(w, 0.5, -50, 5, 50, 0);
     for (int s = 0; s < 200; s++) bt_world_step(w);
     const double deep = pose(w, 0)->x;
-    assert_true(deep > 0.02 && w->tiles->tile[0].n_memory == 1);
+    assert_true(deep > 0.02 && w->cells->cell[0].n_memory == 1);
     for (int s = 0; s < 20; s++) bt_world_step(w);
     CHECK_CLOSE(pose(w, 0)->x, deep, 0);
     const uint64_t hash = bt_world_hash(w);
-    w->tiles->tile[0].memory[0].value[0] *= 1 + 1e-15;
+    w->cells->cell[0].memory[0].value[0] *= 1 + 1e-15;
     assert_true(bt_world_hash(w) != hash);
 
     const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
     for (int i = 0; i < 3; i++) {
         const double out = away[i] * BT_CRUSH_MEMORY, start = pose(w, 0)->x;
         vel(w, 0)->x = -0.5;
-        w->bodies.stirred[bt_world_index(w, 0)] = 1;
-        w->tiles->rest[0] = BT_REST_NO;
-        bt_tiles_wake(w->tiles, 0);
+        w->bodies.disturbed[bt_world_index(w, 0)] = 1;
+        w->cells->asleep[0] = BT_AWAKE;
+        bt_cells_wake(w->cells, 0);
         while (pose(w, 0)->x > -out) bt_world_step(w);
         vel(w, 0)->x = back;
         double free_until = 0;
@@ -276,9 +276,9 @@ static void rebound_below_the_limit(void **state)
         before = now;
     }
     assert_true(before < -1e-3 && depth > 0.01);
-    assert_true(w->tiles->tile[0].n_memory == 1);
+    assert_true(w->cells->cell[0].n_memory == 1);
     for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_CRUSH_MEMORY; s++) bt_world_step(w);
-    assert_true(w->tiles->tile[0].n_memory == 0); // parted, forgotten
+    assert_true(w->cells->cell[0].n_memory == 0); // parted, forgotten
     bt_world_free(w);
 }
 
@@ -299,9 +299,9 @@ static void body_at_a_set_speed(void **state)
         bt_world_step(w);
         assert_true(w->stats.converged);
         if (s == 0) continue; // the floes are set in motion
-        const bt_tile *t = w->tiles->tile;
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < t[k].n_units; j++) CHECK_CLOSE((t[k].units[j].ln[0] + t[k].units[j].ln[1]) / dt, 0.5 * pressure * h, 1e-4 * pressure * h);
+        const bt_cell *t = w->cells->cell;
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < t[k].n_contacts; j++) CHECK_CLOSE((t[k].contacts[j].ln[0] + t[k].contacts[j].ln[1]) / dt, 0.5 * pressure * h, 1e-4 * pressure * h);
         CHECK_CLOSE(w->stats.crushed_work, 0.5 * pressure * h * 0.1 * dt, 1e-6 * pressure * h);
     }
     // The thin floe's two sides share what is crushed.

@@ -138,8 +138,8 @@ static void dynamic_tilt_carries_a_body(void **state)
 
 enum { SIDE = 20 };
 
-/// A sparse field at rest. stirred: every floe is looked at in every step, whatever its velocity.
-static bt_world *field_world(const bt_case *c, int steps, bool stirred, double *active)
+/// A sparse field at rest. disturbed: every floe is looked at in every step, whatever its velocity.
+static bt_world *field_world(const bt_case *c, int steps, bool disturbed, double *active)
 {
     bt_params p = scene_params(0.5, 1);
     bt_world *w = bt_world_create(&p);
@@ -152,9 +152,9 @@ static bt_world *field_world(const bt_case *c, int steps, bool stirred, double *
         d.x = 3 * (i % SIDE), d.y = 3 * (i / SIDE), d.yaw = i;
         bt_world_add(w, &d);
     }
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     for (int s = 0; s < steps; s++) {
-        if (stirred) memset(w->bodies.stirred, 1, (size_t)w->bodies.n);
+        if (disturbed) memset(w->bodies.disturbed, 1, (size_t)w->bodies.n);
         bt_world_step(w);
         if (active) active[s] = (double)w->stats.n_active;
     }
@@ -216,7 +216,7 @@ static void a_floe_at_rest_follows_a_new_current(void **state)
         d.x = 3 * (i % 3), d.y = 3 * (i / 3), d.vx = 0.25;
         bt_world_add(w, &d);
     }
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     for (int s = 1; s <= 100; s++) {
         bt_world_step(w);
         const bt_vel *v = &w->bodies.vel[bt_world_index(w, 4)];
@@ -228,8 +228,8 @@ static void a_floe_at_rest_follows_a_new_current(void **state)
     bt_case_free(&c);
 }
 
-/// Tiles go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, tiles of some metres).
-static void tiles_go_with_the_tide(void **state)
+/// Cells go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, cells of some metres).
+static void cells_go_with_the_tide(void **state)
 {
     (void)state;
     bt_case c = tidal_case(0.5, 0.3, 40 * deg, 0);
@@ -253,7 +253,7 @@ static void tiles_go_with_the_tide(void **state)
     }
     assert_true(most > 3000);
     // Once at the start, once when the first speed was seen.
-    assert_true(w->tiles->n_labellings <= 3);
+    assert_true(w->cells->n_labellings <= 3);
     CHECK_CLOSE(w->drift_x, w->bodies.pose[bt_world_index(w, 0)].x, 1);
     bt_world_free(w);
     bt_case_free(&c);
@@ -268,7 +268,7 @@ int main(void)
         cmocka_unit_test(dynamic_tilt_carries_a_body),
         cmocka_unit_test(rest_ends_when_the_water_or_the_wind_moves),
         cmocka_unit_test(a_floe_at_rest_follows_a_new_current),
-        cmocka_unit_test(tiles_go_with_the_tide),
+        cmocka_unit_test(cells_go_with_the_tide),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "base/h5read.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "bergtow/run.h"
 #include "bergtow/setup.h"
 #include "force/drift.h"
@@ -65,7 +65,7 @@ static double width_of(const bt_world *w, bt_idx i) { return 2 * w->bodies.radiu
 static void what_will_not_do_is_refused(void **state)
 {
     (void)state;
-    static const bt_force_key bad_unit[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}}, no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
+    static const bt_force_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}}, no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
     const struct { bt_force_law law; const char *says; } bad[] = {
         {{.name = "tilt", .doc = "a law of that name", .add = spring}, "there is a force of this name"},
@@ -73,7 +73,7 @@ static void what_will_not_do_is_refused(void **state)
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without function"}, "no function"},
         {{.name = "mute", .add = spring}, "say in a line"},
-        {{.name = "odd", .doc = "a law with a bad unit", .add = spring, .keys = bad_unit, .n_keys = 1}, "unit furlong"},
+        {{.name = "odd", .doc = "a law with a bad unit", .add = spring, .keys = bad_contact, .n_keys = 1}, "unit furlong"},
         {{.name = "wide", .doc = "a law without a range", .add = spring, .keys = no_range, .n_keys = 1}, "the range must be"},
         {{.name = "far", .doc = "a law with a bad default", .add = spring, .keys = beyond, .n_keys = 1}, "the default must be"},
         {{.name = "ice", .doc = "a law whose section is there", .add = spring, .keys = spring_keys, .n_keys = 1}, "choose a section of its own"},
@@ -331,7 +331,7 @@ static int64_t series_of(const char *name, const char *series, double *x)
     char path[80], *file = in_folder(name);
     snprintf(path, sizeof path, "/series/%s", series);
     strcat(file, "/result.h5");
-    bt_h5_open(&r, file, BT_SEAL_RESULT, &err);
+    bt_h5_open(&r, file, BT_CHECKSUM_RESULT, &err);
     const int64_t n = bt_h5_size(&r, path, 0);
     bt_h5_read(&r, path, H5T_NATIVE_DOUBLE, 0, n, 1, x);
     if (r.status != BT_OK) fail_msg("%s", err.n ? err.text[0] : "no series");

@@ -178,7 +178,7 @@ static void detect_equals_brute_force_with_parts(void **state)
     for (int scene = 0; scene < 4; scene++) {
         bt_params p = params_of_world(0.1);
         const double box = 16;
-        p.tile = 2;
+        p.cell = 2;
         p.period_x = p.period_y = scene % 2 ? box : 0;
         bt_world *w = bt_world_create(&p);
         double v[2 * BT_MAX_VERTICES];
@@ -186,7 +186,7 @@ static void detect_equals_brute_force_with_parts(void **state)
             const int n = i % 3 ? random_star(&rng, 0.8, v) : scene_random_polygon(&rng, 0.6, v);
             add_outline(w, n, v, box * scene_uniform(&rng), box * scene_uniform(&rng), 7 * scene_uniform(&rng), 0, 0);
         }
-        // A large one, with bays: in the last tile, with floes of any other.
+        // A large one, with bays: in the last cell, with floes of any other.
         int n_large;
         do n_large = random_star(&rng, 3, v);
         while (bt_outline_convex(n_large, v));
@@ -200,17 +200,17 @@ static void detect_equals_brute_force_with_parts(void **state)
         for (int step = 0; step < 25; step++) {
             const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 10 < 5 ? 0.05 : 0.12));
             // Which of two facing edges is the reference depends on the step before, within the tie: without it both must find the same.
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_pairs; j++) w->tiles->tile[k].pairs[j].n_points = 0;
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_pairs; j++) w->cells->cell[k].pairs[j].n_points = 0;
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, have = 0;
             bt_contacts_brute_force(w, margin, &want, &n);
             bool *taken = bt_alloc((size_t)n, sizeof *taken);
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-                    const bt_unit *u = &w->tiles->tile[k].units[j];
-                    const double *gaps = w->tiles->tile[k].gaps[j].gap, gap = u->n > 1 ? bt_min(gaps[0], gaps[1]) : gaps[0];
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+                    const bt_contact *u = &w->cells->cell[k].contacts[j];
+                    const double *gaps = w->cells->cell[k].gaps[j].gap, gap = u->n > 1 ? bt_min(gaps[0], gaps[1]) : gaps[0];
                     bt_idx at = -1;
                     for (bt_idx l = 0; l < n && at < 0; l++) {
                         const bt_manifold *m = &want[l];
@@ -232,9 +232,9 @@ static void detect_equals_brute_force_with_parts(void **state)
                 bt_bodies_turn(&w->bodies, i);
                 b->path[i] += hypot(dx, dy) + b->radius[i] * fabs(dr);
             }
-            for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->moved[k] += 0.14;
-            w->tiles->moved_any += 0.14;
-            w->tiles->relabel = true;
+            for (bt_idx k = 0; k < w->cells->n; k++) w->cells->moved[k] += 0.14;
+            w->cells->moved_any += 0.14;
+            w->cells->relabel = true;
         }
         bt_world_free(w);
     }
@@ -405,8 +405,8 @@ static void pressed_stars_do_not_pass_through_each_other(void **state)
     double worst = 0, deepest = 0;
     for (int s = 0; s < 1550; s++) {
         bt_world_step(w);
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) pressed = bt_max(pressed, w->tiles->tile[k].units[j].ln[0]);
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) pressed = bt_max(pressed, w->cells->cell[k].contacts[j].ln[0]);
         if (s % 20 == 0) worst = bt_max(worst, bt_max(deepest_of_all(w) - 2 * w->stats.overlap, 0));
         if (s % 20 == 0) deepest = bt_max(deepest, w->stats.overlap);
     }

@@ -129,9 +129,9 @@ static void plough_in_a_channel(void **state)
             bt_observe(w, v, &sample);
             // A row solved to the residual ρ can do at most λ ρ of positive work.
             double exchanged = 0;
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++)
-                    exchanged += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++)
+                    exchanged += w->cells->cell[k].contacts[j].ln[0] + w->cells->cell[k].contacts[j].ln[1];
             assert_true(w->stats.contact_work <= 2 * exchanged * p.tolerance);
             if (s % 50 && front0 > 0) {
                 impulse += sample.ice_resistance * p.dt;

@@ -360,9 +360,9 @@ static void rows_and_contacts_are_one_system(void **state)
             assert_true(w->stats.momentum_residual < 1e-9 && vessel_closure(t) < 1e-12);
         }
         double wall = 0; // normal impulse on it
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-                const bt_unit *u = &w->tiles->tile[k].units[j];
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+                const bt_contact *u = &w->cells->cell[k].contacts[j];
                 if (w->bodies.inv[u->b].m == 0) wall += (u->ln[0] + u->ln[1]) * u->nx - u->lt * u->ny;
             }
         const double pull = bt_tow_tension(t, 0) * t->branch[0].lx + bt_tow_tension(t, 1) * t->branch[1].lx;

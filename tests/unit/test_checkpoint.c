@@ -20,10 +20,10 @@
 #include "loads/impact.h"
 #include "output/observe.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 #include "output/state.h"
 
@@ -216,13 +216,13 @@ static int seen_in(const bt_world *w)
     if (w->stats.n_crushing > 0) seen |= CRUSHES;
     if (w->stats.n_rafting > 0 && w->stats.raft_friction_work > 0) seen |= RAFTS;
     if (w->impacts && w->impacts->n_closed + w->impacts->n_open > 0) seen |= COLLIDES;
-    if (w->tiles->relabel) seen |= RELABELS;
+    if (w->cells->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (bt_part_first(&w->bodies, i) > 0) seen |= PARTS;
         if (w->bodies.home[i].lap != 0) seen |= WRAPS;
     }
-    for (bt_idx k = 0; k + 1 < w->tiles->n; k++)
-        if (w->tiles->rest[k] && w->tiles->tile[k].end > w->tiles->tile[k].first) seen |= RESTS;
+    for (bt_idx k = 0; k + 1 < w->cells->n; k++)
+        if (w->cells->asleep[k] && w->cells->cell[k].end > w->cells->cell[k].first) seen |= RESTS;
     return seen;
 }
 
@@ -237,7 +237,7 @@ static void goes_on_from_every_step(const struct scenario *s)
     setting t = {.speed = 0};
     set_up(s, &t);
     bt_world *w = new_world(&t, &t.f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     bt_snapshot *state = calloc((size_t)s->steps + 1, sizeof *state);
     bt_sample *sample = calloc((size_t)s->steps + 1, sizeof *sample);
     int seen = 0;
@@ -374,7 +374,7 @@ static void refused(const char *path, size_t at)
     bt_errors_free(&err);
 }
 
-/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the comparison with the seal (tried) the first
+/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the comparison with the checksum (tried) the first
 /// flip passes.
 static void damage_is_refused(void **state)
 {
@@ -383,7 +383,7 @@ static void damage_is_refused(void **state)
     setting t = {.speed = 0};
     set_up(&scenarios[1], &t);
     bt_world *w = new_world(&t, &t.f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     for (int n = 0; n < 20; n++) bt_world_step(w);
     bt_snapshot s = {0};
     save(&t, w, &s);
@@ -394,7 +394,7 @@ static void damage_is_refused(void **state)
     uint64_t x = 88172645463325252u; // xorshift64
     for (int k = 0; k < 1100; k++) {
         x ^= x << 13, x ^= x >> 7, x ^= x << 17;
-        // A fifth of them in the seal and the first metadata, which are few bytes.
+        // A fifth of them in the checksum and the first metadata, which are few bytes.
         const size_t at = k % 5 ? x % n : x % 1024;
         const char bit = (char)(1 << (x >> 40) % 8);
         bytes[at] ^= bit;
@@ -408,7 +408,7 @@ static void damage_is_refused(void **state)
     refused(path, n);
     // Whole, of another version of the program.
     spill(path, bytes, n);
-    must(bt_seal_write(path, "checkpoint 1", &err), &err);
+    must(bt_checksum_write(path, "checkpoint 1", &err), &err);
     bt_snapshot old;
     assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
     assert_non_null(strstr(err.text[0], "has the format \"checkpoint 1\", this program reads \"checkpoint 2\"; use the program that wrote it"));

@@ -148,7 +148,7 @@ static char *read_bytes(size_t *n)
     return bytes;
 }
 
-/// The good file without its seal, as another program would write it.
+/// The good file without its checksum, as another program would write it.
 static void write_bare(void)
 {
     size_t n;
@@ -205,7 +205,7 @@ static uint64_t next_random(void)
     return x;
 }
 
-/// Of a sealed file every flip is refused, wherever it is: seal, metadata, numbers.
+/// Of a protected by a checksum file every flip is refused, wherever it is: checksum, metadata, numbers.
 static void test_flipped_bits_of_a_sealed_file(void **state)
 {
     (void)state;
@@ -214,7 +214,7 @@ static void test_flipped_bits_of_a_sealed_file(void **state)
     char *bytes = read_bytes(&n);
     for (int k = 0; k < 1000; k++) {
         const uint64_t x = next_random();
-        // A fifth of them in the seal and the first metadata, which are few bytes.
+        // A fifth of them in the checksum and the first metadata, which are few bytes.
         const size_t at = k % 5 ? x % n : x % 1024;
         bytes[at] ^= (char)(1 << (x >> 40) % 8);
         write_bytes(bytes, n);

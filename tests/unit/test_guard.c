@@ -9,7 +9,7 @@
 #include "loads/impact.h"
 #include "output/observe.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "step/window.h"
 #include "run/guard.h"
 
@@ -23,7 +23,7 @@ static bt_world *two_floes(void)
         d.x = 3 * k + 1, d.y = 2;
         bt_world_add(w, &d);
     }
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     w->step = 50;
     return w;
 }
@@ -139,14 +139,14 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
 
     // Where nothing has moved a step does not look; the end does.
     *y = 4.01;
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_KNOWN, w->tiles->awake[k] = 0;
-    w->tiles->still = true;
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_ASLEEP, w->cells->awake[k] = 0;
+    w->cells->still = true;
     expect(&g, w, &s, NULL);
     expect_of(&g, w, &s, true, "floe 1 is beyond a wall");
-    w->tiles->still = false; // all drifts
+    w->cells->still = false; // all drifts
     expect(&g, w, &s, "floe 1 is beyond a wall");
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NEW; // come to rest in this step
-    w->tiles->still = true;
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_ASLEEP_NEW; // come to rest in this step
+    w->cells->still = true;
     expect(&g, w, &s, "floe 1 is beyond a wall");
 
     // A wall that closes is where it is now: 0.2 m/s for 5 s.
@@ -226,7 +226,7 @@ static bt_world *whole_scene(bt_case *c, bt_roster *r)
     bt_world *w = NULL;
     if (bt_case_finish(c, &err) != BT_OK || bt_setup_world(c, &f, &w, r, &err) != BT_OK) fail_msg("%s", err.text[0]);
     bt_field_free(&f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     while (w->step < 50) bt_world_step(w);
     return w;
 }

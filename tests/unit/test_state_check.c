@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a checkpoint holds under a sound seal, and no run leaves, is refused with one message that names the array; so is a file of another make.
+// What a checkpoint holds under a sound checksum, and no run leaves, is refused with one message that names the array; so is a file of another make.
 //
-// Each row of the table changes one number of a real state. What turns this red (tried): leaving out the check of the tiles' box, of the order of contacts,
+// Each row of the table changes one number of a real state. What turns this red (tried): leaving out the check of the cells' box, of the order of contacts,
 // of the width of a row in result.h5, of the space that a dataset takes in the file.
 #include <setjmp.h>
 #include <stdarg.h>
@@ -21,11 +21,11 @@
 #include "loads/impact.h"
 #include "bergtow/run.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "step/window.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 #include "output/state.h"
 
@@ -150,7 +150,7 @@ static int make_states(void **state)
         must(bt_field_load(c, &f, &err), &err);
         must(bt_lead_open(c, &f, &lead, &err), &err);
         must(bt_setup_world(c, &f, &w, &roster, &err), &err);
-        bt_tiles_begin(w);
+        bt_cells_begin(w);
         for (int n = 0; n < 40; n++) bt_world_step(w);
         if (k == 0) bt_events_add(&w->events, 1, BT_EVENT_WAYPOINT, 1, 2); // one to change
         must(bt_state_save(w, &bt_comm_alone, &kept[k].state, &err), &err);
@@ -271,7 +271,7 @@ static void write_make(const char *path, int make)
 {
     bt_errors err = {0};
     const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-    H5Pset_userblock(creation, BT_SEAL_BYTES);
+    H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
     assert_true(file >= 0);
     H5Gclose(H5Gcreate2(file, "/a", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
@@ -285,7 +285,7 @@ static void write_make(const char *path, int make)
     }
     H5Fclose(file);
     H5Pclose(creation);
-    must(bt_seal_write(path, BT_SEAL_CHECKPOINT, &err), &err);
+    must(bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, &err), &err);
 }
 
 static void files_of_another_make_are_refused(void **state)
@@ -337,14 +337,14 @@ static void rows_of_another_width_are_refused(void **state)
     for (size_t k = 0; k < sizeof reads / sizeof *reads; k++) {
         bt_errors err = {0};
         const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-        H5Pset_userblock(creation, BT_SEAL_BYTES);
+        H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
         const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
         add_numbers(file, "/x", 3, (hsize_t[]){3, 4, 5});
         H5Fclose(file);
         H5Pclose(creation);
-        must(bt_seal_write(path, BT_SEAL_RESULT, &err), &err);
+        must(bt_checksum_write(path, BT_CHECKSUM_RESULT, &err), &err);
         bt_h5_reader r;
-        must(bt_h5_open(&r, path, BT_SEAL_RESULT, &err), &err);
+        must(bt_h5_open(&r, path, BT_CHECKSUM_RESULT, &err), &err);
         bt_h5_read(&r, "/x", H5T_NATIVE_DOUBLE, reads[k].first, reads[k].n, reads[k].width, x);
         if ((bt_h5_end(&r) == BT_OK) != reads[k].good || (err.n == 0) != reads[k].good) fail_msg("read %zu is %s", k, reads[k].good ? "refused" : "accepted");
         bt_errors_free(&err);

@@ -50,8 +50,8 @@ static void move(bt_world *w, bt_gid g, double dx, double dy, double yaw)
     if (p->x < 0) p->x += LENGTH, w->bodies.home[i].lap--;
     if (p->x >= LENGTH) p->x -= LENGTH, w->bodies.home[i].lap++;
     bt_bodies_turn(&w->bodies, i);
-    w->bodies.stirred[i] = 1;
-    w->tiles->labelled = false;
+    w->bodies.disturbed[i] = 1;
+    w->cells->labelled = false;
 }
 
 static bool at(const bt_world *w, bt_gid g, double x, double y) { return pose(w, g).x == x && pose(w, g).y == y; }

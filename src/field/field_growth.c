@@ -48,7 +48,7 @@ static entry make_entry(const bt_field *f, const double *outline, bt_idx i, doub
     return e;
 }
 
-void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
+void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
                           void *context)
 {
     if (f->n < 1) return;
@@ -59,7 +59,7 @@ void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *out
     for (bt_idx i = 0; i < f->n; i++) {
         entry e = make_entry(f, outline, i, limit);
         double x = e.x, z = e.y; // a floe read from a file may lie outside a periodic domain
-        bt_yard_wrap(y, &x, &z);
+        bt_region_wrap(y, &x, &z);
         e.x0 += x - e.x, e.x1 += x - e.x, e.x = x;
         e.y0 += z - e.y, e.y1 += z - e.y, e.y = z;
         extent += (e.x1 - e.x0 + e.y1 - e.y0) / 2 / f->n;
@@ -140,7 +140,7 @@ static void room_of_pair(void *context, bt_idx i, bt_idx j, double dx, double dy
     s->room[j] = bt_min(s->room[j], a.both);
 }
 
-static double room_within(const bt_yard *y, double x, double z, int n, const double *v, double room)
+static double room_within(const bt_region *y, double x, double z, int n, const double *v, double room)
 {
     for (int k = 0; k < n; k++) {
         double px = v[2 * k], pz = v[2 * k + 1];
@@ -150,7 +150,7 @@ static double room_within(const bt_yard *y, double x, double z, int n, const dou
     return room;
 }
 
-void bt_field_room(const bt_yard *y, const bt_field *f, double limit, double *room)
+void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room)
 {
     double *outline = bt_field_outlines(f), *radius = bt_alloc((size_t)f->n, sizeof *radius);
     for (bt_idx i = 0; i < f->n; i++) {

@@ -19,7 +19,7 @@ static void place(int n, double *v, double x, double y, double yaw)
 }
 
 // Area of a polygon within the region.
-static double area_inside(const bt_yard *y, int n, const double *v)
+static double area_inside(const bt_region *y, int n, const double *v)
 {
     double a[2 * (BT_MAX_VERTICES + 4)], b[2 * (BT_MAX_VERTICES + 4)];
     n = bt_shape_clip(n, v, -1, 0, -y->x0, a);
@@ -31,7 +31,7 @@ static double area_inside(const bt_yard *y, int n, const double *v)
 
 // Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so slender that room for the
 // clearance cannot be made by scaling: it would keep floes away all along its line, and its images would be without number.
-static bool add_obstacle(bt_yard *y, int n, const double *v)
+static bool add_obstacle(bt_region *y, int n, const double *v)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     bt_moments m = bt_shape_moments(n, v);
@@ -41,7 +41,7 @@ static bool add_obstacle(bt_yard *y, int n, const double *v)
     double r = m.radius * grow;
     // A body far outside a periodic domain is brought back first, so that images next to it suffice.
     double wx = m.cx, wy = m.cy;
-    bt_yard_wrap(y, &wx, &wy);
+    bt_region_wrap(y, &wx, &wy);
     int reach_x = y->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = y->periodic_y ? 1 + (int)(r / ly) : 0;
     for (int ix = -reach_x; ix <= reach_x; ix++)
         for (int iy = -reach_y; iy <= reach_y; iy++) {
@@ -70,7 +70,7 @@ static bool spans(double a0, double a1, double d0, double length)
     return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
 }
 
-static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
     int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
@@ -84,9 +84,9 @@ static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, dou
     return true;
 }
 
-bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err)
+bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err)
 {
-    *y = (bt_yard){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
+    *y = (bt_region){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
     if (!(y->x1 > y->x0 && y->y1 > y->y0)) {
         bt_errors_add(err, "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
                       c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
@@ -117,10 +117,10 @@ bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors
     return BT_OK;
 }
 
-void bt_yard_free(bt_yard *y)
+void bt_region_free(bt_region *y)
 {
     free(y->obstacles);
-    *y = (bt_yard){0};
+    *y = (bt_region){0};
 }
 
 static double wrap(double x, double low, double high)
@@ -130,7 +130,7 @@ static double wrap(double x, double low, double high)
     return x < high ? x : low; // round-off may land on the upper edge
 }
 
-void bt_yard_wrap(const bt_yard *y, double *px, double *py)
+void bt_region_wrap(const bt_region *y, double *px, double *py)
 {
     if (y->periodic_x) *px = wrap(*px, y->x0, y->x1);
     if (y->periodic_y) *py = wrap(*py, y->y0, y->y1);
@@ -158,12 +158,12 @@ static bool edge_separates(int n, const double *v, int m, const double *o)
     return false;
 }
 
-int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
+int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
 {
     enum { CAP = 2 * BT_MAX_VERTICES };
     double trial[2 * CAP], best[2 * CAP];
     for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
-        if (n > 4 * BT_CELL_VERTICES) n = bt_cell_clean(n, v, 0); // many obstacles around one cell
+        if (n > 4 * BT_TESSELLATION_VERTICES) n = bt_tessellation_clean(n, v, 0); // many obstacles around one cell
         const bt_obstacle *o = &y->obstacles[k];
         double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
         for (int i = 0; i < n; i++) {
@@ -203,7 +203,7 @@ int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
     return n;
 }
 
-int bt_cell_clean(int n, double *v, double shortest)
+int bt_tessellation_clean(int n, double *v, double shortest)
 {
     // A subset of the vertices of a convex polygon is convex and lies inside it. Of the shortest edge's two ends, the
     // one whose removal costs less area goes.
@@ -215,7 +215,7 @@ int bt_cell_clean(int n, double *v, double shortest)
             double l = hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
             if (l < least) least = l, at = i;
         }
-        if (least >= shortest && n <= BT_CELL_VERTICES) break;
+        if (least >= shortest && n <= BT_TESSELLATION_VERTICES) break;
         double loss[2];
         for (int e = 0; e < 2; e++) {
             const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n), *r = v + 2 * ((at + e + 1) % n);
