@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Quantities: the numbers that a run keeps of every step, each registered once, with all that a reader needs to know of it.
+// Quantities: the numbers that a run keeps of every step, each registered once, with all that a reader needs to know of
+// it.
 //
 // A registered quantity is
 //     a series            /series/NAME of result.h5, with units, description, merge, applies, role, label as attributes
@@ -29,7 +30,8 @@ typedef enum {
 /// Where pictures and reports show it.
 typedef enum {
     BT_ROLE_NONE,
-    BT_ROLE_BALANCE,    ///< a force against the tow that the momentum balance of the towed body adds up (tow and inertia included)
+    /// a force against the tow that the momentum balance of the towed body adds up (tow and inertia included)
+    BT_ROLE_BALANCE,
     BT_ROLE_FORCE,      ///< a force on the towed body against the tow that is part of another
     BT_ROLE_LOAD,       ///< a load of the line or the vessel
     BT_ROLE_DIAGNOSTIC, ///< a panel of its own beside those of the contact solver
@@ -48,9 +50,11 @@ typedef struct bt_quantity {
     bt_keep keep;
     bt_applies applies;
     bt_role role;
-    const char *summary;     ///< key of its reduction in summary.json, NULL = none; of a registered one it is made of name and units
+    /// key of its reduction in summary.json, NULL = none; of a registered one it is made of name and units
+    const char *summary;
     // one of the next two
-    /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank, with the same result.
+    /// From what every rank holds: the towed body, the tow, the numbers of the step. After the step; on every rank,
+    /// with the same result.
     double (*of_world)(const bt_world *w, const void *context);
     /// The share of one floe. The sum over all floes is exact: the same bits on any number of ranks and threads.
     double (*of_floe)(const bt_world *w, bt_idx floe, const void *context);
@@ -59,7 +63,8 @@ typedef struct bt_quantity {
 } bt_quantity;
 
 /// Add a quantity before any run begins. It is copied; its texts and context must outlive every run.
-/// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no room.
+/// Errors: BT_ERR_USAGE, with the reason in err: a name that is taken or none, no unit, no sentence, no function, no
+/// room.
 bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err);
 
 /// All series, in the order of the file: the program's own, then those registered.

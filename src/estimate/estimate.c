@@ -44,9 +44,12 @@ static bt_estimate compaction(const bt_estimate_input *in)
 static bt_estimate rafting(const bt_estimate_input *in)
 {
     const bool compact = in->concentration >= BT_EST_COMPACT;
-    const double lift = 0.5 * in->ice_density * (1 - in->ice_density / in->water_density) * GRAVITY * in->thickness * in->thickness *
-                        in->concentration * in->width;
-    return (bt_estimate){.force = in->kappa * lift, .low = in->kappa_low * lift, .high = in->kappa_high * lift, .valid = compact,
+    const double lift = 0.5 * in->ice_density * (1 - in->ice_density / in->water_density) * GRAVITY * in->thickness *
+                        in->thickness * in->concentration * in->width;
+    return (bt_estimate){.force = in->kappa * lift,
+                         .low = in->kappa_low * lift,
+                         .high = in->kappa_high * lift,
+                         .valid = compact,
                          .note = compact ? "A >= 0.65: all ice of the strip rafts" : has_room};
 }
 
@@ -63,24 +66,33 @@ static bt_estimate dilute(const bt_estimate_input *in)
     const bool thin = in->concentration <= BT_EST_DILUTE_MOST;
     const double force = 4.0 / 3 * (1 + in->restitution) * in->concentration * in->ice_density * in->thickness *
                          (0.5 * in->width + in->floe_radius) * in->along * in->along;
-    return just(force, thin, thin ? "A <= 0.25 (assumed): floes are met one by one" : "A > 0.25 (assumed): floes hit each other");
+    return just(force, thin,
+                thin ? "A <= 0.25 (assumed): floes are met one by one" : "A > 0.25 (assumed): floes hit each other");
 }
 
 /// Regression of the resistance of ships over the pack-ice Froude number.
 static double ships_of(const bt_estimate_input *in, double k, double b, double n)
 {
     const double froude = in->along / sqrt(GRAVITY * in->thickness * in->concentration);
-    return 0.5 * k * pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along * pow(in->concentration, n);
+    return 0.5 * k * pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along *
+           pow(in->concentration, n);
 }
 
 static bt_estimate ships(const bt_estimate_input *in)
 {
     const double blunt = ships_of(in, 16.1, -1.7937, 3), slender = ships_of(in, 4.4, -0.8267, 2);
-    return (bt_estimate){.force = blunt, .low = bt_min(blunt, slender), .high = bt_max(blunt, slender), .valid = in->ship,
-                         .note = in->ship ? "a ship; ice and speeds of the regression are not known here" : "extrapolated: a regression of ships, and this is none"};
+    return (bt_estimate){.force = blunt,
+                         .low = bt_min(blunt, slender),
+                         .high = bt_max(blunt, slender),
+                         .valid = in->ship,
+                         .note = in->ship ? "a ship; ice and speeds of the regression are not known here"
+                                          : "extrapolated: a regression of ships, and this is none"};
 }
 
-static bt_estimate open_water(const bt_estimate_input *in) { return just(in->drag * in->speed * in->along, true, "drag of the water alone"); }
+static bt_estimate open_water(const bt_estimate_input *in)
+{
+    return just(in->drag * in->speed * in->along, true, "drag of the water alone");
+}
 
 /// Lichey & Hellmer's drag of ice is the same from 0.15 to 0.9.
 static bool is_dense(const bt_estimate_input *in) { return in->concentration >= BT_EST_DENSE; }
@@ -88,31 +100,46 @@ static bool is_dense(const bt_estimate_input *in) { return in->concentration >= 
 // --- the registry ----------------------------------------------------------------------------------------------------
 
 static bt_estimate_def estimates[BT_MAX_ESTIMATES] = {
-    [BT_EST_LICHEY_HELLMER] = {
-        .name = "lichey_hellmer", .label = "Lichey-Hellmer",
-        .formula = "0.5 rho_i C_si h W |dV| dV; 0 for A <= 0.15; at most P W when captured",
-        .source = "Lichey & Hellmer 2001, J. Glaciol. 47", .at = lichey_hellmer, .knows = is_dense, .any_course = true},
-    [BT_EST_COMPACTION] = {
-        .name = "marchenko_compaction", .label = "Marchenko, compaction", .formula = "P W, P = P* h exp(-20 (1 - A))",
-        .source = "our closure of Marchenko et al. 2010 with the strength of Hibler 1979", .at = compaction},
-    [BT_EST_RAFTING] = {
-        .name = "marchenko_rafting", .label = "Marchenko, rafting",
-        .formula = "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
-        .source = "our closure of Marchenko et al. 2010; kappa: Flato & Hibler 1995 for the high end", .at = rafting},
-    [BT_EST_MOMENTUM] = {
-        .name = "marchenko_momentum", .label = "Marchenko, momentum", .formula = "rho_i h W V^2 A phi / (phi - A)",
-        .source = "our closure of Marchenko et al. 2010: ice swept together to phi", .at = momentum},
-    [BT_EST_DILUTE] = {
-        .name = "dilute_limit", .label = "dilute limit", .formula = "(4/3) (1 + e) A rho_i h (R + r) V^2, R = W / 2",
-        .source = "derived: disc-like floes at rest, each met once by a heavy disc", .at = dilute},
-    [BT_EST_SHIPS] = {
-        .name = "ships_in_pack_ice", .label = "ships in pack ice",
-        .formula = "0.5 k Fr_p^b rho_i W h V^2 A^n, Fr_p = V / sqrt(g h A); blunt hull, range to slender",
-        .source = "form of Colbourne 2000 (not at hand); k, b, n as in PolarRoute (British Antarctic Survey), for ships, range not given",
-        .at = ships, .note_tells = true},
-    [BT_EST_OPEN_WATER] = {
-        .name = "open_water_drag", .label = "open-water drag", .formula = "(0.5 rho_w C_w draft b + rho_w C_ws A_wl) |dV| dV",
-        .source = "the drag law of this program; no ice resistance, to be added to the others", .at = open_water, .on_top = true},
+    [BT_EST_LICHEY_HELLMER] = {.name = "lichey_hellmer",
+                               .label = "Lichey-Hellmer",
+                               .formula = "0.5 rho_i C_si h W |dV| dV; 0 for A <= 0.15; at most P W when captured",
+                               .source = "Lichey & Hellmer 2001, J. Glaciol. 47",
+                               .at = lichey_hellmer,
+                               .knows = is_dense,
+                               .any_course = true},
+    [BT_EST_COMPACTION] = {.name = "marchenko_compaction",
+                           .label = "Marchenko, compaction",
+                           .formula = "P W, P = P* h exp(-20 (1 - A))",
+                           .source = "our closure of Marchenko et al. 2010 with the strength of Hibler 1979",
+                           .at = compaction},
+    [BT_EST_RAFTING] = {.name = "marchenko_rafting",
+                        .label = "Marchenko, rafting",
+                        .formula = "kappa 0.5 rho_i (1 - rho_i / rho_w) g h^2 A W",
+                        .source = "our closure of Marchenko et al. 2010; kappa: Flato & Hibler 1995 for the high end",
+                        .at = rafting},
+    [BT_EST_MOMENTUM] = {.name = "marchenko_momentum",
+                         .label = "Marchenko, momentum",
+                         .formula = "rho_i h W V^2 A phi / (phi - A)",
+                         .source = "our closure of Marchenko et al. 2010: ice swept together to phi",
+                         .at = momentum},
+    [BT_EST_DILUTE] = {.name = "dilute_limit",
+                       .label = "dilute limit",
+                       .formula = "(4/3) (1 + e) A rho_i h (R + r) V^2, R = W / 2",
+                       .source = "derived: disc-like floes at rest, each met once by a heavy disc",
+                       .at = dilute},
+    [BT_EST_SHIPS] = {.name = "ships_in_pack_ice",
+                      .label = "ships in pack ice",
+                      .formula = "0.5 k Fr_p^b rho_i W h V^2 A^n, Fr_p = V / sqrt(g h A); blunt hull, range to slender",
+                      .source = "form of Colbourne 2000 (not at hand); k, b, n as in PolarRoute (British Antarctic "
+                                "Survey), for ships, range not given",
+                      .at = ships,
+                      .note_tells = true},
+    [BT_EST_OPEN_WATER] = {.name = "open_water_drag",
+                           .label = "open-water drag",
+                           .formula = "(0.5 rho_w C_w draft b + rho_w C_ws A_wl) |dV| dV",
+                           .source = "the drag law of this program; no ice resistance, to be added to the others",
+                           .at = open_water,
+                           .on_top = true},
 };
 static int n_estimates = BT_N_OWN_ESTIMATES;
 
@@ -129,12 +156,16 @@ bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = d->name ? d->name : "";
-    if (!is_name(name)) bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+    if (!is_name(name))
+        bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     for (int k = 0; k < n_estimates; k++)
-        if (!strcmp(estimates[k].name, name)) bt_errors_add(err, "estimate %s: there is one of this name; choose another", name);
-    if (!d->label || !d->formula || !d->source) bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
+        if (!strcmp(estimates[k].name, name))
+            bt_errors_add(err, "estimate %s: there is one of this name; choose another", name);
+    if (!d->label || !d->formula || !d->source)
+        bt_errors_add(err, "estimate %s: it has no label, formula or source", name);
     if (!d->at) bt_errors_add(err, "estimate %s: it has no function `at`", name);
-    if (n_estimates == BT_MAX_ESTIMATES) bt_errors_add(err, "estimate %s: there are %d; raise BT_MAX_ESTIMATES", name, BT_MAX_ESTIMATES);
+    if (n_estimates == BT_MAX_ESTIMATES)
+        bt_errors_add(err, "estimate %s: there are %d; raise BT_MAX_ESTIMATES", name, BT_MAX_ESTIMATES);
     if (err->n > before) return BT_ERR_USAGE;
     estimates[n_estimates++] = *d;
     return BT_OK;
@@ -158,11 +189,13 @@ bt_estimate bt_estimate_at(int kind, const bt_estimate_input *in)
     return e;
 }
 
-// Mean diameter weighted with area, <d³>/<d²>. Power law: density ∝ d^(−a−1) on [lo, hi]; lognormal with mean m and relative spread s:
-// <d^k> = m^k (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: the moments of a symmetric spread, m (1 + 3s²)/(1 + s²). Truncation is left out.
+// Mean diameter weighted with area, <d³>/<d²>. Power law: density ∝ d^(−a−1) on [lo, hi]; lognormal with mean m and
+// relative spread s: <d^k> = m^k (1 + s²)^(k(k−1)/2), so m (1 + s²)²; single: the moments of a symmetric spread, m (1 +
+// 3s²)/(1 + s²). Truncation is left out.
 static double weighted_size(const bt_case *c)
 {
-    const double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max, s2 = c->ice.size_spread * c->ice.size_spread;
+    const double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max,
+                 s2 = c->ice.size_spread * c->ice.size_spread;
     if (c->ice.size_law == BT_SIZE_LOGNORMAL) return c->ice.size * (1 + s2) * (1 + s2);
     if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 3 * s2) / (1 + s2);
     const double top = fabs(a - 3) < 1e-9 ? log(hi / lo) : (pow(hi, 3 - a) - pow(lo, 3 - a)) / (3 - a);
@@ -205,8 +238,9 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
     in->speed = hypot(rx, ry);
     in->along = rx * ux + ry * uy;
     const double flow = in->speed > 0 ? atan2(ry, rx) - c->body.yaw : ahead;
-    in->drag = 0.5 * c->water.density * c->body.drag.water_form * c->body.draft * bt_shape_width(n, v, cos(flow), sin(flow)) +
-               c->water.density * c->body.drag.water_skin * bt_shape_moments(n, v).area;
+    in->drag =
+        0.5 * c->water.density * c->body.drag.water_form * c->body.draft * bt_shape_width(n, v, cos(flow), sin(flow)) +
+        c->water.density * c->body.drag.water_skin * bt_shape_moments(n, v).area;
 }
 
 void bt_estimate_field(const bt_field *f, double *thickness, double *radius)

@@ -63,7 +63,8 @@ const bt_json_key bt_estimate_keys[] = {
     OF_ESTIMATE("force_n", e.force, "N", "force against the tow; null where the formula has no value"),
     OF_ESTIMATE("low_n", e.low, "N", "lower end of its range"),
     OF_ESTIMATE("high_n", e.high, "N", "upper end of its range"),
-    OF_ESTIMATE("simulated_over_estimate", ratio, "1", "mean ice resistance of the run / force; it tells something where `compares`"),
+    OF_ESTIMATE("simulated_over_estimate", ratio, "1",
+                "mean ice resistance of the run / force; it tells something where `compares`"),
     OF_ESTIMATE("valid", e.valid, "1", "the formula is meant for these conditions"),
     OF_ESTIMATE("compares", e.compares, "1", "valid, and it knows the concentration: a run is held against it"),
     OF_ESTIMATE("note", e.note, "", "regime, or why it is not valid"),
@@ -133,7 +134,8 @@ void bt_estimates_print(const bt_estimate_input *in, double simulated, const cha
         if (e.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
         else if (!isnan(simulated)) printf(" %-9s", "-");
         printf(" %s%s", e.valid || bt_estimate_of(k)->note_tells ? "" : "not valid: ", e.note);
-        if (isfinite(e.force) && e.low != e.high) printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
+        if (isfinite(e.force) && e.low != e.high)
+            printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
         printf("\n");
         if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_of(k)->formula, indent, bt_estimate_of(k)->source);
     }

@@ -11,18 +11,21 @@ extern const int bt_n_estimate_keys;
 extern const bt_json_key bt_condition_keys[]; ///< of what they depend on
 extern const int bt_n_condition_keys;
 
-/// An object "estimates": the conditions, one object an estimate, and curves over the concentration with all else kept. simulated: mean ice
-/// resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
+/// An object "estimates": the conditions, one object an estimate, and curves over the concentration with all else kept.
+/// simulated: mean ice resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
 void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated);
 
-/// An object "estimate_labels": of each estimate, in the order of the registry, its label and kind. Which of the members of "estimates" are
-/// estimates follows from it.
+/// An object "estimate_labels": of each estimate, in the order of the registry, its label and kind. Which of the
+/// members of "estimates" are estimates follows from it.
 void bt_estimate_labels_json(bt_json *j, const char *key);
 
-static inline const char *bt_estimate_kind_name(const bt_estimate_def *d) { return d->on_top ? "on top" : "ice resistance"; }
+static inline const char *bt_estimate_kind_name(const bt_estimate_def *d)
+{
+    return d->on_top ? "on top" : "ice resistance";
+}
 
-/// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime. full: with formula and
-/// source.
+/// A table on stdout, each line begun with indent: estimate, force, simulated / estimate when there is a run, regime.
+/// full: with formula and source.
 void bt_estimates_print(const bt_estimate_input *in, double simulated, const char *indent, bool full);
 
 #endif

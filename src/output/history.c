@@ -41,11 +41,16 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
 
 static double added_energy(const bt_sample *s) { return s->contact_work > WORK_ROUNDING * s->kinetic_energy; }
 
-#define TOTAL(type, member, rule_, from) \
-    {.at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from)}
-#define LATER(type, member, rule_, from) \
-    {.at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_, .offset = offsetof(bt_sample, from), \
-     .later = true}
+#define TOTAL(type, member, rule_, from)                                                                               \
+    {                                                                                                                  \
+        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
+        .offset = offsetof(bt_sample, from)                                                                            \
+    }
+#define LATER(type, member, rule_, from)                                                                               \
+    {                                                                                                                  \
+        .at = {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}, .rule = BT_TOTAL_##rule_,                    \
+        .offset = offsetof(bt_sample, from), .later = true                                                             \
+    }
 const bt_total bt_history_totals[BT_N_TOTALS] = {
     TOTAL(F64, sum_contacts, SUM, contacts),
     TOTAL(F64, sum_sweeps, SUM, sweeps),
@@ -68,7 +73,9 @@ const bt_total bt_history_totals[BT_N_TOTALS] = {
     LATER(F64, raft_friction_work, SUM, raft_friction_work),
     TOTAL(I64, unconverged, STEPS, unconverged),
     TOTAL(I64, unprojected, STEPS, unprojected),
-    {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)}, .rule = BT_TOTAL_STEPS, .of = added_energy},
+    {.at = {"positive_work", BT_ITEM_I64, 1, offsetof(bt_history, positive_work)},
+     .rule = BT_TOTAL_STEPS,
+     .of = added_energy},
     TOTAL(I64, restitution_cut, STEPS, restitution_cut),
     TOTAL(I64, repeats, SUM, repeats),
     TOTAL(I64, outrun, STEPS, outrun),
@@ -117,7 +124,8 @@ void bt_history_add(bt_history *h, const bt_sample *s)
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
         h->column[k][h->n] = *(const double *)(const void *)((const char *)s + bt_history_columns[k].offset);
-    for (int k = BT_N_COLUMNS; k < h->n_columns; k++) h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
+    for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
+        h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
     h->n++;
     for (int k = 0; k < BT_N_TOTALS; k++) add_total(h, &bt_history_totals[k], s);
 }

@@ -8,8 +8,22 @@
 
 /// Columns of what the summary keeps of every step; names and members of the sample: bt_history_columns.
 typedef enum bt_column {
-    BT_COL_TIME, BT_COL_ICE, BT_COL_TOW, BT_COL_DRAG, BT_COL_CORIOLIS, BT_COL_TILT, BT_COL_INERTIA, BT_COL_BUDGET,
-    BT_COL_TENSION_1, BT_COL_TENSION_2, BT_COL_THRUST, BT_COL_UNCONVERGED, BT_COL_RESIDUAL, BT_COL_COLLISION, BT_COL_PUSH, BT_N_COLUMNS
+    BT_COL_TIME,
+    BT_COL_ICE,
+    BT_COL_TOW,
+    BT_COL_DRAG,
+    BT_COL_CORIOLIS,
+    BT_COL_TILT,
+    BT_COL_INERTIA,
+    BT_COL_BUDGET,
+    BT_COL_TENSION_1,
+    BT_COL_TENSION_2,
+    BT_COL_THRUST,
+    BT_COL_UNCONVERGED,
+    BT_COL_RESIDUAL,
+    BT_COL_COLLISION,
+    BT_COL_PUSH,
+    BT_N_COLUMNS
 } bt_column;
 
 typedef struct bt_column_def {
@@ -23,7 +37,8 @@ extern const bt_column_def bt_history_columns[BT_N_COLUMNS];
 typedef struct bt_history {
     int64_t n, cap;
     int n_columns;                   ///< the program's own, then one for each registered quantity
-    double *column[BT_N_COLUMNS + BT_MAX_ADDED]; ///< [n] each, units as in bt_sample; NaN where a step has no such number
+    /// [n] each, units as in bt_sample; NaN where a step has no such number
+    double *column[BT_N_COLUMNS + BT_MAX_ADDED];
     // running totals: bt_history_totals
     double sum_contacts, sum_sweeps, sum_updates, sum_moves, contact_work;
     double max_overlap, max_momentum_residual, max_residual;

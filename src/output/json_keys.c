@@ -18,7 +18,9 @@ static void write_value(bt_json *j, const bt_json_key *k, const struct bt_summar
     const char *key = last_part(k->key), *at = source ? (const char *)source + k->offset : NULL;
     switch (k->kind) {
     case BT_JSON_REAL: bt_json_number(j, key, k->number ? k->number(v) : *(const double *)(const void *)at); break;
-    case BT_JSON_INT: bt_json_int(j, key, k->number ? (int64_t)k->number(v) : *(const int64_t *)(const void *)at); break;
+    case BT_JSON_INT:
+        bt_json_int(j, key, k->number ? (int64_t)k->number(v) : *(const int64_t *)(const void *)at);
+        break;
     case BT_JSON_INT32: bt_json_int(j, key, *(const int *)(const void *)at); break;
     case BT_JSON_BOOL: bt_json_bool(j, key, *(const bool *)at); break;
     case BT_JSON_TEXT: bt_json_string(j, key, k->text ? k->text(v) : *(const char *const *)(const void *)at); break;
@@ -28,7 +30,8 @@ static void write_value(bt_json *j, const bt_json_key *k, const struct bt_summar
     }
 }
 
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v, const void *const *source)
+void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v,
+                        const void *const *source)
 {
     enum { DEEPEST = 4 };
     size_t open[DEEPEST]; // lengths of the names of the objects that are open

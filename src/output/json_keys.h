@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Tables of JSON keys: one row gives a key its units, its meaning and the place of its value, in the order of the file.
 //
-// The same rows write the file, fill `bergtow --list-quantities` and give the datasets of ensemble.h5 their attributes. A key
-// "a.b" is the member b of the object a, whose own row (BT_JSON_GROUP) comes before.
+// The same rows write the file, fill `bergtow --list-quantities` and give the datasets of ensemble.h5 their attributes.
+// A key "a.b" is the member b of the object a, whose own row (BT_JSON_GROUP) comes before.
 #ifndef BT_JSON_KEYS_H
 #define BT_JSON_KEYS_H
 
@@ -11,7 +11,8 @@
 struct bt_summary_view;
 
 typedef enum {
-    BT_JSON_REAL, BT_JSON_INT, BT_JSON_INT32, BT_JSON_BOOL, BT_JSON_TEXT, ///< at `offset` in its source, or by `number` or `text`
+    /// at `offset` in its source, or by `number` or `text`
+    BT_JSON_REAL, BT_JSON_INT, BT_JSON_INT32, BT_JSON_BOOL, BT_JSON_TEXT,
     BT_JSON_GROUP,   ///< an object whose members follow; null where it does not apply
     BT_JSON_WRITTEN, ///< what `write` writes, key included
     BT_JSON_ADDED    ///< the place of the registered quantities (summary_keys.c)
@@ -30,7 +31,7 @@ typedef struct bt_json_key {
 } bt_json_key;
 
 /// The kind of a member of a struct.
-#define BT_JSON_KIND(x) \
+#define BT_JSON_KIND(x)                                                                                                \
     _Generic((x), double: BT_JSON_REAL, int64_t: BT_JSON_INT, int: BT_JSON_INT32, bool: BT_JSON_BOOL, char *: BT_JSON_TEXT, \
              const char *: BT_JSON_TEXT)
 /// The parts of a row for a member of a source.
@@ -39,7 +40,8 @@ typedef struct bt_json_key {
     .offset = offsetof(type, member)
 
 /// The rows as members of the object that is open. source: by bt_json_key.from.
-void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v, const void *const *source);
+void bt_json_keys_write(bt_json *j, const bt_json_key *keys, int n, const struct bt_summary_view *v,
+                        const void *const *source);
 
 /// The row of a key, NULL where there is none.
 const bt_json_key *bt_json_keys_find(const bt_json_key *keys, int n, const char *key);

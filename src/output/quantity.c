@@ -70,14 +70,20 @@ bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
     const size_t before = err->n;
     const char *name = q->name ? q->name : "";
     if (!is_name(name))
-        bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name, MOST_NAME);
-    else if (bt_series_find(name)) bt_errors_add(err, "quantity %s: there is a series of this name; choose another", name);
-    if (!q->units || !*q->units) bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
-    if (!q->description || strlen(q->description) < 8) bt_errors_add(err, "quantity %s: say in a sentence what it is (`description`)", name);
+        bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
+                      MOST_NAME);
+    else if (bt_series_find(name))
+        bt_errors_add(err, "quantity %s: there is a series of this name; choose another", name);
+    if (!q->units || !*q->units)
+        bt_errors_add(err, "quantity %s: it has no units; take \"1\" for a plain number", name);
+    if (!q->description || strlen(q->description) < 8)
+        bt_errors_add(err, "quantity %s: say in a sentence what it is (`description`)", name);
     if (!q->of_world == !q->of_floe) bt_errors_add(err, "quantity %s: give it one of `of_world` and `of_floe`", name);
-    if ((unsigned)q->keep >= BT_KEEP_KINDS || (unsigned)q->applies >= BT_APPLIES_KINDS || (unsigned)q->role >= BT_ROLE_KINDS)
+    if ((unsigned)q->keep >= BT_KEEP_KINDS || (unsigned)q->applies >= BT_APPLIES_KINDS ||
+        (unsigned)q->role >= BT_ROLE_KINDS)
         bt_errors_add(err, "quantity %s: keep, applies or role is none of its kinds", name);
-    if (n_added == BT_MAX_ADDED) bt_errors_add(err, "quantity %s: there are %d of them; raise BT_MAX_ADDED", name, BT_MAX_ADDED);
+    if (n_added == BT_MAX_ADDED)
+        bt_errors_add(err, "quantity %s: there are %d of them; raise BT_MAX_ADDED", name, BT_MAX_ADDED);
     if (err->n > before) return BT_ERR_USAGE;
     bt_quantity *own = &added[n_added];
     *own = *q;

@@ -21,7 +21,8 @@ static void list_series(FILE *out)
     fprintf(out, "%-24s %-6s %-5s %-32s %s\n", "series", "units", "merge", "applies", "meaning");
     for (int k = 0; k < bt_n_series(); k++) {
         const bt_quantity *q = bt_series(k);
-        fprintf(out, "%-24s %-6s %-5s %-32s %s", q->name, q->units, bt_keep_names[q->keep], bt_applies_names[q->applies], q->description);
+        fprintf(out, "%-24s %-6s %-5s %-32s %s", q->name, q->units, bt_keep_names[q->keep],
+                bt_applies_names[q->applies], q->description);
         fprintf(out, q->summary ? "; %s in the summary\n" : "\n", q->summary);
     }
 }
@@ -37,7 +38,8 @@ static void list_summary(FILE *out)
             snprintf(name, sizeof name, "%s%s", tables[t].prefix, k->key);
             fprintf(out, "%-46s %-6s %s\n", name, k->units, k->description);
         }
-    for (int k = 0; k < bt_n_added(); k++) fprintf(out, "%-46s %-6s %s\n", bt_added(k)->summary, bt_added(k)->units, bt_added(k)->description);
+    for (int k = 0; k < bt_n_added(); k++)
+        fprintf(out, "%-46s %-6s %s\n", bt_added(k)->summary, bt_added(k)->units, bt_added(k)->description);
 }
 
 void bt_quantities_list(void *stream)

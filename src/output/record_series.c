@@ -3,9 +3,12 @@
 #include "output/record.h"
 #include "case/cost.h"
 
-#define SHOWN(name_, applies_, keep_, units_, text_, role_, label_, key_) \
-    {.name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_), .keep = BT_KEEP_##keep_, \
-     .applies = BT_APPLIES_##applies_, .role = BT_ROLE_##role_, .label = label_, .summary = key_}
+#define SHOWN(name_, applies_, keep_, units_, text_, role_, label_, key_)                                              \
+    {                                                                                                                  \
+        .name = #name_, .units = units_, .description = text_, .offset = offsetof(bt_sample, name_),                   \
+        .keep = BT_KEEP_##keep_, .applies = BT_APPLIES_##applies_, .role = BT_ROLE_##role_, .label = label_,           \
+        .summary = key_                                                                                                \
+    }
 #define ROW(name_, applies_, keep_, units_, text_) SHOWN(name_, applies_, keep_, units_, text_, NONE, NULL, NULL)
 
 const bt_quantity bt_own_series[] = {

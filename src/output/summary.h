@@ -16,7 +16,8 @@ typedef struct bt_summary {
     bt_steady window;
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double added[BT_MAX_ADDED];       ///< reductions of the registered quantities over the window, without a towed body over all steps
+    /// reductions of the registered quantities over the window, without a towed body over all steps
+    double added[BT_MAX_ADDED];
     double balance;                   ///< mean tow − drag − Coriolis − tilt − registered forces − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
@@ -31,8 +32,10 @@ typedef struct bt_summary {
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body);
 /// summary.json as text; the caller frees it.
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
-void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
 void bt_summary_free(bt_summary *s);
 
 #endif

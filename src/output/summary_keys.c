@@ -23,8 +23,14 @@ static double number_or_nan(bool there, double x) { return there ? x : NAN; }
 static const char *version(const view *v) { return (void)v, BT_VERSION; }
 static const char *peak_conversion(const view *v) { return (void)v, "mean over a step, impulse / dt"; }
 static double n_floes(const view *v) { return v->n_floes; }
-static double memory_per_floe(const view *v) { return number_or_nan(v->n_floes > 0, v->t->memory / (double)v->n_floes); }
-static double overlap_relative(const view *v) { return number_or_nan(v->t->mean_size > 0, v->h->max_overlap / v->t->mean_size); }
+static double memory_per_floe(const view *v)
+{
+    return number_or_nan(v->n_floes > 0, v->t->memory / (double)v->n_floes);
+}
+static double overlap_relative(const view *v)
+{
+    return number_or_nan(v->t->mean_size > 0, v->h->max_overlap / v->t->mean_size);
+}
 
 static double rafted_share(const view *v)
 {
@@ -81,7 +87,8 @@ static const char *state_hash(const view *v)
     return text;
 }
 
-// --- arrays and objects whose members are counted ---------------------------------------------------------------------
+// --- arrays and objects whose members are counted
+// ---------------------------------------------------------------------
 
 static void write_quarters(bt_json *j, const char *key, const view *v, const void *reported)
 {
@@ -425,7 +432,13 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
 static bt_meaning meaning_of(const bt_json_key *k)
 {
     if (!k) return (bt_meaning){.units = "", .description = "", .estimate = "", .label = "", .kind = ""};
-    return (bt_meaning){.known = true, .machine = k->machine, .units = k->units, .description = k->description, .estimate = "", .label = "", .kind = ""};
+    return (bt_meaning){.known = true,
+                        .machine = k->machine,
+                        .units = k->units,
+                        .description = k->description,
+                        .estimate = "",
+                        .label = "",
+                        .kind = ""};
 }
 
 /// A key "estimates.NAME.key", or one of the conditions.
@@ -447,10 +460,16 @@ bt_meaning bt_summary_meaning(const char *key)
 {
     for (int k = 0; k < bt_n_added(); k++)
         if (!strcmp(bt_added(k)->summary, key))
-            return (bt_meaning){.known = true, .units = bt_added(k)->units, .description = bt_added(k)->description, .estimate = "", .label = "", .kind = ""};
+            return (bt_meaning){.known = true,
+                                .units = bt_added(k)->units,
+                                .description = bt_added(k)->description,
+                                .estimate = "",
+                                .label = "",
+                                .kind = ""};
     if (!strncmp(key, "estimates.", 10)) return meaning_of_estimate(key + 10);
     const char *dot = strrchr(key, '.');
-    if (!strncmp(key, "window.series.", 14)) return meaning_of(bt_json_keys_find(bt_reported_keys, bt_n_reported_keys, dot + 1));
+    if (!strncmp(key, "window.series.", 14))
+        return meaning_of(bt_json_keys_find(bt_reported_keys, bt_n_reported_keys, dot + 1));
     bt_meaning m = meaning_of(bt_json_keys_find(bt_summary_keys, bt_n_summary_keys, key));
     return m;
 }

@@ -19,7 +19,11 @@ PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test
 def run(tmp_path_factory):
     subprocess.run(["make", "-s", str(PROGRAM)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     folder = tmp_path_factory.mktemp("run")
-    done = subprocess.run([ROOT / PROGRAM, "write", folder], check=True, stdout=subprocess.PIPE, text=True, errors="replace")
+    done = subprocess.run([ROOT / PROGRAM, "write", folder],
+                          check=True,
+                          stdout=subprocess.PIPE,
+                          text=True,
+                          errors="replace")
     (folder / "table.txt").write_text(done.stdout, encoding="utf-8")
     return folder
 
@@ -90,8 +94,8 @@ def test_summary_is_json_with_every_promised_number(run):
         raise ValueError(f"{name} is not JSON")
 
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"), parse_constant=no_constant)
-    numbers = """n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n mean_ice_resistance_se_n
-        mean_tow_force_n max_overlap_m unconverged_steps mean_sweeps contacts_mean ns_per_floe_step momentum_residual
+    numbers = """n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n
+        mean_ice_resistance_se_n mean_tow_force_n max_overlap_m unconverged_steps mean_sweeps contacts_mean ns_per_floe_step momentum_residual
         concentration mean_drag_force_n mean_ice_resistance_budget_n contact_work_j positive_work_steps floes_outside
         p95_ice_resistance_n p99_ice_resistance_n peak_ice_resistance_n sd_ice_resistance_n""".split()
     for name in numbers:
