@@ -32,7 +32,9 @@ int bt_division_sharers(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX
     int n = 0;
     for (int k = 0; k < BT_MAX_SHARERS; k++) {
         const int64_t here = k == 4 ? bt_division_place(w, x, y) : 0;
-        const int r = k < 4 ? bt_division_owner(w, x - (k & 1), y - (k >> 1)) : here >= 0 && w->domain->under[here] ? w->domain->large_owner : -1;
+        const int r = k < 4                                 ? bt_division_owner(w, x - (k & 1), y - (k >> 1))
+                      : here >= 0 && w->domain->under[here] ? w->domain->large_owner
+                                                            : -1;
         bool known = r < 0;
         for (int i = 0; i < n && !known; i++) known = rank[i] == r;
         if (!known) rank[n++] = r;
@@ -50,7 +52,10 @@ bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int
     return bt_division_place(w, out[0], out[1]) >= 0;
 }
 
-static bool movable_large(const bt_world *w, bt_idx i) { return w->bodies.large[i] && w->bodies.motion[i] == BT_DYNAMIC; }
+static bool movable_large(const bt_world *w, bt_idx i)
+{
+    return w->bodies.large[i] && w->bodies.motion[i] == BT_DYNAMIC;
+}
 
 double bt_division_large_path(const bt_world *w)
 {
@@ -86,7 +91,8 @@ static int *carry_over(const bt_world *w, const bt_domain *before)
     int *owner = bt_alloc((size_t)t->n_x * (size_t)t->n_y, sizeof *owner);
     for (int32_t y = 0; y < t->n_y; y++)
         for (int32_t x = 0; x < t->n_x; x++) {
-            const double px = (t->low_x + x + 0.5) * t->side_x / before->side_x, py = (t->low_y + y + 0.5) * t->side_y / before->side_y;
+            const double px = (t->low_x + x + 0.5) * t->side_x / before->side_x,
+                         py = (t->low_y + y + 0.5) * t->side_y / before->side_y;
             const int32_t bx = (int32_t)bt_max(0, bt_min(before->n_x - 1, floor(px) - before->low_x));
             const int32_t by = (int32_t)bt_max(0, bt_min(before->n_y - 1, floor(py) - before->low_y));
             owner[(int64_t)y * t->n_x + x] = before->owner ? before->owner[(int64_t)by * before->n_x + bx] : -1;
@@ -100,8 +106,10 @@ static double *carry_work(const bt_world *w, const bt_domain *before)
     const bt_cells *t = w->cells;
     double *work = bt_alloc((size_t)t->n_x * (size_t)t->n_y, sizeof *work);
     for (int64_t p = 0; before->work && p < (int64_t)before->n_x * before->n_y; p++) {
-        const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / t->side_x, py = (before->low_y + p / before->n_x + 0.5) * before->side_y / t->side_y;
-        const int32_t x = (int32_t)bt_max(0, bt_min(t->n_x - 1, floor(px) - t->low_x)), y = (int32_t)bt_max(0, bt_min(t->n_y - 1, floor(py) - t->low_y));
+        const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / t->side_x,
+                     py = (before->low_y + p / before->n_x + 0.5) * before->side_y / t->side_y;
+        const int32_t x = (int32_t)bt_max(0, bt_min(t->n_x - 1, floor(px) - t->low_x)),
+                      y = (int32_t)bt_max(0, bt_min(t->n_y - 1, floor(py) - t->low_y));
         work[(int64_t)y * t->n_x + x] += before->work[p];
     }
     return work;
@@ -134,7 +142,8 @@ static void cut_map(bt_world *w)
     int64_t *work = gather_work(w);
     double dealt = 0;
     if (d->comm->rank == 0) {
-        int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to), *group = bt_alloc((size_t)n, sizeof *group);
+        int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to),
+            *group = bt_alloc((size_t)n, sizeof *group);
         int64_t *edge = bt_alloc(8 * (size_t)n, sizeof *edge);
         double (*at)[2] = bt_alloc((size_t)n, sizeof *at);
         int64_t cut = 0, all = 0;
@@ -154,7 +163,13 @@ static void cut_map(bt_world *w)
             group[p] = d->under[p] ? 0 : -1;
             at[p][0] = x * t->side_x, at[p][1] = y * t->side_y;
         }
-        const bt_graph g = {.n = n, .start = start, .to = to, .edge = edge, .weight = work, .at = (const double (*)[2])at, .group = group};
+        const bt_graph g = {.n = n,
+                            .start = start,
+                            .to = to,
+                            .edge = edge,
+                            .weight = work,
+                            .at = (const double(*)[2])at,
+                            .group = group};
         bt_cut_quality q;
         bt_cut(&g, d->comm->size, TOLERANCE, d->owner, &q);
         dealt = q.imbalance;
@@ -195,7 +210,8 @@ void bt_division_map(bt_world *w, bool cut)
     if (cut || !d->dealt) {
         cut_map(w);
         memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
-        d->steps = 0; // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at
+        // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at
+        d->steps = 0;
     }
     d->due = false;
     for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++)

@@ -10,7 +10,8 @@
 /// What is exchanged with one other rank.
 typedef struct bt_link {
     int rank;
-    // bodies that this rank's cells of a phase may change and the other holds, and the reverse; both sides list them in the same order
+    // bodies that this rank's cells of a phase may change and the other holds, and the reverse; both sides list them in
+    // the same order
     bt_idx *send[BT_PHASES], *receive[BT_PHASES];   ///< [n_...] indices of bodies
     bt_idx n_send[BT_PHASES], n_receive[BT_PHASES];
     // of these, the ones that contacts of this step touch: at the front of chosen lists
@@ -37,7 +38,8 @@ struct bt_domain {
     double side_x, side_y;   ///< of the cells it was made for, m
     int large_owner;         ///< rank that owns the large movable bodies
     double large_path;       ///< path of the large movable bodies when the division was made, m
-    double drift;            ///< way of the water through cells that do not move with it (periodic directions), since then, m
+    /// way of the water through cells that do not move with it (periodic directions), since then, m
+    double drift;
     uint8_t *owned;          ///< [n bodies] this rank answers for the body
     bt_idx cap_owned;
     // links

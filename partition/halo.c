@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What ranks exchange: velocities of shared bodies after each phase, values of cells, and what only some of them know.
 //
-// Lists. A body of cell t is touched in phase p by one cell, T_p(t), whose rank sends its velocity to all others that hold t. Both sides
-// go through the cells they hold in the same order, so they make the same lists without a word. Of these bodies few have a
-// contact in a given step: after the detection the sender says which (one byte each), and only those travel in the sweeps.
+// Lists. A body of cell t is touched in phase p by one cell, T_p(t), whose rank sends its velocity to all others that
+// hold t. Both sides go through the cells they hold in the same order, so they make the same lists without a word. Of
+// these bodies few have a contact in a given step: after the detection the sender says which (one byte each), and only
+// those travel in the sweeps.
 #include <stdlib.h>
 #include <string.h>
 
@@ -22,7 +23,8 @@ void bt_halo_free(bt_domain *d)
             free(l->send_now[p]);
             free(l->receive_now[p]);
         }
-        void *arrays[] = {l->out, l->in, l->flags_out, l->flags_in, l->tell_send, l->tell_receive, l->tell_out, l->tell_in};
+        void *arrays[] = {l->out,       l->in,           l->flags_out, l->flags_in,
+                          l->tell_send, l->tell_receive, l->tell_out,  l->tell_in};
         for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     }
     free(d->link);
@@ -51,7 +53,10 @@ static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_cell *t
     }
 }
 
-static bool is_under(const bt_domain *d, const bt_cell *t) { return d->under[(int64_t)(t->y - d->low_y) * d->n_x + t->x - d->low_x]; }
+static bool is_under(const bt_domain *d, const bt_cell *t)
+{
+    return d->under[(int64_t)(t->y - d->low_y) * d->n_x + t->x - d->low_x];
+}
 
 /// Lists of bodies for the cells that this rank holds.
 static void list_bodies(bt_world *w)
@@ -83,7 +88,8 @@ static void list_bodies(bt_world *w)
     }
 }
 
-/// Does rank r hold a cell within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far that has converged.
+/// Does rank r hold a cell within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far
+/// that has converged.
 static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
 {
     const bt_cells *t = w->cells;
@@ -207,8 +213,12 @@ void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take)
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         for (bt_idx i = 0; i < l->n_tell_send; i++) l->tell_out[i] = value[l->tell_send[i]];
-        if (l->n_tell_receive) MPI_Irecv(l->tell_in, l->n_tell_receive, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi, &d->request[d->n_requests++]);
-        if (l->n_tell_send) MPI_Isend(l->tell_out, l->n_tell_send, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_tell_receive)
+            MPI_Irecv(l->tell_in, l->n_tell_receive, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
+        if (l->n_tell_send)
+            MPI_Isend(l->tell_out, l->n_tell_send, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
     wait_all(d);
     for (int k = 0; k < d->n_links; k++) {
@@ -243,8 +253,12 @@ void bt_domain_select(bt_world *w)
                 if (now) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];
             }
         }
-        if (l->n_flags_in) MPI_Irecv(l->flags_in, l->n_flags_in, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
-        if (l->n_flags_out) MPI_Isend(l->flags_out, l->n_flags_out, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_flags_in)
+            MPI_Irecv(l->flags_in, l->n_flags_in, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
+        if (l->n_flags_out)
+            MPI_Isend(l->flags_out, l->n_flags_out, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
     wait_all(d);
     for (int k = 0; k < d->n_links; k++) {
@@ -276,12 +290,16 @@ void bt_domain_send(bt_world *w, int phase, bt_vel *v)
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         const bt_idx n_in = l->n_receive_now[phase], n_out = l->n_send_now[phase];
-        if (n_in) MPI_Irecv(l->in, 3 * n_in, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+        if (n_in)
+            MPI_Irecv(l->in, 3 * n_in, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi,
+                      &d->request[d->n_requests++]);
         for (bt_idx i = 0; i < n_out; i++) {
             const bt_vel *x = &v[l->send_now[phase][i]];
             l->out[3 * i] = x->x, l->out[3 * i + 1] = x->y, l->out[3 * i + 2] = x->w;
         }
-        if (n_out) MPI_Isend(l->out, 3 * n_out, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+        if (n_out)
+            MPI_Isend(l->out, 3 * n_out, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
 }
 

@@ -4,10 +4,11 @@
 // Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
 // 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
 // path), and a cold part (mass, drag, polygon in its own frame). Each part is an array of its own over the
-// bodies in storage order, which is the order of the cells (cells.h): neighbours in space are neighbours in memory. Every
-// reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a body
-// that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never from
-// storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large or fixed bodies.
+// bodies in storage order, which is the order of the cells (cells.h): neighbours in space are neighbours in memory.
+// Every reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a
+// body that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never
+// from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large or
+// fixed bodies.
 //
 // Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
 // gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
@@ -27,14 +28,16 @@ typedef enum {
 } bt_motion;
 
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
-typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
+/// 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
+typedef struct bt_inv { double m, i; } bt_inv;
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
 /// Where a floe of a moving window belongs (window.h).
 typedef struct bt_home {
     double x, y, yaw; ///< pose in the field as made, m, m, rad
     int32_t copy;     ///< which repetition of that place, in lengths of the period along x
-    int32_t lap;      ///< periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    /// periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    int32_t lap;
 } bt_home;
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
@@ -46,9 +49,10 @@ typedef struct bt_drag {
     double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
 } bt_drag;
 
-/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its own: contacts are found between
-/// parts, and act on the body. Rejected: parts as bodies that follow a parent. Everything that counts, sorts, moves, hashes or writes bodies would
-/// have to tell the two apart; this way only the pair search and the narrow phase know.
+/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its
+/// own: contacts are found between parts, and act on the body. Rejected: parts as bodies that follow a parent.
+/// Everything that counts, sorts, moves, hashes or writes bodies would have to tell the two apart; this way only the
+/// pair search and the narrow phase know.
 typedef struct bt_mark {
     uint8_t count;  ///< at the first vertex of the outline or a part: its number of vertices; 0 elsewhere
     uint8_t corner; ///< vertex of the outline that stands here
@@ -79,7 +83,8 @@ typedef struct bt_bodies {
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
     double *outline;      ///< [offset[n]][2] vertices, also those of parts, turned by yaw, relative to the centroid, m
-    double *path;         ///< [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
+    /// [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
+    double *path;
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
     // cold
@@ -97,8 +102,9 @@ typedef struct bt_bodies {
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no cell
-    uint8_t *disturbed;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
-                          ///< changes a pose or velocity by hand
+    /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set
+    /// by whoever changes a pose or velocity by hand
+    uint8_t *disturbed;
     int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
     bt_home *home;        ///< [n]
     int64_t cap_vertices;
@@ -112,7 +118,8 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every contact for each; with plain_sweeps, of sweeps
+    /// limit of the work of a step: 3 updates of every contact for each; with plain_sweeps, of sweeps
+    int64_t max_sweeps;
     bool warm_start;
     bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
     int64_t inner_sweeps;  ///< times a cell is swept before the next one has its turn
@@ -196,13 +203,15 @@ typedef struct bt_world {
 bt_world *bt_world_create(const bt_params *p);
 void bt_world_free(bt_world *w);
 
-/// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition is copied.
+/// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
+/// is copied.
 bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
 
 /// Number of vertices of the outline of body i.
 static inline int bt_body_corners(const bt_bodies *b, bt_idx i) { return b->mark[b->offset[i]].count; }
 
-/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline itself, if that is convex.
+/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline
+/// itself, if that is convex.
 static inline int bt_part_first(const bt_bodies *b, bt_idx i)
 {
     const int n = bt_body_corners(b, i);

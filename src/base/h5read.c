@@ -51,7 +51,9 @@ static void fail(bt_h5_reader *r, const char *name)
 {
     if (r->status != BT_OK) return;
     r->status = BT_ERR_CASE;
-    bt_errors_add(r->err, "%s: %s cannot be read or has another shape than expected; use the program that wrote the file", r->path, name);
+    bt_errors_add(r->err,
+                  "%s: %s cannot be read or has another shape than expected; use the program that wrote the file",
+                  r->path, name);
 }
 
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
@@ -106,7 +108,8 @@ void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int
         size[0] = (hsize_t)n;
         const hid_t here = H5Screate_simple(rank, size, NULL);
         const bool filled = H5Sget_simple_extent_npoints(here) > 0;
-        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 && (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
+        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+               (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
         H5Sclose(here);
     }
     if (space >= 0) H5Sclose(space);

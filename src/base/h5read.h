@@ -26,7 +26,8 @@ bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 
 /// Size of a dataset's dimension k, 0 = not so many.
 int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
-/// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem: H5T_NATIVE_...
+/// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem:
+/// H5T_NATIVE_...
 void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to);
 
 #endif

@@ -9,14 +9,17 @@
 
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
-    FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
-    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
-    FIELD(disturbed), FIELD(cell), FIELD(home),
+    FIELD(vel),       FIELD(inv),  FIELD(pose),   FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
+    FIELD(radius),    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share),     FIELD(friction), FIELD(restitution),
+    FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
 const bt_body_field bt_vertex_fields[] = {
-    {offsetof(bt_bodies, vertices), 2 * sizeof(double)}, {offsetof(bt_bodies, outline), 2 * sizeof(double)}, FIELD(per_length), FIELD(mark),
+    {offsetof(bt_bodies, vertices), 2 * sizeof(double)},
+    {offsetof(bt_bodies, outline), 2 * sizeof(double)},
+    FIELD(per_length),
+    FIELD(mark),
 };
 const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_fields;
 

@@ -24,7 +24,8 @@ double bt_speed_law_way(const bt_speed_law *l, double t)
         const double *p = l->programme;
         double way = bt_min(t, p[0]) * p[1]; // constant before the first
         for (int i = 0; i + 1 < l->n && t > p[2 * i]; i++) {
-            const double dt = p[2 * i + 2] - p[2 * i], rise = (p[2 * i + 3] - p[2 * i + 1]) / dt, s = bt_min(t - p[2 * i], dt);
+            const double dt = p[2 * i + 2] - p[2 * i], rise = (p[2 * i + 3] - p[2 * i + 1]) / dt,
+                         s = bt_min(t - p[2 * i], dt);
             way += s * (p[2 * i + 1] + 0.5 * rise * s);
         }
         return way + bt_max(0, t - p[2 * l->n - 2]) * p[2 * l->n - 1];
@@ -34,7 +35,8 @@ double bt_speed_law_way(const bt_speed_law *l, double t)
 
 double bt_speed_law_time(const bt_speed_law *l, double way, double latest)
 {
-    if (l->n == 0) return way < l->speed * l->ramp / 2 ? sqrt(2 * l->ramp * way / l->speed) : way / l->speed + l->ramp / 2;
+    if (l->n == 0)
+        return way < l->speed * l->ramp / 2 ? sqrt(2 * l->ramp * way / l->speed) : way / l->speed + l->ramp / 2;
     double low = 0, high = latest;
     for (int i = 0; i < 100; i++) {
         const double mid = 0.5 * (low + high);

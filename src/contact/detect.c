@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Contact detection of one step: which cells are active, their margins, narrow phase, contacts with last step's impulses.
+// Contact detection of one step: which cells are active, their margins, narrow phase, contacts with last step's
+// impulses.
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -99,7 +100,8 @@ bool bt_contacts_outrun(const bt_world *w)
         const bt_idx k = t->busy[j];
         const bt_cell *cell = &t->cell[k];
         any = cell->own && t->bound[k] > 0 &&
-              (!cell->active || bt_margin_for(w, t->bound[k]) > cell->margin || 2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
+              (!cell->active || bt_margin_for(w, t->bound[k]) > cell->margin ||
+               2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;
@@ -181,7 +183,8 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         if (!near) bt_pairs_add_near(t, i);
         double gap;
         bt_manifold *m = bt_pack_next(&s->pack, i);
-        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
+        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin,
+                                             p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
         p->reach = gap + paths;
         if (!touch) {
             p->n_points = 0;
@@ -212,14 +215,16 @@ static void wake_body(bt_world *w, bt_idx i)
     bt_cells_wake(t, k);
 }
 
-/// Cells with bodies that contacts, here or on other ranks, may move; none of a step falls asleep when it is detected again.
+/// Cells with bodies that contacts, here or on other ranks, may move; none of a step falls asleep when it is detected
+/// again.
 static void find_awake(bt_world *w)
 {
     bt_cells *t = w->cells;
     for (bt_idx i = 0; i < t->n_order; i++) {
         const bt_cell *cell = &t->cell[t->order[i]];
         if (cell->phase == BT_COLOURS) {
-            for (bt_idx j = 0; j < cell->n_contacts; j++) wake_body(w, cell->contacts[j].a), wake_body(w, cell->contacts[j].b);
+            for (bt_idx j = 0; j < cell->n_contacts; j++)
+                wake_body(w, cell->contacts[j].a), wake_body(w, cell->contacts[j].b);
             continue;
         }
         const bt_idx block[4] = {t->order[i], cell->right, cell->above, cell->diagonal};
@@ -276,7 +281,8 @@ void bt_contacts_detect_all(bt_world *w, double margin)
     bt_cells_update(w, margin);
     bt_cells_wake_all(w->cells);
     // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
-    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        w->cells->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
     bool movable = false;
     for (bt_idx l = w->cells->n_in_cells; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
     if (!movable) w->cells->bound[w->cells->n - 1] = 0;
@@ -298,7 +304,9 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
                     if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
                     double gap;
                     int32_t axis = -1;
-                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man],
+                                          &gap, &axis))
+                        ++*n_man;
                 }
         }
     bt_merge_parts(w, *man, (size_t)*n_man);
@@ -311,7 +319,8 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
 double bt_contacts_overlap(bt_world *w)
 {
     bt_cells_begin(w); // from here on and again below, bodies may lie elsewhere
-    if (bt_cells_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    if (bt_cells_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false))))
+        bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
     detect(w, false);
     const bt_cells *t = w->cells;
     double deepest = 0;

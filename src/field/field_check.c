@@ -15,7 +15,8 @@ static void depth_of_pair(void *context, bt_idx i, bt_idx j, double dx, double d
 {
     depth_search *s = context;
     const int64_t *o = s->f->offsets;
-    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]), s->outline + 2 * o[j], dx, dy);
+    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]),
+                             s->outline + 2 * o[j], dx, dy);
     s->deepest = bt_max(s->deepest, -a.gap);
 }
 

@@ -3,9 +3,9 @@
 //
 // Floes are drawn from the size law until their areas fill concentration × ice area; a common factor (near 1) makes it
 // exact. Cells (tessellation, sawn strips) fill the region in the same proportions. A floe is its cell scaled about the
-// centroid, so cells prove that floes do not overlap before the shake; after it, separating axes do. Regular polygons do not
-// fill their cells: they grow from where they fit, in stages between shakes (after Lubachevsky & Stillinger 1990, J. Stat.
-// Phys. 60).
+// centroid, so cells prove that floes do not overlap before the shake; after it, separating axes do. Regular polygons
+// do not fill their cells: they grow from where they fit, in stages between shakes (after Lubachevsky & Stillinger
+// 1990, J. Stat. Phys. 60).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,18 +29,23 @@ static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
 {
     static const char *const names[] = {[BT_ICE_VORONOI] = "voronoi floes", [BT_ICE_RECTANGLES] = "rectangles",
                                         [BT_ICE_POLYGONS] = "regular polygons"};
-    bt_errors_add(err, "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
-                  "ice.shape, size or region", path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
+    bt_errors_add(
+        err,
+        "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
+        "ice.shape, size or region",
+        path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
     return BT_ERR_CASE;
 }
 
 // Target areas of all floes, m²; [*n], caller frees.
-static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n, bt_errors *err)
+static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n,
+                              bt_errors *err)
 {
     double expected = wanted / bt_sizes_mean_area(s);
     if (expected > BT_MOST_FLOES) {
-        bt_errors_add(err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-                      path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
+        bt_errors_add(
+            err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
+            path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
         return BT_ERR_CASE;
     }
     size_t cap = 64;
@@ -56,8 +61,11 @@ static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted
         if (sum >= wanted) break;
     }
     if (sum > 2 * wanted) {
-        bt_errors_add(err, "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
-                      "a larger region, or ice.concentration: 0", path_of(c), bt_sizes_mean(s), wanted);
+        bt_errors_add(
+            err,
+            "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
+            "a larger region, or ice.concentration: 0",
+            path_of(c), bt_sizes_mean(s), wanted);
         free(*target);
         return BT_ERR_CASE;
     }
@@ -99,8 +107,8 @@ static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n
 }
 
 // One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
-static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted, bt_field *f,
-                                  bt_errors *err)
+static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
+                                  bt_field *f, bt_errors *err)
 {
     double *room = bt_alloc((size_t)cells->n, sizeof *room);
     for (bt_idx i = 0; i < cells->n; i++) {
@@ -132,8 +140,8 @@ static double fit_into(int nc, const double *cell, double x, double y, int n, co
 }
 
 // Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
-static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted, bt_field *f,
-                                   bt_errors *err)
+static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
+                                   bt_field *f, bt_errors *err)
 {
     int sides = (int)c->ice.sides;
     if (c->ice.sides < 3 || c->ice.sides > 32) {
@@ -180,8 +188,8 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
         }
         double size, gap = mean_gap(y, f, &size);
         for (bt_idx i = 0; i < f->n; i++) {
-            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so that
-            // grown floes do not trap it.
+            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so
+            // that grown floes do not trap it.
             bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (room[i] - 1))));
         }
         status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
@@ -200,15 +208,17 @@ static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, doubl
     for (bt_idx i = 0; i < f->n && status == BT_OK; i++) {
         room[i] *= TOUCH;
         if (room[i] > 0.9) continue;
-        bt_errors_add(err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
-                      path_of(c), (long long)i);
+        bt_errors_add(
+            err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
+            path_of(c), (long long)i);
         status = BT_ERR_NUMERIC;
     }
     if (status == BT_OK) {
         double reached = bt_field_fit(f, room, wanted);
         if (reached < 0.995 * wanted) {
-            bt_errors_add(err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
-                          path_of(c), reached / y->ice_area, wanted / y->ice_area);
+            bt_errors_add(
+                err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
+                path_of(c), reached / y->ice_area, wanted / y->ice_area);
             status = BT_ERR_NUMERIC;
         }
     }

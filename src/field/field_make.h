@@ -57,9 +57,10 @@ bt_tessellation bt_tessellation_create(bt_idx n);
 void bt_tessellation_free(bt_tessellation *c);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
 bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed);
-/// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside obstacles: 0 keeps
-/// rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
-bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort);
+/// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside
+/// obstacles: 0 keeps rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
+bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed,
+                                    int effort);
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
 int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed);
@@ -69,14 +70,15 @@ int bt_tessellation_clean(int n, double *v, double shortest);
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
 double *bt_field_outlines(const bt_field *f);
 
-/// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy) points
-/// from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair search.
+/// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy)
+/// points from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair
+/// search.
 typedef void bt_pair_visit(void *context, bt_idx i, bt_idx j, double dx, double dy);
-void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
-                          void *context);
+void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit,
+                          bt_pair_visit *visit, void *context);
 
-/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time, without
-/// touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
+/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time,
+/// without touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
 void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room);
 
 /// Scale floe i about its centroid.

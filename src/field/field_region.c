@@ -29,8 +29,9 @@ static double area_inside(const bt_region *y, int n, const double *v)
     return n >= 3 ? bt_shape_moments(n, b).area : 0;
 }
 
-// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so slender that room for the
-// clearance cannot be made by scaling: it would keep floes away all along its line, and its images would be without number.
+// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so
+// slender that room for the clearance cannot be made by scaling: it would keep floes away all along its line, and its
+// images would be without number.
 static bool add_obstacle(bt_region *y, int n, const double *v)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
@@ -48,7 +49,9 @@ static bool add_obstacle(bt_region *y, int n, const double *v)
             double cx = wx + ix * lx, cy = wy + iy * ly;
             // Floes at home reach over a periodic edge by less than half a period.
             double over_x = y->periodic_x ? lx / 2 : 0, over_y = y->periodic_y ? ly / 2 : 0;
-            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y || cy - r > y->y1 + over_y) continue;
+            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y ||
+                cy - r > y->y1 + over_y)
+                continue;
             y->obstacles = bt_realloc(y->obstacles, (size_t)y->n_obstacles + 1, sizeof *y->obstacles);
             bt_obstacle *o = &y->obstacles[y->n_obstacles++];
             *o = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
@@ -73,7 +76,8 @@ static bool spans(double a0, double a1, double d0, double length)
 static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
-    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x,
+        over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
     for (int ix = -over_x; ix <= over_x; ix++)
         for (int iy = -over_y; iy <= over_y; iy++) {
             double v[2 * BT_MAX_VERTICES];
@@ -86,10 +90,13 @@ static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, d
 
 bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err)
 {
-    *y = (bt_region){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
+    *y = (bt_region){
+        .x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
     if (!(y->x1 > y->x0 && y->y1 > y->y0)) {
-        bt_errors_add(err, "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
-                      c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
+        bt_errors_add(
+            err,
+            "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
+            c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
         return BT_ERR_CASE;
     }
     y->periodic_x = bt_bound_wraps(c->domain.ends) && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
@@ -105,12 +112,15 @@ bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_er
         wide = nv < 3 || add_body(y, c, nv, v, d->x, d->y, d->yaw);
     }
     if (!wide) {
-        bt_errors_add(err, "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m between it and the ice; take a wider one, or smaller floes (ice.size)",
+        bt_errors_add(err,
+                      "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
+                      "between it and the ice; take a wider one, or smaller floes (ice.size)",
                       c->path ? c->path : "case", clearance);
         return BT_ERR_CASE;
     }
     if (!(y->ice_area > 0)) {
-        bt_errors_add(err, "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
+        bt_errors_add(err,
+                      "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
                       c->path ? c->path : "case");
         return BT_ERR_CASE;
     }
@@ -218,7 +228,8 @@ int bt_tessellation_clean(int n, double *v, double shortest)
         if (least >= shortest && n <= BT_TESSELLATION_VERTICES) break;
         double loss[2];
         for (int e = 0; e < 2; e++) {
-            const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n), *r = v + 2 * ((at + e + 1) % n);
+            const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n),
+                         *r = v + 2 * ((at + e + 1) % n);
             loss[e] = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         }
         int gone = (at + (loss[1] < loss[0])) % n;

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Power (Laguerre) diagram of weighted seeds whose cells have given areas: broken ice before it is moved apart.
 //
-// The cell of seed p_i with weight w_i is { x : |x − p_i|² − w_i <= |x − p_j|² − w_j for all j }. With x measured from p_i
-// and D = p_j − p_i, each j gives the half-plane D·x <= (|D|² + w_i − w_j)/2. Neighbours are met in rings of a grid. All
-// seeds not yet met are at a distance >= d, their lines at >= (d² − Δ)/(2d) from p_i with Δ = max w − w_i >= 0, which
-// grows with d; so once (d² − Δ) >= 2 d R, R the farthest vertex of the cell so far, no later seed can cut and the cell is
-// exact. Periodic directions begin from ± half a period, the line to the seed's own image; other images are met by
-// rings that go round.
+// The cell of seed p_i with weight w_i is { x : |x − p_i|² − w_i <= |x − p_j|² − w_j for all j }. With x measured from
+// p_i and D = p_j − p_i, each j gives the half-plane D·x <= (|D|² + w_i − w_j)/2. Neighbours are met in rings of a
+// grid. All seeds not yet met are at a distance >= d, their lines at >= (d² − Δ)/(2d) from p_i with Δ = max w − w_i >=
+// 0, which grows with d; so once (d² − Δ) >= 2 d R, R the farthest vertex of the cell so far, no later seed can cut and
+// the cell is exact. Periodic directions begin from ± half a period, the line to the seed's own image; other images are
+// met by rings that go round.
 //
-// Areas. Weights move by Δw_i = ω (A_i* − A_i)/π: for a round cell w = r² and A = π r². It is a damped Jacobi step on the
-// concave dual of semi-discrete optimal transport (Aurenhammer, Hoffmann & Aronov 1998, Algorithmica 20), whose gradient
-// is A* − A. A few Lloyd moves (seed to centroid) first take out the needles of a random diagram; many would give the
-// honeycomb of a foam, which broken ice is not.
+// Areas. Weights move by Δw_i = ω (A_i* − A_i)/π: for a round cell w = r² and A = π r². It is a damped Jacobi step on
+// the concave dual of semi-discrete optimal transport (Aurenhammer, Hoffmann & Aronov 1998, Algorithmica 20), whose
+// gradient is A* − A. A few Lloyd moves (seed to centroid) first take out the needles of a random diagram; many would
+// give the honeycomb of a foam, which broken ice is not.
 //
 // Rejected: Qhull (one diagram of all seeds: no periodic direction, no cells of obstacles, more memory, a dependency).
 #include <math.h>
@@ -27,7 +27,8 @@ enum {
     ROUNDS = 24,    // weight updates, the Lloyd moves among them
     TRIES = 24,     // candidate places of a seed
 };
-static const double SPACING = 0.66; // discs of this part of the cell's radius do not overlap at the start: disorder of the ice
+// discs of this part of the cell's radius do not overlap at the start: disorder of the ice
+static const double SPACING = 0.66;
 static const double STEP = 0.9;     // ω
 static const double SHORT_EDGE = 0.07; // shortest edge kept / diameter of equal area
 static const double SLIVER = 0.16;     // least inradius / radius of equal area
@@ -202,7 +203,8 @@ static bool next_bin(bin_walk *w)
             w->iy++;
         }
         if (w->iy > w->iy1) return false;
-        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny); // turns round the period
+        // turns round the period
+        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny);
         if ((tx && !w->yard->periodic_x) || (ty && !w->yard->periodic_y)) continue;
         w->bin = (size_t)(w->iy - ty * w->dd->ny) * (size_t)w->dd->nx + (size_t)(w->ix - tx * w->dd->nx);
         w->sx = tx * (w->yard->x1 - w->yard->x0);
@@ -212,8 +214,8 @@ static bool next_bin(bin_walk *w)
 }
 
 // How deep, relative to their size, a disc at (x, y) lies in others, in walls and in obstacles; <= 0: free.
-static double crowding(const bt_region *yard, const discs *dd, const double *p, const double *radius, double x, double y,
-                       double r)
+static double crowding(const bt_region *yard, const discs *dd, const double *p, const double *radius, double x,
+                       double y, double r)
 {
     double worst = -1;
     if (!yard->periodic_x) worst = bt_max(worst, 1 - bt_min(x - yard->x0, yard->x1 - x) / (SPACING * r));

@@ -43,7 +43,8 @@ static void add_stream(const bt_bodies *b, bt_idx i, const bt_stream *in, const 
     a->scale += g * s;
 }
 
-/// Explicit and linear forces. An explicit force counts as constant: one that falls with the velocity slows Newton's method down.
+/// Explicit and linear forces. An explicit force counts as constant: one that falls with the velocity slows Newton's
+/// method down.
 static void add_rest(const bt_load *l, const double u[2], balance *a)
 {
     const double f[2] = {l->fx + l->jx - l->g * u[0], l->fy + l->jy - l->g * u[1]};
@@ -107,7 +108,8 @@ bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u
     force = hypot(a.f[0], a.f[1]);
     for (int step = 0; step < MAX_STEPS && force > 0; step++) {
         const double det = a.df[0][0] * a.df[1][1] - a.df[0][1] * a.df[1][0];
-        const double by[2] = {-(a.df[1][1] * a.f[0] - a.df[0][1] * a.f[1]) / det, -(a.df[0][0] * a.f[1] - a.df[1][0] * a.f[0]) / det};
+        const double by[2] = {-(a.df[1][1] * a.f[0] - a.df[0][1] * a.f[1]) / det,
+                              -(a.df[0][0] * a.f[1] - a.df[1][0] * a.f[0]) / det};
         if (!isfinite(by[0]) || !isfinite(by[1])) break;
         double share = 1, next = INFINITY, to[2] = {0, 0};
         balance there = a;

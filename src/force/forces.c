@@ -20,7 +20,8 @@ static inline void load_of(const bt_forces *f, bool added, bt_force_body *b, bt_
     if (added) bt_load_fill(f, BT_LISTED_LAWS, b, l);
 }
 
-/// Two programs, without and with laws that are added: where the load of a body leaves the function, the compiler must keep all of it in memory.
+/// Two programs, without and with laws that are added: where the load of a body leaves the function, the compiler must
+/// keep all of it in memory.
 __attribute__((always_inline)) static inline void predict(bt_world *w, bt_idx i, bool added, bt_turning *r)
 {
     bt_bodies *b = &w->bodies;
@@ -76,7 +77,8 @@ bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b)
     bt_load_clear(&l);
     bt_load_fill(w->forces, 0, b, &l);
     bt_linear a = bt_load_linear(&l, u.w);
-    for (int k = 0; k < l.n_streams; k++) bt_linear_add_skin(&a, &l.stream[k], hypot(l.stream[k].u - u.x, l.stream[k].v - u.y));
+    for (int k = 0; k < l.n_streams; k++)
+        bt_linear_add_skin(&a, &l.stream[k], hypot(l.stream[k].u - u.x, l.stream[k].v - u.y));
     bt_turning r = BT_TURNING_NONE;
     bt_turning_set(&r, b->share * l.turn * dt);
     bt_load_turn(&l, &r, dt, m, b->inertia, &u);

@@ -2,14 +2,16 @@
 // The record: what each law has done to a body in the step just solved.
 //
 // The impulses follow from the load of the law alone, by the scheme of bergtow/forces.h:
-//     rotation   M (R − I) (U1 − U_b): with U1 the part of the law whose turn it is, with U_b that of the law that says U_b
+//     rotation   M (R − I) (U1 − U_b): with U1 the part of the law whose turn it is, with U_b that of the law that says
+//     U_b
 //     gain       M times the gain;   explicit: Δt F
-//     implicit   Δt (j − D U2 − O U*), K = D + O with the diagonal D: contacts and line see D alone, so that what couples
-//                turning and drift is that of U*. From (M + Δt K) U* = M U' + Δt j and (M + Δt D)(U2 − U*) = J_contacts + J_line:
-//                Δt (j − D U2 − O U*) = M (U2 − U') − J_contacts − J_line, all that is not rotation, gain or explicit
-// Every impulse is so computed from its law, and that they add up to M (U2 − U1) is a check. Rejected: drag as what is left
-// of M (U2 − U1) when all else is taken away. A law that is forgotten there is booked as drag, and the balance closes.
-// Of a kinematic body U1 = U* = U2 is the prescribed velocity, and the rotation that of its rate, Δt m f k×U.
+//     implicit   Δt (j − D U2 − O U*), K = D + O with the diagonal D: contacts and line see D alone, so that what
+//                couples turning and drift is that of U*. From (M + Δt K) U* = M U' + Δt j and (M + Δt D)(U2 − U*) =
+//                J_contacts + J_line: Δt (j − D U2 − O U*) = M (U2 − U') − J_contacts − J_line, all that is not
+//                rotation, gain or explicit
+// Every impulse is so computed from its law, and that they add up to M (U2 − U1) is a check. Rejected: drag as what is
+// left of M (U2 − U1) when all else is taken away. A law that is forgotten there is booked as drag, and the balance
+// closes. Of a kinematic body U1 = U* = U2 is the prescribed velocity, and the rotation that of its rate, Δt m f k×U.
 #include "force/load.h"
 
 /// State of a body over a step.
@@ -26,7 +28,8 @@ static bt_impulse turned(const motion *q, const bt_load *l)
     const double m = q->m, ax = l->about_x, ay = l->about_y;
     if (q->led) {
         const double own = q->dt * q->share * m * l->turn, all = q->dt * q->share * m * q->turn;
-        return (bt_impulse){-own * q->u2->y + (m * l->gain_x + all * ay), own * q->u2->x + (m * l->gain_y - all * ax), 0};
+        return (bt_impulse){-own * q->u2->y + (m * l->gain_x + all * ay), own * q->u2->x + (m * l->gain_y - all * ax),
+                            0};
     }
     const double s = q->r.s, c1 = q->r.c - 1, part = l->turn == 0 ? 0 : l->turn / q->turn;
     return (bt_impulse){
@@ -61,8 +64,14 @@ void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse
     const bt_bodies *b = &w->bodies;
     const bt_forces *f = w->forces;
     const bool led = b->motion[i] != BT_DYNAMIC;
-    motion q = {.u1 = led ? &b->vel[i] : &b->vel_start[i], .free = led ? &b->vel[i] : &b->vel_free[i], .u2 = &b->vel[i], .r = BT_TURNING_NONE,
-                .m = b->mass[i], .share = b->share[i], .dt = w->par.dt, .led = led};
+    motion q = {.u1 = led ? &b->vel[i] : &b->vel_start[i],
+                .free = led ? &b->vel[i] : &b->vel_free[i],
+                .u2 = &b->vel[i],
+                .r = BT_TURNING_NONE,
+                .m = b->mass[i],
+                .share = b->share[i],
+                .dt = w->par.dt,
+                .led = led};
     bt_force_body s = bt_load_body(w, i, q.u1);
     bt_load l;
     bt_load_clear(&l);

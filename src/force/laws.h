@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The force laws of the program; equations in bergtow/forces.h, how to add one in docs/how-to-add-a-force-law.md.
 //
-// Entries and functions stand in a header, so that the prediction, which calls every law for every body, has them inline:
-// called through the table they made a step in 20 % ice and wind 8 % longer in instructions, 2 % in 80 % ice. Who needs a
-// law less often takes it from the table (table.c), which is made of the same list.
+// Entries and functions stand in a header, so that the prediction, which calls every law for every body, has them
+// inline: called through the table they made a step in 20 % ice and wind 8 % longer in instructions, 2 % in 80 % ice.
+// Who needs a law less often takes it from the table (table.c), which is made of the same list.
 #ifndef BERGTOW_LAWS_H
 #define BERGTOW_LAWS_H
 
@@ -11,7 +11,10 @@
 
 // --- drag ------------------------------------------------------------------------------------------------------------
 
-static inline void bt_add_water_drag(const bt_force_body *b, bt_load *l) { bt_load_stream(l, b->par->water_u, b->par->water_v, b->drag->water_skin, b->drag->water_form); }
+static inline void bt_add_water_drag(const bt_force_body *b, bt_load *l)
+{
+    bt_load_stream(l, b->par->water_u, b->par->water_v, b->drag->water_skin, b->drag->water_form);
+}
 
 static inline bool bt_water_rests(const bt_params *p, const double *own)
 {
@@ -27,7 +30,10 @@ static const bt_force_law bt_law_water_drag = {
     .add = bt_add_water_drag,
 };
 
-static inline void bt_add_air_drag(const bt_force_body *b, bt_load *l) { bt_load_stream(l, b->par->air_u, b->par->air_v, b->drag->air_skin, b->drag->air_form); }
+static inline void bt_add_air_drag(const bt_force_body *b, bt_load *l)
+{
+    bt_load_stream(l, b->par->air_u, b->par->air_v, b->drag->air_skin, b->drag->air_form);
+}
 
 static inline bool bt_air_rests(const bt_params *p, const double *own)
 {

@@ -16,12 +16,14 @@ void bt_linear_add_outline(const bt_bodies *b, bt_idx i, bt_stream stream, doubl
         if (mark[k].next == k) continue;
         const double *p = v + 2 * k, *q = v + 2 * mark[k].next, ex = q[0] - p[0], ey = q[1] - p[1];
         // Inflow −v·n times the length of the edge, at its ends.
-        const double in0 = -((rx + w * p[1]) * ey - (ry - w * p[0]) * ex), in1 = -((rx + w * q[1]) * ey - (ry - w * q[0]) * ex);
+        const double in0 = -((rx + w * p[1]) * ey - (ry - w * p[0]) * ex),
+                     in1 = -((rx + w * q[1]) * ey - (ry - w * q[0]) * ex);
         if (in0 <= 0 && in1 <= 0) continue;
         const double from = in0 < 0 ? in0 / (in0 - in1) : 0, to = in1 < 0 ? in0 / (in0 - in1) : 1;
         for (int side = -1; side <= 1; side += 2) {
             const double s = 0.5 * (from + to + side * gauss * (to - from));
-            const double g = 0.5 * (to - from) * form * bt_max(0, in0 + s * (in1 - in0)), x = p[0] + s * ex, y = p[1] + s * ey;
+            const double g = 0.5 * (to - from) * form * bt_max(0, in0 + s * (in1 - in0)), x = p[0] + s * ex,
+                         y = p[1] + s * ey;
             a->g += g;
             a->gx += g * x;
             a->gy += g * y;

@@ -85,7 +85,8 @@ static inline void bt_load_turn(const bt_load *l, const bt_turning *r, double dt
 /// All that is implicit as one linear force j − K (U, ω).
 typedef struct bt_linear {
     double g, gx, gy, gw, jx, jy, jw; ///< as in bt_load
-    double twist;                     ///< jw without that of streams, which vanishes where they do not couple, but for rounding
+    /// jw without that of streams, which vanishes where they do not couple, but for rounding
+    double twist;
 } bt_linear;
 
 static inline bt_linear bt_load_linear(const bt_load *l, double w)

@@ -38,7 +38,8 @@ static void find_series(void)
     }
     bt_n_force_wholes = bt_n_force_series;
     for (int k = 0; k < bt_n_force_laws; k++)
-        if (bt_force_laws[k]->part_of && !bt_force_laws[k]->turns_only) add_series(bt_force_laws[k]->name, bt_force_laws[k], true);
+        if (bt_force_laws[k]->part_of && !bt_force_laws[k]->turns_only)
+            add_series(bt_force_laws[k]->name, bt_force_laws[k], true);
 }
 
 // --- a law of a program ----------------------------------------------------------------------------------------------
@@ -68,8 +69,14 @@ static bool add_keys(const bt_force_law *law, bt_errors *err)
         const size_t length = strlen(law->name) + strlen(own->name) + 2;
         char *name = bt_alloc(length, 1); // kept by the table of keys
         snprintf(name, length, "%s.%s", law->name, own->name);
-        if (unit < 0) bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_force_key, or \"\"", name, own->unit);
-        const bt_key key = {.name = name, .unit = (bt_unit)bt_max(unit, 0), .preset = own->preset, .range = own->range, .doc = own->doc};
+        if (unit < 0)
+            bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_force_key, or \"\"",
+                          name, own->unit);
+        const bt_key key = {.name = name,
+                            .unit = (bt_unit)bt_max(unit, 0),
+                            .preset = own->preset,
+                            .range = own->range,
+                            .doc = own->doc};
         const bool added = unit >= 0 && bt_schema_add(&key, err) >= 0;
         if (!added) free(name);
         all = all && added;
@@ -91,12 +98,16 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!is_name(name)) bt_errors_add(err, "force law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
-    else if (bt_force_series_find(name) >= 0) bt_errors_add(err, "force law %s: there is a force of this name; choose another", name);
+    if (!is_name(name))
+        bt_errors_add(err, "force law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+    else if (bt_force_series_find(name) >= 0)
+        bt_errors_add(err, "force law %s: there is a force of this name; choose another", name);
     if (!law->add) bt_errors_add(err, "force law %s: it has no function `add`", name);
     if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "force law %s: say in a line what it is (`doc`)", name);
-    if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN) bt_errors_add(err, "force law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_FORCE_OWN);
-    if (bt_n_force_laws == BT_MAX_FORCE_LAWS) bt_errors_add(err, "force law %s: there are %d laws; raise BT_MAX_FORCE_LAWS", name, BT_MAX_FORCE_LAWS);
+    if (law->n_keys < 0 || law->n_keys > BT_MAX_FORCE_OWN)
+        bt_errors_add(err, "force law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_FORCE_OWN);
+    if (bt_n_force_laws == BT_MAX_FORCE_LAWS)
+        bt_errors_add(err, "force law %s: there are %d laws; raise BT_MAX_FORCE_LAWS", name, BT_MAX_FORCE_LAWS);
     if (err->n > before || !add_keys(law, err)) return BT_ERR_USAGE;
     bt_force_laws[bt_n_force_laws++] = law;
     find_series();

@@ -30,10 +30,12 @@ static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
     return BT_PI - atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
-/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that meet, the sharper.
+/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that
+/// meet, the sharper.
 static double corner_of(const bt_bodies *b, const bt_contact *u, uint32_t feature)
 {
-    if ((feature >> 20) == 0x7ffu) return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
+    if ((feature >> 20) == 0x7ffu)
+        return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
     const bool reference_b = feature >> 31, of_reference = feature & 1u;
     return interior_angle(b, reference_b == of_reference ? u->b : u->a, (feature & 0xfffffu) >> 1);
 }
@@ -44,7 +46,8 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u, bt_idx towed)
+static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
+                                bt_idx towed)
 {
     const bt_bodies *b = &w->bodies;
     const bool is_b = u->b == towed;
@@ -81,7 +84,8 @@ static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, cell->pairs[cell->gaps[u - cell->contacts].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner =
+            corner_of(b, u, cell->pairs[cell->gaps[u - cell->contacts].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];
@@ -111,7 +115,8 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
 {
     const bt_cells *ts = w->cells;
     const bt_idx towed = bt_world_towed(w);
-    // A large movable body has its contacts in the last cell, which comes last of all; one of infinite mass has them in the cells of the floes.
+    // A large movable body has its contacts in the last cell, which comes last of all; one of infinite mass has them in
+    // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     touches all = {0};
 #pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_CELLS))
@@ -134,7 +139,8 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     bt_body_contact *rows = all.row;
     *n = all.n;
     if (w->domain) {
-        rows = (bt_body_contact *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row, n);
+        rows = (bt_body_contact *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row,
+                                                           n);
         free(all.row);
     }
     if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_gid);

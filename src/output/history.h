@@ -7,8 +7,22 @@
 
 /// Columns of what the summary keeps of every step; names and members of the sample: bt_history_columns.
 typedef enum bt_column {
-    BT_COL_TIME, BT_COL_ICE, BT_COL_TOW, BT_COL_DRAG, BT_COL_CORIOLIS, BT_COL_TILT, BT_COL_INERTIA, BT_COL_BUDGET,
-    BT_COL_TENSION_1, BT_COL_TENSION_2, BT_COL_THRUST, BT_COL_UNCONVERGED, BT_COL_RESIDUAL, BT_COL_COLLISION, BT_COL_PUSH, BT_N_COLUMNS
+    BT_COL_TIME,
+    BT_COL_ICE,
+    BT_COL_TOW,
+    BT_COL_DRAG,
+    BT_COL_CORIOLIS,
+    BT_COL_TILT,
+    BT_COL_INERTIA,
+    BT_COL_BUDGET,
+    BT_COL_TENSION_1,
+    BT_COL_TENSION_2,
+    BT_COL_THRUST,
+    BT_COL_UNCONVERGED,
+    BT_COL_RESIDUAL,
+    BT_COL_COLLISION,
+    BT_COL_PUSH,
+    BT_N_COLUMNS
 } bt_column;
 
 typedef struct bt_column_def {
@@ -33,8 +47,12 @@ typedef struct bt_history {
     int64_t unconverged, unprojected, positive_work, restitution_cut, repeats, outrun;
 } bt_history;
 
-/// Column k of the history, those of force laws after the others: its place, and its name in the checkpoint (NAME of the force law's series).
-static inline double **bt_history_column(bt_history *h, int k) { return k < BT_N_COLUMNS ? &h->column[k] : &h->law[k - BT_N_COLUMNS]; }
+/// Column k of the history, those of force laws after the others: its place, and its name in the checkpoint (NAME of
+/// the force law's series).
+static inline double **bt_history_column(bt_history *h, int k)
+{
+    return k < BT_N_COLUMNS ? &h->column[k] : &h->law[k - BT_N_COLUMNS];
+}
 void bt_history_name(int k, char name[80]);
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.

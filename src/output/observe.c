@@ -2,7 +2,8 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the table of force laws)
+//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the
+//     table of force laws)
 // On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
@@ -49,7 +50,8 @@ static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t
             const double *arm = is_b ? u->rbn : u->ran;
             bt_sum_add(&t->sum[ICE_X], sign * jx);
             bt_sum_add(&t->sum[ICE_Y], sign * jy);
-            bt_sum_add(&t->sum[ICE_TURN], sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
+            bt_sum_add(&t->sum[ICE_TURN],
+                       sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
             bt_sum_add(&t->sum[TOUCHING], (u->ln[0] > 0) + (u->ln[1] > 0));
         } else if (prescribed) { // impulses that came from the other bodies of infinite mass
             const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
@@ -68,7 +70,9 @@ static bt_totals observe_cells(const bt_world *w, double slow2)
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx j = 0; j < ts->n_busy; j++) {
             const bt_idx k = ts->busy[j];
-            if (ts->cell[k].own && (k == ts->n - 1 || bt_cells_moves(ts, k) || ts->cell[k].n_contacts > 0 || !ts->still)) observe_cell(w, k, slow2, &t);
+            if (ts->cell[k].own &&
+                (k == ts->n - 1 || bt_cells_moves(ts, k) || ts->cell[k].n_contacts > 0 || !ts->still))
+                observe_cell(w, k, slow2, &t);
         }
 #pragma omp critical
         bt_totals_merge(&all, &t);
@@ -139,7 +143,8 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     const bt_idx t = bt_world_towed(w);
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
-    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
+    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]),
+                           bt_sum_value(&seen->sum[ICE_TURN])};
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
@@ -149,7 +154,8 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     s->coriolis_force = force_against(w, bt_force_series_find("coriolis"));
     s->tilt_force = force_against(w, bt_force_series_find("tilt"));
     for (int k = 0; k < bt_n_law_series(); k++) s->law_force[k] = force_against(w, bt_law_series(k));
-    s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
+    s->inertia_force =
+        b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
     s->body_yaw = b->pose[t].yaw;
@@ -180,8 +186,10 @@ static void observe_impacts(const bt_world *w, bt_sample *s)
 unsigned bt_observe_applies(const bt_world *w)
 {
     const bool body = w->towed >= 0, line = body && bt_tow_has_line(w->tow);
-    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE | (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
-           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL | (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
+    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE |
+           (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
+           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL |
+           (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
            (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
 }
 
@@ -233,7 +241,8 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_waiting = (double)w->window->waiting;
     }
     for (int k = 0; k < bt_n_series(); k++)
-        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
+        if (!(has & 1u << bt_series_fields[k].applies))
+            *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 
 double bt_observe_ice_area(const bt_world *w)

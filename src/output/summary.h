@@ -29,8 +29,10 @@ typedef struct bt_summary {
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body);
 /// summary.json as text; the caller frees it.
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
-void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
 void bt_summary_free(bt_summary *s);
 
 #endif

@@ -49,8 +49,9 @@ static uint64_t stamp(const char *folder)
         const bool there = stat(path, &st) == 0;
         free(path);
         if (!there) return 0;
-        const uint64_t of[6] = {(uint64_t)st.st_ino, (uint64_t)st.st_size, (uint64_t)st.st_mtim.tv_sec, (uint64_t)st.st_mtim.tv_nsec, (uint64_t)st.st_ctim.tv_sec,
-                                (uint64_t)st.st_ctim.tv_nsec};
+        const uint64_t of[6] = {(uint64_t)st.st_ino,         (uint64_t)st.st_size,
+                                (uint64_t)st.st_mtim.tv_sec, (uint64_t)st.st_mtim.tv_nsec,
+                                (uint64_t)st.st_ctim.tv_sec, (uint64_t)st.st_ctim.tv_nsec};
         memcpy(part[k], of, sizeof of);
     }
     const uint64_t all = XXH3_64bits(part, sizeof part);
@@ -58,7 +59,8 @@ static uint64_t stamp(const char *folder)
 }
 
 /// The record that the files ask for. Errors: BT_ERR_CASE, one is missing; BT_ERR_IO.
-static bt_status make(const bt_member_records *r, const char *name, const char *folder, char text[MOST_TEXT], bt_errors *err)
+static bt_status make(const bt_member_records *r, const char *name, const char *folder, char text[MOST_TEXT],
+                      bt_errors *err)
 {
     int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, r->study);
     for (int k = 0; k < N_FILES; k++) {
@@ -83,7 +85,8 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     for (int k = 0; numbers[k] && !missing; k++)
         if (!json_is_number(json_object_get(root, numbers[k]))) missing = numbers[k];
     const bool stopped = json_is_string(json_object_get(root, "stopped"));
-    if (!root) bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
+    if (!root)
+        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
     else if (missing) bt_errors_add(err, "%s: has no %s; look at the disk", path, missing);
     else if (stopped) bt_errors_add(err, "%s: is of a run that was stopped", path);
     const bt_status status = root && !missing && !stopped ? BT_OK : BT_ERR_IO;
@@ -111,7 +114,8 @@ static void line_of(const char *text, const char *key, char out[128])
     const size_t n = strlen(key);
     *out = 0;
     for (const char *at = text; at && *at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
-        if (!strncmp(at, key, n) && at[n] == ':') snprintf(out, 128, "%.*s", (int)bt_min((double)strcspn(at, "\n"), 127), at);
+        if (!strncmp(at, key, n) && at[n] == ':')
+            snprintf(out, 128, "%.*s", (int)bt_min((double)strcspn(at, "\n"), 127), at);
 }
 
 /// Why a record is not the one that the files ask for, in words.
@@ -120,7 +124,11 @@ static void tell(const char *folder, const char *kept, const char *wanted, bt_er
     static const char *const whose[] = {"name", "study"};
     char a[128], b[128];
     if (strncmp(kept, "bergtow finished member 1\n", 26)) {
-        bt_errors_add(err, "%s/%s: %s", folder, RECORD, *kept ? "is no record of a finished member" : "is empty, as older versions of the program left it: nothing tells whether the result is as it was");
+        bt_errors_add(
+            err, "%s/%s: %s", folder, RECORD,
+            *kept
+                ? "is no record of a finished member"
+                : "is empty, as older versions of the program left it: nothing tells whether the result is as it was");
         return;
     }
     for (int k = 0; k < 2; k++) {

@@ -54,7 +54,8 @@ static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
     const bt_drag *k = &b->drag[i];
     bt_load load;
     bt_forces_load(w, i, &b->vel[i], &load);
-    const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i], drawn = ratio(hypot(load.jx, load.jy), load.g);
+    const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i],
+                 drawn = ratio(hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
     const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));
     const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);
@@ -64,7 +65,10 @@ static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
     return bt_max(d->prescribed, d->water + wind + push + drawn);
 }
 
-static double energy_of(double mass, double inertia, double vx, double vy, double turn) { return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn); }
+static double energy_of(double mass, double inertia, double vx, double vy, double turn)
+{
+    return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn);
+}
 
 /// E_0 + Σ ½ M v². Of a run that goes on, too, E_0 is that of time zero.
 static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
@@ -77,9 +81,12 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
         double start = 0;
         const bt_gid by_hand = b->gid[i] - (n_floes - c->n_floes);
         // A velocity that is not given is that of free drift, below the driven speed.
-        if (b->gid[i] == w->towed) start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy), c->body.yaw_rate);
+        if (b->gid[i] == w->towed)
+            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy),
+                              c->body.yaw_rate);
         else if (by_hand >= 0 && by_hand < c->n_floes)
-            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx), bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
+            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx),
+                              bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
         bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, w, i), 0, 0)) / UNIT);
     }
     bt_domain_reduce(w, &t);
@@ -123,7 +130,8 @@ static range range_of(const bt_guard *g, const bt_world *w)
     return r;
 }
 
-/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them only where they stand.
+/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them
+/// only where they stand.
 static bool beyond(const range *r, double x, double y)
 {
     const double out[2] = {bt_max(r->low[0] - x, x - r->high[0]), bt_max(r->low[1] - y, y - r->high[1])};
@@ -211,8 +219,9 @@ static bool numbers_of_sample(const bt_world *w, const bt_sample *s, bt_errors *
                   "step %" PRId64 ": %s (%s) is %s; "
                   "take a smaller run.dt, and check masses, stiffness and speeds of the case",
                   w->step, f->name, f->description,
-                  isnan(x) ? "not a number, or came from some too large to be summed up"
-                  : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure" : "beyond all numbers of a run");
+                  isnan(x)                   ? "not a number, or came from some too large to be summed up"
+                  : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure"
+                                             : "beyond all numbers of a run");
     return false;
 }
 
@@ -236,16 +245,18 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
     if (g->energy > 0 && s->kinetic_energy > g->energy) {
         sound = false;
         bt_errors_add(err,
-                      "step %" PRId64 ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
+                      "step %" PRId64
+                      ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
                       "take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
                       w->step, s->kinetic_energy, g->energy);
     }
     if (g->unconverged > 0 && g->in_a_row >= g->unconverged) {
         sound = false;
-        bt_errors_add(err,
-                      "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
-                      "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
-                      w->step, g->in_a_row);
+        bt_errors_add(
+            err,
+            "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
+            "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
+            w->step, g->in_a_row);
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Listed contacts of a cell in batches of four that share no body, swept with vector instructions (private to the solver).
+// Listed contacts of a cell in batches of four that share no body, swept with vector instructions (private to the
+// solver).
 //
 //     contacts   [0] [1] [2] [3] [4] [5] ...      a contact a row; half of them bear no load and are not listed
 //     list     0       2   3       5  ...
-//     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four contacts, ny of four contacts, ...
+//     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four contacts, ny of four
+//     contacts, ...
 //
-// A sweep goes through the batches of a cell in sequence, and updates the four contacts of each at once: as they share no body that can be moved,
-// that is the same as one after the other. So the order of a cell's updates is that of its batches, the same everywhere.
+// A sweep goes through the batches of a cell in sequence, and updates the four contacts of each at once: as they share
+// no body that can be moved, that is the same as one after the other. So the order of a cell's updates is that of its
+// batches, the same everywhere.
 //
-// Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever instructions it is
-// translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for AVX2 and for any, and the loader takes the one that fits.
-// The scalar update of src/solve/kernel.h remains for contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch
-// holds contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
+// Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever
+// instructions it is translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for
+// AVX2 and for any, and the loader takes the one that fits. The scalar update of src/solve/kernel.h remains for
+// contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch holds
+// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
 //
-// Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the contacts.
+// Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
+// contacts.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
@@ -22,9 +27,11 @@
 /// Are the contacts of this cell swept in batches?
 bool bt_batch_is_for(const bt_cell *cell);
 
-/// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that changes no more than `enough`, m/s. Updates so many times the list
-/// are counted in *done; the largest update of the first pass in *most. Returns how far it turned against its move, J.
-double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough, int64_t *done, double *most);
+/// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
+/// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
+/// first pass in *most. Returns how far it turned against its move, J.
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+                      int64_t *done, double *most);
 
 /// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
 void bt_batch_order(const bt_cell *cell, bt_idx *contact);

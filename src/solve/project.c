@@ -3,9 +3,9 @@
 //
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M⁻¹ J_nᵀ p with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction, in rounds over the points that push or overlap (rounds.h). Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart
-// does not press either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that
-// is not there (Metrikin 2014).
+// by the same rows without friction, in rounds over the points that push or overlap (rounds.h). Touching contacts (g2 ≥
+// −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
+// (Baumgarte) would add kinetic energy and load that is not there (Metrikin 2014).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,7 +36,8 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
 }
 
 /// How far point i is open beyond the slop, m.
-static double opening(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, const bt_vel *da, const bt_vel *db)
+static double opening(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, const bt_vel *da,
+                      const bt_vel *db)
 {
     return bt_normal_velocity(u, i, da, db) + g->after[i] + w->par.slop;
 }
@@ -95,14 +96,18 @@ static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     if (cell->n_list == 0) return;
     bt_moved moved;
     if (o->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; o->moves && j < cell->n_list; j++) bt_rounds_move(o, cell->gaps[cell->list[j]].push, cell->before[cell->list[j]], moved.y[j], 2);
-    for (bt_idx j = 0; j < cell->n_list; j++) push_contact(w, &cell->contacts[cell->list[j]], &cell->gaps[cell->list[j]], &t->most);
+    for (bt_idx j = 0; o->moves && j < cell->n_list; j++)
+        bt_rounds_move(o, cell->gaps[cell->list[j]].push, cell->before[cell->list[j]], moved.y[j], 2);
+    for (bt_idx j = 0; j < cell->n_list; j++)
+        push_contact(w, &cell->contacts[cell->list[j]], &cell->gaps[cell->list[j]], &t->most);
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->n_list);
     if (!o->moves) return;
     double against = 0;
     for (bt_idx j = 0; j < cell->n_list; j++) {
         const bt_idx u = cell->list[j];
-        for (int i = 0; i < 2; i++) against += bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->before[u][i], moved.y[j][i]);
+        for (int i = 0; i < 2; i++)
+            against +=
+                bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->before[u][i], moved.y[j][i]);
     }
     bt_moved_end(&moved, cell, o, against, t);
 }
@@ -130,13 +135,20 @@ void bt_solver_project(bt_world *w)
         if (k == ts->n - 1 || bt_cells_moves(ts, k))
             memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
     }
-    bt_problem p = {.look = look_at_cell, .sweep = push_cell, .vel = s->shift, .tolerance = 0.1 * w->par.slop, .cap = 0.9, .length = 25,
-                    .limit = (double)w->par.position_sweeps, .plain = w->par.plain_sweeps};
+    bt_problem p = {.look = look_at_cell,
+                    .sweep = push_cell,
+                    .vel = s->shift,
+                    .tolerance = 0.1 * w->par.slop,
+                    .cap = 0.9,
+                    .length = 25,
+                    .limit = (double)w->par.position_sweeps,
+                    .plain = w->par.plain_sweeps};
     bt_rounds_scale(&p, ts->heaviest);
     bt_work work = {0};
     bt_rounds_look(w, &p, false, &work);
     if (p.plain) // the reference, and what fields are shaken with: no look at the points, it ends with the updates
-        while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance)) work.residual = bt_rounds_sweep(w, &p, &work);
+        while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
+            work.residual = bt_rounds_sweep(w, &p, &work);
     else bt_rounds_run(w, &p, &work);
     st->position_sweeps = work.sweeps;
     st->projected = work.residual <= p.tolerance;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Islands of touching bodies, over ranks too, and the work of their contacts.
 //
-// An island is named by the least gid in it as its rank sees it. Where islands of several ranks meet in a body that both hold, the names
-// belong together: every rank gathers these few (name here, name there) links and joins them by the same union-find; works of
-// islands that reach over ranks are added as exact sums.
+// An island is named by the least gid in it as its rank sees it. Where islands of several ranks meet in a body that
+// both hold, the names belong together: every rank gathers these few (name here, name there) links and joins them by
+// the same union-find; works of islands that reach over ranks are added as exact sums.
 #include "solve/restitution.h"
 
 #include <math.h>
@@ -56,12 +56,14 @@ bool bt_restitution_begin(bt_world *w)
     if (!ts->rebounds) return false;
     double any = 0;
     for (bt_idx k = 0; k < ts->n && any == 0; k++)
-        for (bt_idx i = 0; i < ts->cell[k].n_contacts && any == 0; i++) any = b->restitution[ts->cell[k].contacts[i].b] > 0;
+        for (bt_idx i = 0; i < ts->cell[k].n_contacts && any == 0; i++)
+            any = b->restitution[ts->cell[k].contacts[i].b] > 0;
     bt_domain_maxima(w, &any, 1);
     if (any == 0) return false;
     // Contacts of an earlier detection in this step may still have the lowered restitution of its solution.
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; i < ts->cell[k].n_contacts; i++) bt_pack_bias(w, &ts->cell[k].contacts[i], &ts->cell[k].gaps[i], 1);
+        for (bt_idx i = 0; i < ts->cell[k].n_contacts; i++)
+            bt_pack_bias(w, &ts->cell[k].contacts[i], &ts->cell[k].gaps[i], 1);
 
     if (b->n > s->cap) {
         s->cap = b->n;

@@ -18,9 +18,9 @@
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
 
-// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a cell adds ends
-// at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one contact
-// at convergence, so that 10²⁷ times that still fits.
+// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What
+// a cell adds ends at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the
+// quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one contact at convergence, so that 10²⁷ times that still fits.
 void bt_rounds_scale(bt_problem *p, double heaviest)
 {
     const double energy = heaviest * p->tolerance * p->tolerance;
@@ -68,7 +68,8 @@ static void mark_block(bt_cells *t, int32_t x, int32_t y, double listed)
     }
 }
 
-/// Tell the value of each cell that has work, 1 or 0, to `take`, which spreads it to the cells around; on all ranks. Collective.
+/// Tell the value of each cell that has work, 1 or 0, to `take`, which spreads it to the cells around; on all ranks.
+/// Collective.
 static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
 {
     bt_cells *t = w->cells;
@@ -86,8 +87,9 @@ static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take
 static double has_list(const bt_cell *cell) { return cell->n_list > 0; }
 static double is_bad(const bt_cell *cell) { return cell->bad; }
 
-/// Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body always. Exactly
-/// these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the marks must not depend on ranks. Collective.
+/// Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body
+/// always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the
+/// marks must not depend on ranks. Collective.
 static void mark_swept(bt_world *w)
 {
     bt_cells *t = w->cells;
@@ -130,7 +132,8 @@ void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work
     lists_are_new(w);
 }
 
-// --- rounds over a part of the field -------------------------------------------------------------------------------------
+// --- rounds over a part of the field
+// -------------------------------------------------------------------------------------
 
 /// The cell at (x, y) is bad: its list and those beside it stay.
 static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
@@ -142,7 +145,8 @@ static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
         }
 }
 
-/// Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach anywhere and stay. Collective.
+/// Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach anywhere
+/// and stay. Collective.
 static void keep_near_bad(bt_world *w)
 {
     bt_cells *t = w->cells;
@@ -172,7 +176,8 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
         const bt_vel now = m->vel[i];
         if (beta > 0) {
             const bt_vel *before = &m->before[i];
-            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y), now.w + beta * (now.w - before->w), 0};
+            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y),
+                                 now.w + beta * (now.w - before->w), 0};
         }
         m->before[i] = now;
     }
@@ -224,7 +229,8 @@ static void move_on(bt_world *w, const bt_problem *p, double cap, momentum *m)
 }
 
 /// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
-static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m, bt_work *work)
+static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m,
+                      bt_work *work)
 {
     const double small = p->plain ? p->tolerance : BT_NEAR * p->tolerance;
     if (!on) *m = (momentum){.theta = 1};
@@ -269,7 +275,8 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
     momentum m = {.theta = 1};
     const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
-    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work); // between them no momentum
+    // between them no momentum
+    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {

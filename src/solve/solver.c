@@ -70,7 +70,8 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
         if (total == 0 && u->lt == 0) continue;
         t->most = 1;
         bt_vel va = v[u->a], vb = v[u->b];
-        bt_apply(u, total, u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1], u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1], u->lt, inv[u->a], inv[u->b], &va, &vb);
+        bt_apply(u, total, u->ln[0] * u->ran[0] + u->ln[1] * u->ran[1], u->ln[0] * u->rbn[0] + u->ln[1] * u->rbn[1],
+                 u->lt, inv[u->a], inv[u->b], &va, &vb);
         bt_store(&v[u->a], inv[u->a], &va);
         bt_store(&v[u->b], inv[u->b], &vb);
     }
@@ -79,8 +80,8 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
     bt_vel *towed = &v[bt_world_towed(w)];
     const bt_inv by = inv[bt_world_towed(w)];
     bt_tow_apply(line, towed, by);
-    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first sweep. So
-    // the line has its exact update in every step, not only in steps with sweeps.
+    // On a heavy body the residual of a tension that is newtons off, Δλ W, is below the tolerance before the first
+    // sweep. So the line has its exact update in every step, not only in steps with sweeps.
     if (warm) bt_tow_update(line, towed, by);
 }
 
@@ -102,7 +103,9 @@ static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
         bad += r > near;
         rows += u->n > 0 ? u->n + 1 : 2;
         const double *x = cell->before[i];
-        bool on = p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt; // or did before the last sweep
+        // or did before the last sweep
+        bool on =
+            p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
         if (u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) cell->list[cell->n_list++] = i;
@@ -123,11 +126,12 @@ static void free_velocities(bt_world *w, bt_idx k, const void *context, bt_total
     (void)context, (void)t;
     const bt_cell *cell = &w->cells->cell[k];
     bt_bodies *b = &w->bodies;
-    if (k == w->cells->n - 1 || w->cells->awake[k]) memcpy(b->vel + cell->first, b->vel_free + cell->first, (size_t)(cell->end - cell->first) * sizeof *b->vel);
+    if (k == w->cells->n - 1 || w->cells->awake[k])
+        memcpy(b->vel + cell->first, b->vel_free + cell->first, (size_t)(cell->end - cell->first) * sizeof *b->vel);
 }
 
-/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up. True when some impulse on this
-/// rank is not zero.
+/// Velocities U* + M⁻¹ Jᵀ λ from scratch, so that what increments have rounded away does not build up. True when some
+/// impulse on this rank is not zero.
 static bool form_velocities(bt_world *w, bool warm)
 {
     bt_phases_everywhere(w, free_velocities, NULL);
@@ -177,8 +181,8 @@ static double contacts_against(const bt_cell *cell, double (*y)[3])
     for (bt_idx j = 0; j < cell->n_list; j++) {
         const bt_contact *u = &cell->contacts[cell->list[j]];
         const double *x = cell->before[cell->list[j]];
-        sum += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) + bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) +
-               bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
+        sum += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
+               bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
     }
     return sum;
 }
@@ -187,7 +191,8 @@ static void sweep_in_batches(bt_world *w, bt_cell *cell, const bt_sweep *o, bt_t
 {
     int64_t done = 0;
     double most = 0;
-    const double against = bt_batch_sweep(cell, w->bodies.vel, w->bodies.inv, o, w->par.inner_sweeps, ENOUGH * o->problem->tolerance, &done, &most);
+    const double against = bt_batch_sweep(cell, w->bodies.vel, w->bodies.inv, o, w->par.inner_sweeps,
+                                          ENOUGH * o->problem->tolerance, &done, &most);
     t->most = bt_max(t->most, most);
     cell->updates += done;
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
@@ -210,12 +215,14 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     if (o->moves) {
         bt_moved_begin(&moved, cell);
         move_contacts(o, cell, moved.y);
-        for (int c = 0; line && c < line->n_branches; c++) bt_rounds_move(o, &line->branch[c].lambda, &w->solver->line_before[c], &line_y[c], 1);
+        for (int c = 0; line && c < line->n_branches; c++)
+            bt_rounds_move(o, &line->branch[c].lambda, &w->solver->line_before[c], &line_y[c], 1);
     }
     int64_t times = 0;
     double most = INFINITY;
     for (; times < w->par.inner_sweeps || times == 0; times++) {
-        if (most <= ENOUGH * o->problem->tolerance) break; // more would be for nothing until the neighbours have changed
+        // more would be for nothing until the neighbours have changed
+        if (most <= ENOUGH * o->problem->tolerance) break;
         most = update_list(cell, v, w->bodies.inv);
         if (line) most = bt_max(most, bt_tow_update(line, towed, w->bodies.inv[bt_world_towed(w)]));
         if (times == 0) t->most = bt_max(t->most, most);
@@ -232,8 +239,15 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 static bt_problem contact_problem(const bt_world *w)
 {
     bt_problem p = {
-        .look = look_at_cell, .sweep = sweep_cell, .settle = settle, .vel = w->bodies.vel, .tolerance = w->par.tolerance, .cap = 0.9, .length = 50,
-        .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES), .plain = w->par.plain_sweeps,
+        .look = look_at_cell,
+        .sweep = sweep_cell,
+        .settle = settle,
+        .vel = w->bodies.vel,
+        .tolerance = w->par.tolerance,
+        .cap = 0.9,
+        .length = 50,
+        .limit = (double)w->par.max_sweeps * (w->par.plain_sweeps ? 1 : UPDATES),
+        .plain = w->par.plain_sweeps,
     };
     bt_rounds_scale(&p, w->cells->heaviest);
     return p;
@@ -292,7 +306,8 @@ void bt_solver_solve(bt_world *w)
     bt_solver *s = w->solver;
     bt_step_stats *st = &w->stats;
     st->restitution_cut = false;
-    s->shifted = false; // the displacements of the last step are over, and their array is of the bodies that were here then
+    // the displacements of the last step are over, and their array is of the bodies that were here then
+    s->shifted = false;
     s->prepare_s = 0;
     st->sweeps = st->unit_updates = st->unit_moves = 0;
     const double t0 = bt_clock();

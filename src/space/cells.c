@@ -11,7 +11,8 @@
 #include "space/exchange.h"
 #include "space/margin.h"
 
-#define CELL_DIAMETERS 5.0 // least side of a cell by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
+#define CELL_DIAMETERS                                                                                                 \
+    5.0 // least side of a cell by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
 
 bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
@@ -33,7 +34,8 @@ void bt_cells_free(bt_cells *t)
 {
     if (!t) return;
     for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
-    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->asleep, t->awake, t->busy, t->is_busy, t->order, t->share, t->cell, t};
+    void *arrays[] = {t->at,   t->speed,   t->bound, t->moved, t->asleep, t->awake,
+                      t->busy, t->is_busy, t->order, t->share, t->cell,   t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
@@ -127,8 +129,8 @@ double bt_cells_outside(const bt_world *w, bt_idx i)
     return out;
 }
 
-/// Side of the cells along one direction. Around a period their number is even, or the colours would meet at the seam; below
-/// four the block of a cell would meet itself, and one cell takes the whole period.
+/// Side of the cells along one direction. Around a period their number is even, or the colours would meet at the seam;
+/// below four the block of a cell would meet itself, and one cell takes the whole period.
 static double side_along(double side, double period, int32_t *wrap)
 {
     *wrap = 0;
@@ -174,7 +176,8 @@ static void choose(bt_world *w, double margin)
     const bool any = most[0] + most[2] >= 0;
     t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
     t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
-    double side = bt_max((w->par.cell > 0 ? w->par.cell : CELL_DIAMETERS) * w->par.size, 2 * t->reach + t->margin_max + 0.5 * w->par.size);
+    double side = bt_max((w->par.cell > 0 ? w->par.cell : CELL_DIAMETERS) * w->par.size,
+                         2 * t->reach + t->margin_max + 0.5 * w->par.size);
     if (!(side > 0)) side = 1;
     for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 cells a floe, by larger cells
         t->side_x = side_along(side, w->par.period_x, &t->wrap_x);
@@ -246,9 +249,11 @@ static void permute(bt_bodies *b, const sort_key *key)
     for (size_t i = 0; i < n; i++) offset[i + 1] = offset[i] + (b->offset[key[i].from + 1] - b->offset[key[i].from]);
     for (int k = 0; k < bt_n_vertex_fields; k++) {
         const size_t size = bt_vertex_fields[k].size;
-        char **array = (char **)((char *)b + bt_vertex_fields[k].array), *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
+        char **array = (char **)((char *)b + bt_vertex_fields[k].array),
+             *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size, size * (size_t)(offset[i + 1] - offset[i]));
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size,
+                   size * (size_t)(offset[i + 1] - offset[i]));
         free(*array);
         *array = new;
     }
@@ -407,7 +412,8 @@ void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
     if (n > 0) qsort(trace, (size_t)n, sizeof *trace, bt_memory_by_names);
     for (int64_t k = 0; k < n; k++) {
         const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
-        if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
+        // a floe that has shot so far away from a large body that its rank does not hold it any more
+        if (a < 0 || b < 0) continue;
         bt_cell *cell = &t->cell[bt_cells_of_pair(w, a, b)];
         if (trace[k].law != 0) {
             bt_cells_remember(cell, &trace[k]);
@@ -418,7 +424,8 @@ void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
             cell->pairs = bt_realloc(cell->pairs, (size_t)cell->cap_pairs, sizeof *cell->pairs);
         }
         bt_pair *p = &cell->pairs[cell->n_pairs++];
-        *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
+        *p = (bt_pair){
+            .a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
         memcpy(p->part, trace[k].part, sizeof p->part);
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
         memcpy(p->ln, trace[k].value, sizeof p->ln);
@@ -431,10 +438,14 @@ static bool adjacent(int32_t p, int32_t q, int32_t n)
     return d <= 1 || n == 1 || (n > 1 && d == n - 1);
 }
 
-bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]) { return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y); }
+bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2])
+{
+    return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y);
+}
 
-/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the margin they had (the
-/// last solution may be one that did not converge). No cell has both in its block, and no rank may hold both.
+/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
+/// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
+/// hold both.
 static void drop_parted(const bt_world *w, bt_memory *trace, int64_t *n)
 {
     const bt_bodies *b = &w->bodies;
@@ -447,7 +458,8 @@ static void drop_parted(const bt_world *w, bt_memory *trace, int64_t *n)
     *n = kept;
 }
 
-/// Bodies to their ranks and places under the labels they have, and cells around them with these traces, which are released.
+/// Bodies to their ranks and places under the labels they have, and cells around them with these traces, which are
+/// released.
 static void place(bt_world *w, bt_memory *trace, int64_t n)
 {
     bt_cells *t = w->cells;

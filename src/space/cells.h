@@ -1,34 +1,38 @@
 // SPDX-License-Identifier: MIT
 // Cells: the division of space that orders the contacts, colours them, and is dealt to threads and ranks.
 //
-// Space is cut into square cells, some floe diameters wide. A floe carries the coordinates (tx, ty) of the cell that its
-// centroid was in when labels were last renewed. A contact of bodies a and b belongs to cell
+// Space is cut into square cells, some floe diameters wide. A floe carries the coordinates (tx, ty) of the cell that
+// its centroid was in when labels were last renewed. A contact of bodies a and b belongs to cell
 //     T = (min(tx_a, tx_b), min(ty_a, ty_b)),
 // so T touches only bodies of the 2×2 block {T, T+x, T+y, T+xy}, provided that bodies within reach of each other are in
-// adjacent cells. This holds while side >= 2 r + margin + 2 a: r the largest radius, a how far a centroid may stand outside its
-// cell. When some floe stands farther out, all labels are renewed (and floes sorted, and moved to their ranks).
+// adjacent cells. This holds while side >= 2 r + margin + 2 a: r the largest radius, a how far a centroid may stand
+// outside its cell. When some floe stands farther out, all labels are renewed (and floes sorted, and moved to their
+// ranks).
 //
 // Cells whose coordinates have the same parity touch disjoint blocks: four colours, always, whatever the contacts.
-// A Gauss–Seidel sweep goes through the colours; the cells of a colour are done at once by threads and ranks, the contacts of a
-// cell one after the other, in an order that follows from gids. So the sequence of updates as any body sees it is the
-// same for every division among threads and ranks. Why not a colouring of the contact graph (first tried): 8 to 12
-// colours and as many barriers and exchanges a sweep, tail colours of a few contacts, rows of one colour scattered
-// over all memory, and colours that depend on each other through all ranks. A cell's floes and rows stay in the first-level
-// cache while it is swept, may be swept more than once at that price, and its partial sums are formed in a fixed order.
+// A Gauss–Seidel sweep goes through the colours; the cells of a colour are done at once by threads and ranks, the
+// contacts of a cell one after the other, in an order that follows from gids. So the sequence of updates as any body
+// sees it is the same for every division among threads and ranks. Why not a colouring of the contact graph (first
+// tried): 8 to 12 colours and as many barriers and exchanges a sweep, tail colours of a few contacts, rows of one
+// colour scattered over all memory, and colours that depend on each other through all ranks. A cell's floes and rows
+// stay in the first-level cache while it is swept, may be swept more than once at that price, and its partial sums are
+// formed in a fixed order.
 //
-// Contacts with a large movable body (the berg on a line has hundreds) belong to one last cell, done in sequence after the
-// four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on every rank.
+// Contacts with a large movable body (the berg on a line has hundreds) belong to one last cell, done in sequence after
+// the four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on
+// every rank.
 //
-// Rest. A cell T is idle, and costs nothing, when every floe in its block and in a ring of cells around it has exactly the
-// velocity of the water, there is no other force (bt_forces_rest), no large body that moves is near, and the position projection
-// moved nothing there in the last step. So a floe costs nothing until it is touched; one that was touched slows down by its quadratic drag and
-// never comes quite to rest. The ring is there because contacts hand motion on within a step; what goes farther still is
-// caught after the solve (step.c).
+// Rest. A cell T is idle, and costs nothing, when every floe in its block and in a ring of cells around it has exactly
+// the velocity of the water, there is no other force (bt_forces_rest), no large body that moves is near, and the
+// position projection moved nothing there in the last step. So a floe costs nothing until it is touched; one that was
+// touched slows down by its quadratic drag and never comes quite to rest. The ring is there because contacts hand
+// motion on within a step; what goes farther still is caught after the solve (step.c).
 //
-// A step goes over the list of busy cells alone: those that are not at rest, those that are not idle, and those whose bodies may be moved by a
-// contact that was found. Cells enter the list where they are woken (something moves near, forces have changed, labels are new) and leave it when they are
-// none of these. Everything in the others is as it was, and their part of every sum is zero. Floes that drift with moving water are
-// moved in every step: then all cells are busy.
+// A step goes over the list of busy cells alone: those that are not at rest, those that are not idle, and those whose
+// bodies may be moved by a contact that was found. Cells enter the list where they are woken (something moves near,
+// forces have changed, labels are new) and leave it when they are none of these. Everything in the others is as it was,
+// and their part of every sum is zero. Floes that drift with moving water are moved in every step: then all cells are
+// busy.
 #ifndef BERGTOW_CELLS_H
 #define BERGTOW_CELLS_H
 
@@ -37,7 +41,8 @@
 #include "bergtow/sum.h"
 #include "bergtow/world.h"
 
-enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES }; ///< the fifth phase is the cell of the large movable bodies
+/// the fifth phase is the cell of the large movable bodies
+enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
 
 /// A pair near enough to be looked at, and what its contact was in the last step.
 typedef struct bt_pair {
@@ -47,11 +52,12 @@ typedef struct bt_pair {
     int32_t n_points;    ///< contact points in the last solution
     uint32_t feature[2]; ///< of those
     double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
-    double reach;        ///< gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
+    /// gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
+    double reach;
 } bt_pair;
 
-/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line along the tangent, so both have the
-/// same tangential row.
+/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line
+/// along the tangent, so both have the same tangential row.
 typedef struct bt_contact {
     bt_idx a, b;
     double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
@@ -101,7 +107,8 @@ typedef struct bt_cell {
     bool listed;                    ///< the list is valid for margin_listed
     double margin_listed;           ///< m
     double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
-    bt_idx *near;                   ///< [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    /// [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    bt_idx *near;
     bt_idx n_near, cap_near;
     bool near_known;                ///< they are those of the list
     double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
@@ -113,7 +120,8 @@ typedef struct bt_cell {
     double overlap;                 ///< deepest, m
     // contact laws (contact/law.h)
     struct bt_limit *limits;        ///< [n_contacts] bounds of the contacts; NULL where contacts are rigid
-    bt_memory *memory;               ///< [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
+    /// [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
+    bt_memory *memory;
     bt_idx cap_limits, n_memory, cap_memory;
     bool rising;                    ///< some bounds have a rising part
     // contacts that are swept (src/solve/rounds.h)
@@ -151,24 +159,28 @@ typedef struct bt_cells {
     bool rebounds;                  ///< some body has a restitution
     double margin_max;              ///< largest margin that these cells allow, m
     int32_t low_x, low_y, n_x, n_y; ///< the box of cells that hold floes
-    int32_t wrap_x, wrap_y;         ///< cells around a periodic direction, 0 = open; 1 = one cell, its own neighbour nowhere
+    /// cells around a periodic direction, 0 = open; 1 = one cell, its own neighbour nowhere
+    int32_t wrap_x, wrap_y;
     bt_cell *cell;                  ///< [n] last: the large bodies
     bt_idx n, cap;
     bt_idx *at;                     ///< [n_y][n_x] index of a cell, −1 = not on this rank
     int64_t cap_at;
     bt_idx n_in_cells;                 ///< bodies in cells: storage [0, n_in_cells); large and everywhere after them
     // every step
-    double *speed;                  ///< [n] largest speed of the cell's bodies through the water's frame, m/s; 0 = all at rest
+    /// [n] largest speed of the cell's bodies through the water's frame, m/s; 0 = all at rest
+    double *speed;
     double *bound;                  ///< [n] speed that the margin of cell T is made for, m/s
     double *moved;                  ///< [n] path length that no body of the cell exceeds, m; grows only
     double moved_any;               ///< the same for any body in a cell
-    uint8_t *asleep;                  ///< [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
+    /// [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
+    uint8_t *asleep;
     uint8_t *awake;                 ///< [n] contacts of this step may move the cell's bodies
     bt_idx *busy;                   ///< [n_busy] cells that a step looks at, ascending; the last cell is always one
     bt_idx n_busy;
     uint8_t *is_busy;               ///< [n]
     bool busy_sorted;
-    bt_idx *order;                  ///< [n_order] cells of this rank with work, by phase, in each those at the border of the rank first
+    /// [n_order] cells of this rank with work, by phase, in each those at the border of the rank first
+    bt_idx *order;
     bt_idx n_order;
     bt_idx start[BT_PHASES + 1];    ///< first cell of each phase in the order
     bt_idx n_border[BT_PHASES];     ///< cells at the border among those of each phase
@@ -186,7 +198,8 @@ void bt_cells_free(bt_cells *t);
 /// At the start of a step: renew labels, storage and cells if some floe has left its cell too far. Collective.
 void bt_cells_begin(bt_world *w);
 
-/// The same if the cells are too small for this margin, m. True when renewed: every index of a body has changed. Collective.
+/// The same if the cells are too small for this margin, m. True when renewed: every index of a body has changed.
+/// Collective.
 bool bt_cells_update(bt_world *w, double margin);
 
 /// Cell k, or every cell, is looked at from now on.
@@ -217,10 +230,12 @@ int bt_memory_by_names(const void *p, const void *q);
 /// Append a record to the memory of a cell.
 void bt_cells_remember(bt_cell *t, const bt_memory *r);
 
-/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller frees.
+/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
+/// frees.
 bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
-/// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds, have been set, and the
-/// traces [n], which are released, are those of all ranks. A domain has been created, but nothing is dealt yet.
+/// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
+/// have been set, and the traces [n], which are released, are those of all ranks. A domain has been created, but
+/// nothing is dealt yet.
 void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n);
 /// Put traces, in any order, into the pair lists of empty cells.
 void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n);

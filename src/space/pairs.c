@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // Broad phase: the list of a cell's pairs near enough to be looked at, kept over many steps.
 //
-// Boxes of the bodies of the cell's block are compared all with all; a cell has some dozens, and comparing boxes that lie in a row in
-// memory is quicker than any finer grid. The list holds while no body of the block has travelled (path of its fastest point) farther than
-// its share of the clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
-// floes of the cell itself; one that can be moved has its pairs in the last cell.
+// Boxes of the bodies of the cell's block are compared all with all; a cell has some dozens, and comparing boxes that
+// lie in a row in memory is quicker than any finer grid. The list holds while no body of the block has travelled (path
+// of its fastest point) farther than its share of the clearance; then it is made anew. A large body that cannot be
+// moved (a wall, a berg at a set speed) pairs with the floes of the cell itself; one that can be moved has its pairs in
+// the last cell.
 //
-// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so far towards each
-// other, a step looks at these near ones alone.
+// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
+// far towards each other, a step looks at these near ones alone.
 #include "space/pairs.h"
 
 #include <math.h>
@@ -42,10 +43,14 @@ static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double bo
     }
 }
 
-static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX]) { box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box); }
+static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX])
+{
+    box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box);
+}
 
-/// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the nearest image
-/// of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole period.
+/// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the
+/// nearest image of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole
+/// period.
 static inline bool near(const bt_params *p, const double *a, const double *b, double clearance)
 {
     const double dx = bt_nearest_image(b[X] - a[X], p->period_x), dy = bt_nearest_image(b[Y] - a[Y], p->period_y);
@@ -55,8 +60,10 @@ static inline bool near(const bt_params *p, const double *a, const double *b, do
 
 static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int part_a, int part_b)
 {
-    if (*n == s->cap_found) s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
-    s->found[(*n)++] = (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
+    if (*n == s->cap_found)
+        s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
+    s->found[(*n)++] =
+        (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
 }
 
 /// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
@@ -100,20 +107,23 @@ static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t 
     return n;
 }
 
-static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, size_t j0, size_t j1, double clearance, size_t *n)
+static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, size_t j0, size_t j1, double clearance,
+                  size_t *n)
 {
     for (size_t i = i0; i < i1; i++)
         for (size_t j = j0 == i0 ? i + 1 : j0; j < j1; j++)
-            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance)) append(w, s, n, s->body[i], s->body[j], clearance);
+            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
+                append(w, s, n, s->body[i], s->body[j], clearance);
 }
 
-static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, double clearance, double clearance_large, bt_pair_scratch *s)
+static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, double clearance, double clearance_large,
+                             bt_pair_scratch *s)
 {
     const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
-    const size_t own = add_boxes(w, k, s, 0), right = add_boxes(w, t->right, s, own), above = add_boxes(w, t->above, s, right),
-                 diagonal = add_boxes(w, t->diagonal, s, above);
+    const size_t own = add_boxes(w, k, s, 0), right = add_boxes(w, t->right, s, own),
+                 above = add_boxes(w, t->above, s, right), diagonal = add_boxes(w, t->diagonal, s, above);
     among(w, s, 0, own, 0, own, clearance, &n);
     among(w, s, 0, own, own, diagonal, clearance, &n);
     among(w, s, own, right, right, above, clearance, &n);
@@ -122,7 +132,8 @@ static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, doub
         double box[N_BOX];
         box_of(b, l, box);
         for (size_t i = 0; i < own; i++)
-            if (near(&w->par, box, s->box + N_BOX * i, clearance_large)) append(w, s, &n, l, s->body[i], clearance_large);
+            if (near(&w->par, box, s->box + N_BOX * i, clearance_large))
+                append(w, s, &n, l, s->body[i], clearance_large);
     }
     return n;
 }
@@ -149,8 +160,12 @@ bt_cell_range bt_pairs_range(const bt_world *w, bt_idx i, double pad)
     if (t->wrap_y && r.y1 - r.y0 >= t->wrap_y - 1) r.y0 = 0, r.y1 = t->wrap_y - 1;
     if (t->wrap_x == 1) r.x0 = r.x1 = 0;
     if (t->wrap_y == 1) r.y0 = r.y1 = 0;
-    if (!t->wrap_x) r.x0 = r.x0 > t->low_x - 2 ? r.x0 : t->low_x - 2, r.x1 = r.x1 < t->low_x + t->n_x + 1 ? r.x1 : t->low_x + t->n_x + 1;
-    if (!t->wrap_y) r.y0 = r.y0 > t->low_y - 2 ? r.y0 : t->low_y - 2, r.y1 = r.y1 < t->low_y + t->n_y + 1 ? r.y1 : t->low_y + t->n_y + 1;
+    if (!t->wrap_x)
+        r.x0 = r.x0 > t->low_x - 2 ? r.x0 : t->low_x - 2,
+        r.x1 = r.x1 < t->low_x + t->n_x + 1 ? r.x1 : t->low_x + t->n_x + 1;
+    if (!t->wrap_y)
+        r.y0 = r.y0 > t->low_y - 2 ? r.y0 : t->low_y - 2,
+        r.y1 = r.y1 < t->low_y + t->n_y + 1 ? r.y1 : t->low_y + t->n_y + 1;
     return r;
 }
 
@@ -175,7 +190,8 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
                 if (k < 0) continue;
                 const size_t end = add_boxes(w, k, s, 0);
                 for (size_t i = 0; i < end; i++)
-                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small)) append(w, s, &n, l, s->body[i], clearance_small);
+                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small))
+                        append(w, s, &n, l, s->body[i], clearance_small);
             }
     }
     return n;
@@ -258,7 +274,8 @@ void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_s
     for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->moved_listed[i] > 0.5 * skin;
     if (!stale) return;
     const double large = margin + 0.5 * skin + 0.5 * skin_large;
-    const size_t n = last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
+    const size_t n =
+        last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
     replace(w, t, s, n);
     t->listed = true;
     t->margin_listed = margin;

@@ -17,7 +17,8 @@ typedef struct bt_pair_scratch {
 /// Make the list of cell k, kept in t, anew unless it holds for this margin.
 void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_scratch *s);
 
-/// Do the near pairs of cell k hold for this margin? If not, they are to be found anew: clears them, and keeps what has moved by now.
+/// Do the near pairs of cell k hold for this margin? If not, they are to be found anew: clears them, and keeps what has
+/// moved by now.
 bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin);
 /// Pair i is near when it has less than this between its bodies beyond the margin, m.
 double bt_pairs_near_gap(const bt_world *w);

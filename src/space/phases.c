@@ -25,7 +25,8 @@ static bool has_work(const bt_world *w, bt_idx k)
     return t->cell[k].own && (t->cell[k].n_contacts > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
-/// Stretches of cells [begin, end) of the order with equal parts of the listed contacts, one a share. A cell itself costs something, too.
+/// Stretches of cells [begin, end) of the order with equal parts of the listed contacts, one a share. A cell itself
+/// costs something, too.
 static void deal_stretch(bt_cells *t, bt_idx begin, bt_idx end, bt_share *share)
 {
     enum { CELL = 4 }; // contacts
@@ -100,10 +101,12 @@ typedef struct {
 
 static void open_shares(bt_cells *t)
 {
-    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++) atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
+    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++)
+        atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
 }
 
-/// Cells of one stretch of the order, which share no body: first those of this thread's share, then what others have not yet taken.
+/// Cells of one stretch of the order, which share no body: first those of this thread's share, then what others have
+/// not yet taken.
 static void visit_stretch(pass *o, int stretch)
 {
     bt_cells *t = o->w->cells;

@@ -28,8 +28,8 @@ static double wrap(double x, double low, double period, int32_t *lap)
     return x;
 }
 
-/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there only for cells
-/// that contacts may move: for others their array still holds what it held, maybe of other bodies.
+/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there
+/// only for cells that contacts may move: for others their array still holds what it held, maybe of other bodies.
 static double move(bt_world *w, bt_idx i, bool shifted)
 {
     bt_bodies *b = &w->bodies;
@@ -70,7 +70,8 @@ static bool at_rest(const bt_world *w, const bt_cell *t)
 {
     const bt_bodies *b = &w->bodies;
     for (bt_idx i = t->first; i < t->end; i++)
-        if (b->disturbed[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0) return false;
+        if (b->disturbed[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0)
+            return false;
     return true;
 }
 
@@ -100,7 +101,8 @@ static void advance(bt_world *w)
         if (!last) farthest = bt_max(farthest, path);
         if (!moves || last) continue;
         if (!calm || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
-        else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW; // where forces have been told, they would find what they found
+        // where forces have been told, they would find what they found
+        else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
     }
     ts->moved_any += farthest;
     bt_domain_maxima(w, &out, 1);
@@ -243,7 +245,8 @@ void bt_world_step(bt_world *w)
     bt_window_begin(w);
     bt_cells_begin(w);
     clock_phase(w, &st->detect_s, &t0);
-    if (w->tow) memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
+    if (w->tow)
+        memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     clock_phase(w, &st->forces_s, &t0);

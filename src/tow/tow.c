@@ -19,10 +19,12 @@ void bt_tow_free(bt_tow *t)
 
 double bt_tow_speed(const bt_tow *t, double time)
 {
-    return bt_speed_law_at(&(bt_speed_law){.speed = t->speed, .ramp = t->ramp, .programme = t->programme, .n = t->n_programme}, time);
+    return bt_speed_law_at(
+        &(bt_speed_law){.speed = t->speed, .ramp = t->ramp, .programme = t->programme, .n = t->n_programme}, time);
 }
 
-/// Course and speed that lead from (x, y) to where the path is one step further; on the course of the path while it stands still.
+/// Course and speed that lead from (x, y) to where the path is one step further; on the course of the path while it
+/// stands still.
 static void follow_path(bt_tow *t, double x, double y)
 {
     double to[2], tangent[2];

@@ -23,7 +23,8 @@ static void plain_sum(int n, const double *v, double form, double rx, double ry,
     enum { PIECES = 4000 };
     f[0] = f[1] = f[2] = 0;
     for (int k = 0; k < n; k++) {
-        const double *p = v + 2 * k, *q = v + 2 * ((k + 1) % n), ex = (q[0] - p[0]) / PIECES, ey = (q[1] - p[1]) / PIECES;
+        const double *p = v + 2 * k, *q = v + 2 * ((k + 1) % n), ex = (q[0] - p[0]) / PIECES,
+                     ey = (q[1] - p[1]) / PIECES;
         for (int j = 0; j < PIECES; j++) {
             const double x = p[0] + (j + 0.5) * ex, y = p[1] + (j + 0.5) * ey, vx = rx + w * y, vy = ry - w * x;
             const double g = form * bt_max(0, -(vx * ey - vy * ex));
@@ -61,7 +62,8 @@ static void force_and_moment_are_the_integral(void **state)
         random_outline(&rng, n, v);
         bt_body_def d = scene_prism(n, v, 10);
         d.motion = BT_KINEMATIC, d.large = true, d.drag = (bt_drag){.water_form = 7, .air_form = 0.3};
-        d.vx = scene_uniform(&rng) - 0.5, d.vy = scene_uniform(&rng) - 0.5, d.yaw_rate = trial % 4 ? scene_uniform(&rng) - 0.5 : 0;
+        d.vx = scene_uniform(&rng) - 0.5, d.vy = scene_uniform(&rng) - 0.5,
+        d.yaw_rate = trial % 4 ? scene_uniform(&rng) - 0.5 : 0;
         bt_world *w = one_body(0.5, &d);
         w->par.water_u = 0.2, w->par.air_v = -3;
         const bt_impulse e = drag_of(w);
@@ -80,7 +82,8 @@ static void force_and_moment_are_the_integral(void **state)
 static void a_bay_is_passed_by(void **state)
 {
     (void)state;
-    double bay[] = {-3, -1, 3, -1, 3, 2, 1, 2, 0, -0.5, -1, 2, -3, 2}, hull[] = {-3, -1, 3, -1, 3, 2, 1, 2, -1, 2, -3, 2};
+    double bay[] = {-3, -1, 3, -1, 3, 2, 1, 2, 0, -0.5, -1, 2, -3, 2},
+           hull[] = {-3, -1, 3, -1, 3, 2, 1, 2, -1, 2, -3, 2};
     bt_moments m = bt_shape_moments(7, bay);
     bt_shape_centre(7, bay);
     for (int k = 0; k < 6; k++) hull[2 * k] -= m.cx, hull[2 * k + 1] -= m.cy;
@@ -89,15 +92,25 @@ static void a_bay_is_passed_by(void **state)
         for (double heading = 0; heading < 6; heading += 0.7) {
             double f[3];
             const double vx = 0.4 * cos(heading), vy = 0.4 * sin(heading), w = turn ? 0.1 : 0;
-            bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = 7, .vertices = bay, .parts = &parts, .vx = vx, .vy = vy, .yaw_rate = w, .mass = 1,
-                             .inertia = 1, .drag = {.water_form = 7}};
+            bt_body_def d = {.motion = BT_KINEMATIC,
+                             .large = true,
+                             .n_vertices = 7,
+                             .vertices = bay,
+                             .parts = &parts,
+                             .vx = vx,
+                             .vy = vy,
+                             .yaw_rate = w,
+                             .mass = 1,
+                             .inertia = 1,
+                             .drag = {.water_form = 7}};
             bt_world *a = one_body(1, &d);
             const bt_impulse e = drag_of(a);
             plain_sum(6, hull, 7, -vx, -vy, w, f);
             CHECK_CLOSE(e.x, f[0], 1e-6);
             CHECK_CLOSE(e.y, f[1], 1e-6);
             CHECK_CLOSE(e.turn, f[2], 1e-6);
-            if (!turn) CHECK_CLOSE(hypot(e.x, e.y), 7 * 0.16 * bt_shape_width(7, bay, cos(heading), sin(heading)), 1e-13);
+            if (!turn)
+                CHECK_CLOSE(hypot(e.x, e.y), 7 * 0.16 * bt_shape_width(7, bay, cos(heading), sin(heading)), 1e-13);
             bt_world_free(a);
         }
 }
@@ -118,8 +131,10 @@ static void drag_never_reverses(void **state)
         bt_world *w = one_body(pow(10, 8 * scene_uniform(&rng) - 3), &d);
         bt_world_step(w); // nothing to touch
         const bt_vel *a = &w->bodies.vel_start[0], *b = &w->bodies.vel[0];
-        const double m = w->bodies.mass[0], i = w->bodies.inertia[0], before = m * (a->x * a->x + a->y * a->y) + i * a->w * a->w;
-        const double along = m * (a->x * b->x + a->y * b->y) + i * a->w * b->w, after = m * (b->x * b->x + b->y * b->y) + i * b->w * b->w;
+        const double m = w->bodies.mass[0], i = w->bodies.inertia[0],
+                     before = m * (a->x * a->x + a->y * a->y) + i * a->w * a->w;
+        const double along = m * (a->x * b->x + a->y * b->y) + i * a->w * b->w,
+                     after = m * (b->x * b->x + b->y * b->y) + i * b->w * b->w;
         assert_true(along >= 0 && after <= along * (1 + 1e-12) && along < before);
         bt_world_free(w);
     }
@@ -149,7 +164,8 @@ static void added_mass_takes_no_part(void **state)
     for (int s = 0; s < 2000; s++) {
         bt_world_step(w);
         for (int k = 0; k < 100; k++) {
-            const double dt = 5e-3, x = along - 0.5 * dt * 0.6 * 1.4e-4 * across - 0.5 * dt * 0.6e-4, y = across + 0.5 * dt * 0.6 * 1.4e-4 * along;
+            const double dt = 5e-3, x = along - 0.5 * dt * 0.6 * 1.4e-4 * across - 0.5 * dt * 0.6e-4,
+                         y = across + 0.5 * dt * 0.6 * 1.4e-4 * along;
             along += dt * 0.6 * (-1.4e-4 * y - 1e-4);
             across += dt * 0.6 * 1.4e-4 * x;
         }
@@ -196,7 +212,8 @@ static void free_drift_stays(void **state)
             CHECK_CLOSE(w->bodies.vel[0].x, u[0], 1e-9 * scale);
             CHECK_CLOSE(w->bodies.vel[0].y, u[1], 1e-9 * scale);
         } else assert_true(u[0] == 0 && u[1] == 0);
-        const bool calm = trial % 5 == 0 && !(trial & 2) && (!(trial & 1) || (trial & 4)) && (d.drag.water_skin > 0 || d.drag.water_form > 0);
+        const bool calm = trial % 5 == 0 && !(trial & 2) && (!(trial & 1) || (trial & 4)) &&
+                          (d.drag.water_skin > 0 || d.drag.water_form > 0);
         if (calm) assert_true(u[0] == p.water_u && u[1] == p.water_v);
         const bool wall[2] = {true, false};
         assert_true(bt_drift_velocity(w, 0, wall, u) && u[0] == 0);
@@ -207,8 +224,11 @@ static void free_drift_stays(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(force_and_moment_are_the_integral), cmocka_unit_test(a_bay_is_passed_by), cmocka_unit_test(drag_never_reverses),
-        cmocka_unit_test(added_mass_takes_no_part),          cmocka_unit_test(free_drift_stays),
+        cmocka_unit_test(force_and_moment_are_the_integral),
+        cmocka_unit_test(a_bay_is_passed_by),
+        cmocka_unit_test(drag_never_reverses),
+        cmocka_unit_test(added_mass_takes_no_part),
+        cmocka_unit_test(free_drift_stays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

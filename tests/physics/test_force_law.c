@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A force law from outside the program: the one of docs/how-to-add-a-force-law.md, and a spring that depends on the place. Registered once, each takes part
-// in tow force, momentum balance, rest, free drift, the undisturbed ice of a moving window, series, summary and resume, without a line there.
+// A force law from outside the program: the one of docs/how-to-add-a-force-law.md, and a spring that depends on the
+// place. Registered once, each takes part in tow force, momentum balance, rest, free drift, the undisturbed ice of a
+// moving window, series, summary and resume, without a line there.
 //
-// Red with (tried): the law left out of one of those loops (prediction, record, drift, window); the sum of forces of observe.c taken over drag, Coriolis and
-// tilt alone; the implicit part of the record with U1 in place of U2; the rest of floes without asking laws that are added; the column of the law not in
-// the checkpoint; the wrapped place of the towed body.
+// Red with (tried): the law left out of one of those loops (prediction, record, drift, window); the sum of forces of
+// observe.c taken over drag, Coriolis and tilt alone; the implicit part of the record with U1 in place of U2; the rest
+// of floes without asking laws that are added; the column of the law not in the checkpoint; the wrapped place of the
+// towed body.
 #include "scene.h"
 
 #include <stdio.h>
@@ -20,7 +22,8 @@
 
 #include "examples/force_law.c"
 
-// --- a spring that holds the towed body at x = 0, y = 0 ---------------------------------------------------------------
+// --- a spring that holds the towed body at x = 0, y = 0
+// ---------------------------------------------------------------
 
 static void spring(const bt_force_body *b, bt_load *l)
 {
@@ -34,7 +37,12 @@ static const bt_force_key spring_keys[] = {
     {"stiffness", "N/m", "0 N/m", "[0, 1e9]", "pull for each metre from the origin"},
     {"turning", "", "0", "[0, 1e12]", "moment for each radian of yaw, N m"},
 };
-static const bt_force_law spring_law = {.name = "spring", .doc = "pull of a spring to the origin", .towed_only = true, .keys = spring_keys, .n_keys = 2, .add = spring};
+static const bt_force_law spring_law = {.name = "spring",
+                                        .doc = "pull of a spring to the origin",
+                                        .towed_only = true,
+                                        .keys = spring_keys,
+                                        .n_keys = 2,
+                                        .add = spring};
 
 static double *own_of(bt_world *w, const bt_force_law *law)
 {
@@ -65,24 +73,31 @@ static double width_of(const bt_world *w, bt_idx i) { return 2 * w->bodies.radiu
 static void what_will_not_do_is_refused(void **state)
 {
     (void)state;
-    static const bt_force_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}}, no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
+    static const bt_force_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}},
+                              no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
-    const struct { bt_force_law law; const char *says; } bad[] = {
+    const struct { bt_force_law law; const char *says;
+    } bad[] = {
         {{.name = "tilt", .doc = "a law of that name", .add = spring}, "there is a force of this name"},
         {{.name = "drag", .doc = "a sum of that name", .add = spring}, "there is a force of this name"},
         {{.name = "Big Law", .doc = "a law of that name", .add = spring}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without function"}, "no function"},
         {{.name = "mute", .add = spring}, "say in a line"},
-        {{.name = "odd", .doc = "a law with a bad unit", .add = spring, .keys = bad_contact, .n_keys = 1}, "unit furlong"},
-        {{.name = "wide", .doc = "a law without a range", .add = spring, .keys = no_range, .n_keys = 1}, "the range must be"},
-        {{.name = "far", .doc = "a law with a bad default", .add = spring, .keys = beyond, .n_keys = 1}, "the default must be"},
-        {{.name = "ice", .doc = "a law whose section is there", .add = spring, .keys = spring_keys, .n_keys = 1}, "choose a section of its own"},
+        {{.name = "odd", .doc = "a law with a bad unit", .add = spring, .keys = bad_contact, .n_keys = 1},
+         "unit furlong"},
+        {{.name = "wide", .doc = "a law without a range", .add = spring, .keys = no_range, .n_keys = 1},
+         "the range must be"},
+        {{.name = "far", .doc = "a law with a bad default", .add = spring, .keys = beyond, .n_keys = 1},
+         "the default must be"},
+        {{.name = "ice", .doc = "a law whose section is there", .add = spring, .keys = spring_keys, .n_keys = 1},
+         "choose a section of its own"},
     };
     const int laws = bt_n_force_laws, series = bt_n_series();
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
         bt_errors err = {0};
         assert_int_not_equal(bt_force_register(&bad[k].law, &err), BT_OK);
-        if (err.n == 0 || !strstr(err.text[0], bad[k].says)) fail_msg("%s: %s", bad[k].says, err.n ? err.text[0] : "nothing said");
+        if (err.n == 0 || !strstr(err.text[0], bad[k].says))
+            fail_msg("%s: %s", bad[k].says, err.n ? err.text[0] : "nothing said");
         bt_errors_free(&err);
     }
     assert_int_equal(bt_n_force_laws, laws);
@@ -153,7 +168,8 @@ static bt_world *tow_world(bt_tow_mode mode, double speed)
         double v[8];
         scene_square(0.9, v);
         bt_body_def d = scene_prism(4, v, 40);
-        d.x = 2 + 1.05 * (k / 4), d.y = 1.05 * (k % 4) - 1.5, d.friction = 0.3, d.drag = (bt_drag){.water_skin = 1, .water_form = 0.3};
+        d.x = 2 + 1.05 * (k / 4), d.y = 1.05 * (k % 4) - 1.5, d.friction = 0.3,
+        d.drag = (bt_drag){.water_skin = 1, .water_form = 0.3};
         bt_world_add(w, &d);
     }
     double v[8] = {-1, -0.5, 1, -1, 1, 0.7, -1, 0.9};
@@ -163,7 +179,12 @@ static bt_world *tow_world(bt_tow_mode mode, double speed)
     d.drag = (bt_drag){.water_skin = 20, .water_form = 8, .air_skin = 0.1, .yaw = 5};
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
-    *w->tow = (bt_tow){.mode = mode, .ux = 1, .speed = speed, .dt = p.dt, .carriage_x = 8, .n_branches = mode == BT_TOW_LINE,
+    *w->tow = (bt_tow){.mode = mode,
+                       .ux = 1,
+                       .speed = speed,
+                       .dt = p.dt,
+                       .carriage_x = 8,
+                       .n_branches = mode == BT_TOW_LINE,
                        .branch[0] = {.length0 = 7, .k = 400, .c = 60, .hull_x = 1, .hull_y = 0.2}};
     make_waves(w, 12, 0.7);
     own_of(w, &spring_law)[0] = 3, own_of(w, &spring_law)[1] = 2;
@@ -181,20 +202,23 @@ static void the_tow_bears_it_at_a_set_speed(void **state)
         bt_world_step(w);
         bt_sample o;
         bt_observe(w, 1, &o);
-        const double force = 12 * width_of(w, bt_world_towed(w)), waves = force * cos(BT_PI / 6) + 0.7 * force * (0.05 - v), pull = -3 * x;
+        const double force = 12 * width_of(w, bt_world_towed(w)),
+                     waves = force * cos(BT_PI / 6) + 0.7 * force * (0.05 - v), pull = -3 * x;
         const int n = bt_n_law_series();
         assert_int_equal(n, 2);
         CHECK_CLOSE(o.law_force[0], -waves, 1e-12 * force);
         CHECK_CLOSE(o.law_force[1], -pull, 1e-12 * (force + fabs(pull)));
         const double others = o.ice_resistance + o.drag_force + o.coriolis_force + o.tilt_force + o.inertia_force;
         CHECK_CLOSE(o.tow_force, others - waves - pull, 1e-12 * (fabs(others) + force + fabs(pull)));
-        CHECK_CLOSE(o.ice_resistance_budget, o.ice_resistance, 1e-9 * (fabs(o.ice_resistance) + force)); // the floes' own waves are not booked as ice
+        // the floes' own waves are not booked as ice
+        CHECK_CLOSE(o.ice_resistance_budget, o.ice_resistance, 1e-9 * (fabs(o.ice_resistance) + force));
     }
     assert_true(w->tow->travel_x > 1.5 * w->par.period_x);
     bt_world_free(w);
 }
 
-/// On a line: in every step, M (U2 − U1) and I (ω2 − ω1) are the impulses of the laws, the line and the ice, to rounding.
+/// On a line: in every step, M (U2 − U1) and I (ω2 − ω1) are the impulses of the laws, the line and the ice, to
+/// rounding.
 static void the_momentum_balance_closes_on_a_line(void **state)
 {
     (void)state;
@@ -208,7 +232,8 @@ static void the_momentum_balance_closes_on_a_line(void **state)
         const bt_bodies *b = &w->bodies;
         const bt_branch *line = &w->tow->branch[0];
         const double dt = w->par.dt, m = b->mass[i];
-        double x = line->lambda * line->lx + dt * o.ice_force_x, y = line->lambda * line->ly + dt * o.ice_force_y, turn = line->lambda * line->rxl + dt * o.ice_moment;
+        double x = line->lambda * line->lx + dt * o.ice_force_x, y = line->lambda * line->ly + dt * o.ice_force_y,
+               turn = line->lambda * line->rxl + dt * o.ice_moment;
         double scale = fabs(x) + fabs(y) + m;
         for (int k = 0; k < w->forces->n; k++) {
             const bt_impulse *j = &w->forces->law[k];
@@ -221,11 +246,14 @@ static void the_momentum_balance_closes_on_a_line(void **state)
         CHECK_CLOSE(b->inertia[i] * (u2->w - u1->w), turn, 1e-12 * scale);
         // What each law is by itself: with U2 where it is implicit.
         const double force = 12 * width_of(w, i);
-        CHECK_CLOSE(impulse_of(w, &wave_drift_law)->x, dt * force * (cos(BT_PI / 6) + 0.7 * (0.05 - u2->x)), 1e-12 * scale);
+        CHECK_CLOSE(impulse_of(w, &wave_drift_law)->x, dt * force * (cos(BT_PI / 6) + 0.7 * (0.05 - u2->x)),
+                    1e-12 * scale);
         CHECK_CLOSE(impulse_of(w, &wave_drift_law)->y, dt * force * (sin(BT_PI / 6) - 0.7 * u2->y), 1e-12 * scale);
-        const double sum = o.ice_resistance + o.drag_force + o.coriolis_force + o.tilt_force + o.law_force[0] + o.law_force[1] + o.inertia_force;
+        const double sum = o.ice_resistance + o.drag_force + o.coriolis_force + o.tilt_force + o.law_force[0] +
+                           o.law_force[1] + o.inertia_force;
         CHECK_CLOSE(o.tow_force, sum, 1e-11 * scale / dt);
-        turned = bt_max(turned, fabs(b->pose[i].yaw)), touched += o.ice_resistance != 0, worked = bt_max(worked, o.tow_force);
+        turned = bt_max(turned, fabs(b->pose[i].yaw)), touched += o.ice_resistance != 0,
+        worked = bt_max(worked, o.tow_force);
         assert_true(w->stats.momentum_residual < 1e-12);
     }
     assert_true(turned > 0.05 && touched > 20 && worked > 100);
@@ -317,9 +345,15 @@ static void run_basin(const char *name, int64_t steps)
     bt_case c;
     bt_errors err = {0};
     read_basin(&c);
-    const bt_run_options o = {.dir = in_folder(name), .quiet = true, .threads = 1, .max_steps = steps, .dump_step = -1, .command_line = "test"};
+    const bt_run_options o = {.dir = in_folder(name),
+                              .quiet = true,
+                              .threads = 1,
+                              .max_steps = steps,
+                              .dump_step = -1,
+                              .command_line = "test"};
     bt_status status = bt_run(&bt_comm_alone, &c, &o, &err);
-    for (int64_t done = steps; steps > 0 && done < bt_case_steps(&c) && status == BT_OK; done += steps) status = bt_run_resume(&bt_comm_alone, &o, &err);
+    for (int64_t done = steps; steps > 0 && done < bt_case_steps(&c) && status == BT_OK; done += steps)
+        status = bt_run_resume(&bt_comm_alone, &o, &err);
     if (status != BT_OK) fail_msg("%s", err.n ? err.text[0] : "a run failed");
     bt_case_free(&c);
 }
@@ -339,7 +373,8 @@ static int64_t series_of(const char *name, const char *series, double *x)
     return n;
 }
 
-/// Series and summary have the law by its name; stopped and taken up again in the middle of an entry, the same to the bit.
+/// Series and summary have the law by its name; stopped and taken up again in the middle of an entry, the same to the
+/// bit.
 static void a_run_records_it_and_a_resumed_run_the_same(void **state)
 {
     (void)state;
@@ -352,10 +387,12 @@ static void a_run_records_it_and_a_resumed_run_the_same(void **state)
     assert_memory_equal(whole, pieces, (size_t)n * sizeof *whole);
     assert_int_equal(series_of("whole", "tow_force", tow), n);
     char *a = text_of(in_folder("whole/summary.json")), *b = text_of(in_folder("pieces/summary.json"));
-    const char *const means[] = {"mean_wave_drift_force_n", "mean_spring_force_n", "mean_tow_force_n", "mean_drag_force_n", "closure_n"};
+    const char *const means[] = {"mean_wave_drift_force_n", "mean_spring_force_n", "mean_tow_force_n",
+                                 "mean_drag_force_n", "closure_n"};
     for (size_t k = 0; k < sizeof means / sizeof *means; k++) assert_true(number(a, means[k]) == number(b, means[k]));
     // Disc of 2 m at 0.3 m/s against waves at 160°: F = ½ ρ g a² D, 4 ω/g F (U_w − U)
-    const double force = 0.5 * 1027 * 9.81 * 0.03 * 0.03 * 2, want = -(force * cos(160 * BT_PI / 180) - 4 * (2 * BT_PI / 1.5) / 9.81 * force * 0.3);
+    const double force = 0.5 * 1027 * 9.81 * 0.03 * 0.03 * 2,
+                 want = -(force * cos(160 * BT_PI / 180) - 4 * (2 * BT_PI / 1.5) / 9.81 * force * 0.3);
     CHECK_CLOSE(number(a, "mean_wave_drift_force_n"), want, 1e-2 * want); // the disc is a polygon
     CHECK_CLOSE(whole[n - 1], number(a, "mean_wave_drift_force_n"), 1e-9);
     assert_true(fabs(number(a, "closure_relative")) < 1e-9 && number(a, "mean_spring_force_n") == 0);
@@ -367,7 +404,8 @@ static int set_up(void **state)
 {
     (void)state;
     bt_errors err = {0};
-    return !mkdtemp(folder) || bt_force_register(&wave_drift_law, &err) != BT_OK || bt_force_register(&spring_law, &err) != BT_OK;
+    return !mkdtemp(folder) || bt_force_register(&wave_drift_law, &err) != BT_OK ||
+           bt_force_register(&spring_law, &err) != BT_OK;
 }
 
 static int clean_up(void **state)

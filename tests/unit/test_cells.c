@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Cells on one rank: labels that follow the floes, cells at rest that cost nothing and wake up, blows that go farther than a cell,
-// boxes of few cells around a period, and floes of very different size.
+// Cells on one rank: labels that follow the floes, cells at rest that cost nothing and wake up, blows that go farther
+// than a cell, boxes of few cells around a period, and floes of very different size.
 #include <sys/resource.h>
 
 #include "space/pairs.h"
@@ -33,7 +33,8 @@ static void add_field(bt_world *w, double x0, double y0, int nx, int ny, double 
 }
 
 /// A disc-like heavy body.
-static bt_gid add_hitter(bt_world *w, double radius, double x, double y, double u, double v, bt_motion motion, bool large)
+static bt_gid add_hitter(bt_world *w, double radius, double x, double y, double u, double v, bt_motion motion,
+                         bool large)
 {
     double s[32];
     for (int k = 0; k < 16; k++) s[2 * k] = radius * cos(BT_PI * k / 8), s[2 * k + 1] = radius * sin(BT_PI * k / 8);
@@ -149,12 +150,14 @@ static void check_busy(const bt_cells *t)
             continue;
         }
         assert_true(k < t->n - 1 && t->asleep[k] == BT_ASLEEP && !t->awake[k] && t->bound[k] == 0 && t->speed[k] == 0);
-        assert_true(!t->cell[k].active && !t->cell[k].pairs && t->cell[k].n_contacts == 0 && t->cell[k].overlap == 0 && !t->cell[k].swept);
+        assert_true(!t->cell[k].active && !t->cell[k].pairs && t->cell[k].n_contacts == 0 && t->cell[k].overlap == 0 &&
+                    !t->cell[k].swept);
     }
     assert_int_equal(n, t->n_busy);
 }
 
-// Red: a cell that contacts wake left out of the list; an awake cell that leaves it; a pair left out of the near ones while it may close.
+// Red: a cell that contacts wake left out of the list; an awake cell that leaves it; a pair left out of the near ones
+// while it may close.
 static void a_step_looks_at_busy_cells_alone(void **state)
 {
     (void)state;
@@ -182,7 +185,8 @@ static void a_step_looks_at_busy_cells_alone(void **state)
         if (n > 0) bt_cells_wake_all(all);
         for (int k = 0; k < 2; k++) bt_world_step(w[k]);
         assert_true(bt_world_hash(w[0]) == bt_world_hash(w[1]));
-        assert_true(w[0]->stats.n_active == w[1]->stats.n_active && w[0]->stats.kinetic_energy == w[1]->stats.kinetic_energy);
+        assert_true(w[0]->stats.n_active == w[1]->stats.n_active &&
+                    w[0]->stats.kinetic_energy == w[1]->stats.kinetic_energy);
         assert_true(w[0]->stats.unit_updates == w[1]->stats.unit_updates && w[0]->stats.overlap == w[1]->stats.overlap);
         check_busy(w[0]->cells);
         points += w[0]->stats.n_points;
@@ -193,7 +197,8 @@ static void a_step_looks_at_busy_cells_alone(void **state)
 }
 
 /// A body goes through a field at `speed` relative to water that flows with (u, v).
-static bt_world *tow_in_current(double u, double v, double speed, int steps, int64_t *active, int64_t *points, bool *projected)
+static bt_world *tow_in_current(double u, double v, double speed, int steps, int64_t *active, int64_t *points,
+                                bool *projected)
 {
     bt_params p = calm_params();
     p.slop = 1e-5; // so that overlap is pushed out now and then
@@ -214,7 +219,8 @@ static bt_world *tow_in_current(double u, double v, double speed, int steps, int
     return w;
 }
 
-// Red: cells that do not move with the water; a floe whose velocity the rounding of the drag takes off that of the water.
+// Red: cells that do not move with the water; a floe whose velocity the rounding of the drag takes off that of the
+// water.
 static void uniform_current_is_a_moving_frame(void **state)
 {
     (void)state;
@@ -243,7 +249,8 @@ static void uniform_current_is_a_moving_frame(void **state)
     bt_world_free(drift);
 }
 
-// Red: displacements of an earlier step applied to floes that rest meanwhile (seen: their array is not cleared where nothing moves).
+// Red: displacements of an earlier step applied to floes that rest meanwhile (seen: their array is not cleared where
+// nothing moves).
 static void old_displacements_are_forgotten(void **state)
 {
     (void)state;
@@ -251,7 +258,8 @@ static void old_displacements_are_forgotten(void **state)
     p.water_u = p.air_u = 0.25;
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 40, SIDE, 0.25, 0);
-    for (int k = 0; k < 2; k++) { // two places far apart where a floe is set upon its neighbour, the second when all is over at the first
+    // two places far apart where a floe is set upon its neighbour, the second when all is over at the first
+    for (int k = 0; k < 2; k++) {
         const bt_gid g = 3 * 40 + (k ? 35 : 3);
         const bt_idx i = bt_world_index(w, g);
         w->bodies.pose[i].x += 0.4;
@@ -304,7 +312,8 @@ static bt_world *hit_row(int n, double cell, int steps, bool *outrun, int64_t *r
     return w;
 }
 
-// Red: no look at what the solution outran (the far end of the row stays at rest, its neighbour runs into it, nothing is said).
+// Red: no look at what the solution outran (the far end of the row stays at rest, its neighbour runs into it, nothing
+// is said).
 static void a_blow_goes_through_a_row(void **state)
 {
     (void)state;
@@ -320,7 +329,8 @@ static void a_blow_goes_through_a_row(void **state)
     for (bt_gid g = 0; g <= N; g++) CHECK_CLOSE(vel_of(w, g).x, 1.0 / (N + 1), 1e-6);
     bt_world_free(w);
 
-    // So long that the repeats of a step do not reach the end: told as outrun; nothing is lost, and no floe runs through another.
+    // So long that the repeats of a step do not reach the end: told as outrun; nothing is lost, and no floe runs
+    // through another.
     enum { LONG = 160 };
     w = hit_row(LONG, 2.5, 1, &outrun, &repeats, &lost);
     assert_true(outrun);
@@ -335,7 +345,8 @@ static void a_blow_goes_through_a_row(void **state)
     bt_world_free(w);
 }
 
-/// (margin: a power of two, which is not rounded up). Do the contacts of every cell, together, have the pairs that testing all with all finds, each once?
+/// (margin: a power of two, which is not rounded up). Do the contacts of every cell, together, have the pairs that
+/// testing all with all finds, each once?
 static void check_contacts(bt_world *w, double margin)
 {
     bt_manifold *want;
@@ -356,7 +367,8 @@ static void check_contacts(bt_world *w, double margin)
     free(want);
 }
 
-// Red: three cells around a period (two of one colour meet at the seam), two (a block that holds a cell twice), wrong nearest cell.
+// Red: three cells around a period (two of one colour meet at the seam), two (a block that holds a cell twice), wrong
+// nearest cell.
 static void few_cells_around_a_period(void **state)
 {
     (void)state;
@@ -370,7 +382,9 @@ static void few_cells_around_a_period(void **state)
             bt_world *w = bt_world_create(&p);
             add_field(w, 0.3, 0.3, (int)p.period_x, both ? (int)p.period_y : 12, 0, 0);
             for (bt_idx i = 0; i < w->bodies.n; i++) {
-                w->bodies.vel[i] = (bt_vel){.x = scene_uniform(&seed) - 0.2, .y = scene_uniform(&seed) - (both ? 0.8 : 0.5), .w = scene_uniform(&seed) - 0.5};
+                w->bodies.vel[i] = (bt_vel){.x = scene_uniform(&seed) - 0.2,
+                                            .y = scene_uniform(&seed) - (both ? 0.8 : 0.5),
+                                            .w = scene_uniform(&seed) - 0.5};
                 w->bodies.drag[i] = (bt_drag){0};
             }
             bt_cells_begin(w);
@@ -384,7 +398,8 @@ static void few_cells_around_a_period(void **state)
                 bt_world_step(w);
                 overlap = bt_max(overlap, w->stats.overlap);
                 assert_false(w->stats.outrun);
-                for (bt_idx i = 0; i < w->bodies.n; i++) assert_true(w->bodies.pose[i].x >= 0 && w->bodies.pose[i].x < p.period_x);
+                for (bt_idx i = 0; i < w->bodies.n; i++)
+                    assert_true(w->bodies.pose[i].x >= 0 && w->bodies.pose[i].x < p.period_x);
             }
             for (bt_idx i = 0; i < w->bodies.n; i++) after[0] += w->bodies.vel[i].x, after[1] += w->bodies.vel[i].y;
             CHECK_CLOSE(after[0], before[0], 1e-9);
@@ -426,7 +441,8 @@ static void floes_of_very_different_size(void **state)
     bt_world_free(w);
 }
 
-// Red: a row of cells that does not fit into its integer (found by fuzzing a checkpoint): undefined, and on x86 the whole field.
+// Red: a row of cells that does not fit into its integer (found by fuzzing a checkpoint): undefined, and on x86 the
+// whole field.
 static void a_body_far_away_covers_no_cell(void **state)
 {
     (void)state;
@@ -451,7 +467,8 @@ static void a_body_far_away_covers_no_cell(void **state)
     bt_world_free(w);
 }
 
-// Red: rows for every cell around the period, of nanometres, where there is no floe (found by fuzzing: 2 GB and a minute).
+// Red: rows for every cell around the period, of nanometres, where there is no floe (found by fuzzing: 2 GB and a
+// minute).
 static void no_floes_need_no_rows(void **state)
 {
     (void)state;

@@ -64,7 +64,8 @@ static void move_all(bt_world *w, uint64_t *rng, double step)
     bt_bodies *b = &w->bodies;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_STATIC) continue;
-        double dx = step * (scene_uniform(rng) - 0.5), dy = step * (scene_uniform(rng) - 0.5), dr = step * (scene_uniform(rng) - 0.5);
+        double dx = step * (scene_uniform(rng) - 0.5), dy = step * (scene_uniform(rng) - 0.5),
+               dr = step * (scene_uniform(rng) - 0.5);
         b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
         if (w->par.period_x > 0) b->pose[i].x -= w->par.period_x * floor(b->pose[i].x / w->par.period_x);
         if (w->par.period_y > 0) b->pose[i].y -= w->par.period_y * floor(b->pose[i].y / w->par.period_y);
@@ -106,7 +107,8 @@ static contact *contacts_of(const bt_world *w, bt_idx *n)
         for (bt_idx j = 0; j < t->n_contacts; j++) {
             const bt_contact *u = &t->contacts[j];
             assert_int_equal(bt_cells_of_pair(w, u->a, u->b), k);
-            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n, u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
+            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n,
+                                  u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
                                   t->pairs[t->gaps[j].pair].feature[0]};
         }
     }
@@ -125,7 +127,8 @@ static void detect_equals_brute_force(void **state)
         const double box = scene % 2 ? 12 : 25;
         bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
         for (int step = 0; step < 60; step++) {
-            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12)); // it comes and goes
+            // it comes and goes
+            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12));
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, m;
@@ -143,7 +146,8 @@ static void detect_equals_brute_force(void **state)
             note_moves(w, 0.09);
         }
         labellings += w->cells->n_labellings;
-        assert_true(w->cells->n_labellings < 30 && w->cells->n_listings < 50 * w->cells->n); // labels and lists are in fact kept
+        // labels and lists are in fact kept
+        assert_true(w->cells->n_labellings < 30 && w->cells->n_listings < 50 * w->cells->n);
         bt_world_free(w);
     }
     assert_true(total > 10000 && labellings > 14); // and renewed

@@ -119,7 +119,9 @@ static void test_measure(void **state)
 static void test_grid(void **state)
 {
     (void)state;
-    static const struct { int nx, ny, kx, ky; } c[] = {{64, 64, 2, 1}, {64, 64, 2, 2}, {60, 40, 3, 2}, {96, 96, 8, 8}, {16, 64, 4, 16}};
+    static const struct {
+        int nx, ny, kx, ky;
+    } c[] = {{64, 64, 2, 1}, {64, 64, 2, 2}, {60, 40, 3, 2}, {96, 96, 8, 8}, {16, 64, 4, 16}};
     for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
         grid t;
         grid_init(&t, c[i].nx, c[i].ny, 1000, 16);
@@ -173,8 +175,8 @@ static void test_groups(void **state)
     grid_free(&t);
 }
 
-// A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves that
-// cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
+// A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves
+// that cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
 static void test_group_edges(void **state)
 {
     (void)state;
@@ -235,7 +237,8 @@ static void test_weights(void **state)
         int count[16] = {0}, *part = cut(&t, 16, 0.03, &q);
         for (int v = 0; v < t.g.n; v++) count[part[v]]++;
         for (int p = 0; p < 16; p++)
-            if (count[p] < 60 || count[p] > 66) fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
+            if (count[p] < 60 || count[p] > 66)
+                fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
         if (weight[i]) { // METIS itself, which bisection would stand in for
             assert_true(bt_cut_by_metis(&t.g, 16, 0.03, part));
             assert_true(bt_cut_measure(&t.g, 16, part, NULL).imbalance <= 0.04);

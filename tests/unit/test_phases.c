@@ -59,7 +59,9 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 static void assert_sound(bt_world *w, int held_up)
 {
     const size_t bodies = (size_t)w->bodies.n, cells = (size_t)w->cells->n;
-    log_of_pass log = {.holder = bt_alloc(bodies, sizeof *log.holder), .stamp = bt_alloc(bodies, sizeof *log.stamp), .visits = bt_alloc(cells, sizeof *log.visits)};
+    log_of_pass log = {.holder = bt_alloc(bodies, sizeof *log.holder),
+                       .stamp = bt_alloc(bodies, sizeof *log.stamp),
+                       .visits = bt_alloc(cells, sizeof *log.visits)};
     bt_totals t = {.n_sums = 1};
     bt_phases_run(w, visit, &(visitor){&log, held_up}, NULL, &t);
     assert_int_equal(log.shared, 0);
@@ -104,8 +106,9 @@ static bt_world *fill(const scene *s, uint64_t *rng)
 }
 
 static const scene scenes[] = {
-    {90, 90, false, false, -1, 0}, {300, 30, false, false, -1, 0}, {90, 90, true, true, -1, 0},    {30, 480, false, true, -1, 0},
-    {90, 90, false, false, 0.4, 0.6}, {30, 480, false, true, 0.5, 0.999}, {480, 30, true, false, 0.001, 0.5}, {12, 1200, false, true, 0.5, 0.26},
+    {90, 90, false, false, -1, 0},      {300, 30, false, false, -1, 0},     {90, 90, true, true, -1, 0},
+    {30, 480, false, true, -1, 0},      {90, 90, false, false, 0.4, 0.6},   {30, 480, false, true, 0.5, 0.999},
+    {480, 30, true, false, 0.001, 0.5}, {12, 1200, false, true, 0.5, 0.26},
 };
 enum { N_SCENES = sizeof scenes / sizeof *scenes };
 
@@ -136,7 +139,8 @@ static void shares_follow_the_lists(void **state)
         omp_set_num_threads(threads);
         bt_world *w = fill(&(scene){90, 90, false, false, -1, 0}, &rng);
         bt_cells *t = w->cells;
-        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
+        for (bt_idx i = 0; i < t->n_order; i++)
+            t->cell[t->order[i]].n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
         bt_phases_deal(w);
         assert_int_equal(t->n_shares, threads);
         for (int p = 0; p < BT_COLOURS; p++) {

@@ -31,14 +31,15 @@ static void series_and_frames_come_back_to_the_bit(void **state)
         assert_string_equal(attribute(f, path, "units"), bt_series_fields[k].units);
         assert_true(strlen(attribute(f, path, "description")) > 8);
     }
-    static const char *const promised[] = {"time", "tow_force", "ice_resistance", "drag_force", "body_x", "body_y", "body_yaw",
-                                           "contacts", "sweeps", "residual"};
+    static const char *const promised[] = {"time",   "tow_force", "ice_resistance", "drag_force", "body_x",
+                                           "body_y", "body_yaw",  "contacts",       "sweeps",     "residual"};
     for (size_t k = 0; k < sizeof promised / sizeof *promised; k++) {
         snprintf(path, sizeof path, "/series/%s", promised[k]);
         assert_true(H5Lexists(f, path, H5P_DEFAULT) > 0);
     }
 
-    double time[FRAMES], pose[FRAMES][FLOES][3], other[FRAMES][BODIES - FLOES][3], force[FRAMES][FLOES], speed[FRAMES][BODIES];
+    double time[FRAMES], pose[FRAMES][FLOES][3], other[FRAMES][BODIES - FLOES][3], force[FRAMES][FLOES],
+        speed[FRAMES][BODIES];
     float points[FRAMES][VERTICES][2];
     for (int k = 0; k < FRAMES; k++) {
         snprintf(path, sizeof path, "/xdmf/%06d/floe_points", k);
@@ -226,8 +227,14 @@ static void an_empty_field_can_be_recorded(void **state)
     const bt_case c = made_up_case();
     const int64_t o[2] = {0, 4};
     bodies();
-    const bt_record_bodies b = {.n_floes = 0, .n_bodies = 1, .offsets = o, .vertices = vertices[12], .thickness = thickness,
-                                .area = area, .names = names, .towed = 0};
+    const bt_record_bodies b = {.n_floes = 0,
+                                .n_bodies = 1,
+                                .offsets = o,
+                                .vertices = vertices[12],
+                                .thickness = thickness,
+                                .area = area,
+                                .names = names,
+                                .towed = 0};
     bt_record *r;
     assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("empty"), &c, &b, NULL, &err), BT_OK);
     const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
@@ -257,8 +264,13 @@ static void many_floes_are_packed(void **state)
     }
     bt_errors err = {0};
     const bt_case c = made_up_case();
-    const bt_record_bodies b = {.n_floes = MANY, .n_bodies = MANY, .offsets = o, .vertices = &v[0][0], .thickness = ones,
-                                .area = ones, .towed = -1};
+    const bt_record_bodies b = {.n_floes = MANY,
+                                .n_bodies = MANY,
+                                .offsets = o,
+                                .vertices = &v[0][0],
+                                .thickness = ones,
+                                .area = ones,
+                                .towed = -1};
     bt_record *r;
     assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, &err), BT_OK);
     assert_int_equal(bt_record_frame(r, 0, rows, &err), BT_OK);
