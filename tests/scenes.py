@@ -176,12 +176,17 @@ def layouts_of(name):
     return LAYOUTS[k % n], LAYOUTS[(k + 1 + k // n % (n - 1)) % n]
 
 
+class Failed(Exception):
+    """A program did not end with exit code 0."""
+
+
 def started(binary, ranks, folder, *arguments):
     mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     done = subprocess.run([*mpi, str(binary), *map(str, arguments)], cwd=folder, env=env, capture_output=True,
                           text=True, timeout=PATIENCE)
-    assert done.returncode == 0, f"{' '.join(done.args)}: exit code {done.returncode}\n{done.stdout}{done.stderr}"
+    if done.returncode != 0:
+        raise Failed(f"{' '.join(done.args)}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
 
 
 def draw_outlines(folder, name, binary):
@@ -301,32 +306,32 @@ def digests(items):
 
 
 def stored():
-    """scenes.json as (fingerprint, binary, {scene: {item: digest}})."""
+    """scenes.json as (fingerprint, binary of the last record of all scenes, {scene: {item: digest}})."""
     j = json.loads(STORED.read_text())
     return j["fingerprint"], j["recorded_with"], {
         n: {i: d for i, d in zip(j["items"], s.split()) if d != "-"} for n, s in j["scenes"].items()}
 
 
-def store(scenes):
+def store(binary, scenes):
     # One line for each scene: the digests in the order of `items`, "-" for those that it has not.
     items = sorted({i for s in scenes.values() for i in s})
-    lines = [f'  "{n}": "{" ".join(scenes[n].get(i, "-") for i in items)}"' for n in SCENES]
-    STORED.write_text(f'{{\n"fingerprint": "{fingerprint()}",\n"recorded_with": "{version(BERGTOW)}",\n'
+    lines = [f'  "{n}": "{" ".join(scenes[n].get(i, "-") for i in items)}"' for n in SCENES if n in scenes]
+    STORED.write_text(f'{{\n"fingerprint": "{fingerprint()}",\n"recorded_with": "{binary}",\n'
                       f'"items": {json.dumps(items, indent=0)},\n"scenes": {{\n' + ",\n".join(lines) + "\n}\n}\n")
 
 
 def record(names):
-    mark, _, scenes = stored() if names else (fingerprint(), "", {})
+    mark, binary, scenes = stored() if names else (fingerprint(), version(BERGTOW), {})
     if mark != fingerprint():
         sys.exit(f"{STORED} was recorded with another libm or compiler: record all scenes, not some")
     for name in names or SCENES:
         with tempfile.TemporaryDirectory() as folder:
             scenes[name] = digests(run_scene(pathlib.Path(folder), name, layouts_of(name)[0]))
-    store(scenes)
+    store(binary, scenes)
 
 
 def first_difference(a, b):
-    """(order, words): where two values of an item part, by row, which is time in series and frames."""
+    """(row, words): where two values of an item first differ, and what they are there, mine before theirs."""
     if isinstance(a, str) or isinstance(b, str):
         return math.inf, f"{a!s:.200} and {b!s:.200}"
     if (a.dtype, a.shape) != (b.dtype, b.shape):
@@ -336,22 +341,30 @@ def first_difference(a, b):
     return at[0] if at else 0, f"[{', '.join(map(str, at))}] {a[at].item()!r} and {b[at].item()!r}"
 
 
+def moved(mine, theirs):
+    """(what is new, what is gone or changed) in words; of the latter series come first, by row."""
+    apart = differing(mine, theirs)
+    found = [(False, -1, f"{n} is gone") for n in apart if n not in mine]
+    for n in set(apart) & mine.keys() & theirs.keys():
+        row, words = first_difference(mine[n], theirs[n])
+        found.append((not n.startswith("/series/"), row, f"{n} {words}"))
+    return [n for n in apart if n not in theirs], [words for *_, words in sorted(found)]
+
+
 def compare(other, names):
+    """How many scenes differ, or do not run with both binaries."""
     different = 0
     for name in names or SCENES:
+        layout = layouts_of(name)[0]
         with tempfile.TemporaryDirectory() as folder:
-            mine = run_scene(pathlib.Path(folder) / "a", name, layouts_of(name)[0])
-            theirs = run_scene(pathlib.Path(folder) / "b", name, LAYOUTS[0], other)
-        apart = differing(mine, theirs)
-        new = [n for n in apart if n not in theirs]
-        found = [(-1, f"{n} is gone") for n in apart if n not in mine]
-        for n in set(apart) & mine.keys() & theirs.keys():
-            order, words = first_difference(mine[n], theirs[n])
-            found.append((order, f"{n} {words}"))
-        print(f"{name} {layouts_of(name)[0]}: {f'{len(found)} items differ' if found else 'same'}"
+            try:
+                new, found = moved(run_scene(pathlib.Path(folder) / "mine", name, layout),
+                                   run_scene(pathlib.Path(folder) / "other", name, LAYOUTS[0], other))
+            except Failed as e:
+                new, found = [], [str(e)]
+        print(f"{name} {layout}: {f'{len(found)} items differ' if found else 'same'}"
               + (f"; new: {', '.join(new)}" if new else ""))
-        for _, words in sorted(found)[:6]:
-            print(f"    {words}", flush=True)
+        print("".join(f"    {words}\n" for words in found[:6]), end="", flush=True)
         different += bool(found)
     return different
 
