@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The layers of the program: who calls and includes whom, held against the order below.
 
-    tests/layers.py             every upward edge, circle, doubled type name and stray public include; exit code 1 if any
+    tests/layers.py             upward edges, circles, doubled type names, stray public includes; exit code 1 if any
     tests/layers.py --picture   the picture in docs/architecture.md, from the objects and sources as they are
     tests/layers.py --write     puts that picture into docs/architecture.md
 

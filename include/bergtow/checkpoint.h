@@ -63,8 +63,8 @@ struct bt_snapshot;
 
 #define BT_CHECKPOINT_FILE "checkpoint.h5"
 #define BT_CHECKPOINT_BEFORE "checkpoint.previous.h5"
-// a checkpoint.h5 that was refused, set aside when the next one was written
-#define BT_CHECKPOINT_DAMAGED "checkpoint.damaged.h5"
+#define BT_CHECKPOINT_DAMAGED                                                                                          \
+    "checkpoint.damaged.h5" // a checkpoint.h5 that was refused, set aside when the next one was written
 #define BT_FAILURE_FILE "failure.h5"
 
 /// Write dir/name, a complete file or none. The one before is kept for checkpoint.h5. Errors: BT_ERR_IO.

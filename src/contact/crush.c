@@ -9,8 +9,8 @@
 #include "contact/row.h"
 #include "contact/work.h"
 
-// of the mean floe size: the contact length is linear over the approach of the step, or over this
-#define LEAST_WAY 0.01
+#define LEAST_WAY                                                                                                      \
+    0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
 
 bool bt_crush_on(const bt_params *p) { return p->crush_pressure > 0; }
 

@@ -46,8 +46,8 @@
 
 #include "contact/law.h"
 
-// of the mean floe size, the gap beyond which a pair forgets; cells always reach that far (cells.h)
-#define BT_CRUSH_MEMORY 0.1
+#define BT_CRUSH_MEMORY                                                                                                \
+    0.1 // of the mean floe size, the gap beyond which a pair forgets; cells always reach that far (cells.h)
 
 // The crushing law's row in the table (contact/law.h). Its record: a depth for each contact feature, m.
 bool bt_crush_on(const bt_params *p);

@@ -312,8 +312,8 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
 // counts, if that is not much farther than along the best of
 // all: the middle one of three parts that share a corner has edges of the outline only on its far side.
 
-// rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
-#define CONE 1e-6
+#define CONE                                                                                                           \
+    1e-6 // rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
 #define DETOUR 4  // depth along an axis that counts / depth along the best of all; more only within the tie
 
 typedef struct {

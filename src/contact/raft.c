@@ -7,7 +7,7 @@
 #include "contact/overlap.h"
 #include "contact/work.h"
 
-// of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other
+// Of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other.
 #define LEAST_LENGTH 1e-3
 
 bool bt_raft_on(const bt_params *p) { return p->raft_line > 0; }

@@ -10,8 +10,8 @@
 #include "partition/domain.h"
 #include "loads/body_contacts.h"
 
-// a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
-#define TURNED 1.25
+#define TURNED                                                                                                         \
+    1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
 
 bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w)
 {

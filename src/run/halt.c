@@ -10,8 +10,8 @@
 #include "base/fileio.h"
 
 #define STOP_FILE "stop"
-// wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
-#define LOOK_SECONDS 0.25
+#define LOOK_SECONDS                                                                                                   \
+    0.25 // wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
 // below them a bit for each signal
 static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50;
 

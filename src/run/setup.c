@@ -19,8 +19,8 @@
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
-// a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
-#define LARGE_RATIO 8.0
+#define LARGE_RATIO                                                                                                    \
+    8.0 // a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
 
 bt_params bt_setup_params(const bt_case *c, double size)
 {

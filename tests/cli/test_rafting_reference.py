@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Floes that raft: the dumped problem of a step against an interior-point method that shares nothing with the sweeps.
 
-    u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound;   |r_t| <= μ r_n against u_t
+    u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound
+    |r_t| <= μ r_n against u_t
     sheets on each other: |(r_x, r_y)| <= R against (u_x, u_y)
 
 For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of

@@ -100,7 +100,9 @@ def test_the_stop_file(whole):
 def test_the_wall_time(whole):
     folder, one = whole
     result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.2", cwd=folder)
-    assert (result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr), result.stderr
+    assert (
+        result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr
+    ), result.stderr
     pieces = 1
     while call("resume", "walled", "--quiet", "--max-wall", "0.2s", cwd=folder).returncode == SIGNAL:
         pieces += 1
@@ -140,7 +142,9 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     assert again.returncode == IO and "holds an unfinished run; go on with it by `bergtow resume out`" in again.stderr
     # Killed before its first checkpoint: from its case, at time zero.
     result = call("resume", "out", cwd=tmp_path)
-    assert (result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout), result.stderr
+    assert (
+        result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout
+    ), result.stderr
     assert Run(tmp_path / "out", None).summary["n_steps"] == STEPS
 
 

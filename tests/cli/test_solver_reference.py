@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The contact solver against others: the dumped problem of a step, solved here by an interior-point method.
 
-    u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= μ r_n, r_t against u_t                       (files: FCLIB, local form)
+    u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= μ r_n, r_t against u_t        (files: FCLIB, local form)
 
 Without friction this is the convex problem min ½ rᵀWr + qᵀr, r >= 0, whose velocities are unique. With friction it is
 solved as a sequence of such problems, each with the friction bounds of the last (Haslinger, Hlaváček & Nečas 1996,
