@@ -259,7 +259,7 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     bt_json_number(&j, "max_crushing_contacts", h->max_crushing);
     bt_json_number(&j, "rafting_pairs", h->rafting);
     bt_json_number(&j, "rafted_area_m2", h->rafted_area);
-    bt_json_number(&j, "rafted_share_of_ice", t->ice_area > 0 ? h->rafted_area / t->ice_area : NAN);
+    bt_json_number(&j, "rafted_share_of_ice", t->ice_area > 0 ? h->rafted_area / t->ice_area : 0);
     bt_json_number(&j, "max_rafted_area_m2", h->max_rafted_area);
     bt_json_number(&j, "largest_rafted_pair_m2", h->rafted_largest);
     bt_json_number(&j, "rafted_energy_j", h->rafted_energy);
@@ -365,7 +365,7 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
                (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
     if (c->ice.rafting_kappa > 0)
         printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J of it in the sheets' height, "
-               "friction between sheets %.4g J\n", h->rafted_area, 100 * h->rafted_area / t->ice_area, h->rafting, h->raft_edge_work,
+               "friction between sheets %.4g J\n", h->rafted_area, t->ice_area > 0 ? 100 * h->rafted_area / t->ice_area : 0.0, h->rafting, h->raft_edge_work,
                h->rafted_energy, h->raft_friction_work);
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
