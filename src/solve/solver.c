@@ -97,13 +97,13 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_rounds_list(tile);
     for (bt_idx i = 0; i < tile->n_units; i++) {
         const bt_unit *u = &tile->units[i];
-        const double r = bt_unit_residual(u, tile->limits ? &tile->limits[i] : NULL, v, &sum);
+        const double r = tile->limits ? bt_unit_residual(u, &tile->limits[i], v, &sum) : bt_unit_residual(u, NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
-        rows += u->n > 0 ? u->n + 1 : 2;
+        rows += u->n + 1 + (u->n == 0);
         const double *x = tile->before[i];
         bool on = p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt; // or did before the last sweep
-        if (u->n == 0) on = on || r > 0;
+        if (tile->limits && u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) tile->list[tile->n_list++] = i;
     }
@@ -156,7 +156,8 @@ static double update_list(bt_tile *tile, bt_vel *v, const bt_inv *inv)
     for (bt_idx j = 0; j < tile->n_list; j++) {
         const bt_idx i = tile->list[j];
         fetch_ahead(tile, j + AHEAD);
-        most = bt_max(most, bt_update_unit(&tile->units[i], tile->limits ? &tile->limits[i] : NULL, v, inv));
+        const bt_limit *k = tile->limits ? &tile->limits[i] : NULL;
+        most = bt_max(most, bt_update_unit(&tile->units[i], k, v, inv));
     }
     return most;
 }
