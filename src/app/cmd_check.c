@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // bergtow check: validates a case and prints the numbers that follow from it. Of a study: cmd_check_study.c.
 //
-// Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full scale) and
-// much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
+// Time step rule [Yulmetov & Løset 2017]: Δt about the duration of a collision (0.1 s in a basin, at most 5 s at full
+// scale) and much smaller than body size / relative speed. "Much smaller" is taken as a tenth here (assumed).
 #include "force/environment.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
@@ -58,8 +58,13 @@ static const struct argp_option check_options[] = {
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp check_argp = {.options = check_options, .parser = parse, .args_doc = "CASE.yml|STUDY.yml", .children = children,
-                                       .doc = "Validate a case and print the numbers that follow from it; or a study, with the case of each of its conditions. Nothing is computed or written."};
+static const struct argp check_argp = {.options = check_options,
+                                       .parser = parse,
+                                       .args_doc = "CASE.yml|STUDY.yml",
+                                       .children = children,
+                                       .doc =
+                                           "Validate a case and print the numbers that follow from it; or a study, "
+                                           "with the case of each of its conditions. Nothing is computed or written."};
 
 static bool reads_field(const bt_case *c) { return c->ice.field || c->ice.outlines; }
 
@@ -70,32 +75,43 @@ static void print_ice(const bt_case *c, const bt_check_ice *n)
     printf("ice region           %g x %g m\n", c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     printf("concentration        %.4g\n", n->concentration);
     const bool read = c->ice.field || c->ice.outlines;
-    printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count, c->ice.field ? " (read from the field file)" : read ? " (read from the outlines)" : "");
+    printf("floes                %s%.0f%s\n", read ? "" : "about ", n->count,
+           c->ice.field ? " (read from the field file)"
+           : read       ? " (read from the outlines)"
+                        : "");
     if (n->count < 1) return;
-    printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness, c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
+    printf("mean floe            size %.4g m, thickness %.4g m, mass about %.4g kg\n", n->size, n->thickness,
+           c->ice.density * n->thickness * BT_PI / 4 * n->size * n->size);
 }
 
 static void print_line(const bt_case *c)
 {
     const bool thrust = c->tow.mode == BT_TOW_THRUST;
     const bt_rope rope = bt_rope_named(c->tow.line.type, c->tow.line.diameter);
-    printf("line                 %s, %d x %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", rope.name, (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
-           c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load, c->tow.line.breaking_load > 0 ? "" : " = never breaks");
+    printf("line                 %s, %d x %.4g m, EA %.4g N, breaking load %s%.4g N%s\n", rope.name,
+           (int)c->tow.line.branches, c->tow.line_length, c->tow.line_stiffness,
+           c->tow.line.breaking_load > 0 ? "" : "none: ", c->tow.line.breaking_load,
+           c->tow.line.breaking_load > 0 ? "" : " = never breaks");
     if (c->tow.line.type != BT_ROPE_NUMBERS)
-        printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight and sag are not simulated\n", 1e3 * c->tow.line.diameter, rope.mass,
-               rope.stiffness, rope.breaking, rope.source);
-    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n", bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
+        printf("line, named          diameter %.4g mm, %.4g kg/m, new EA %.4g N and breaking load %.4g N (%s); weight "
+               "and sag are not simulated\n",
+               1e3 * c->tow.line.diameter, rope.mass, rope.stiffness, rope.breaking, rope.source);
+    printf("line, start          period of the body on the line %.3g s, ramp %.4g s, at least %g periods: %s\n",
+           bt_case_line_period(c), c->tow.ramp, BT_RAMP_PERIODS,
            bt_case_start_is_slow(c) ? "ok" : "TOO SHORT: the start jerks the line");
     if (!thrust) return;
     const double v = bt_min(c->tow.speed, c->tow.vessel.free_speed), r = v / c->tow.vessel.free_speed;
-    printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: %.4g N\n", c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v,
-           c->tow.vessel.bollard_pull * (1 - r * r));
+    printf("vessel               bollard pull %.4g N, free-running %.4g m/s; net pull left for the line at %.4g m/s: "
+           "%.4g N\n",
+           c->tow.vessel.bollard_pull, c->tow.vessel.free_speed, v, c->tow.vessel.bollard_pull * (1 - r * r));
 }
 
 static void print_outlines(const bt_outline_counts *o, const bt_case *c)
 {
     if (o->read)
-        printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64 " double or collinear vertices dropped\n", o->read, o->turned, o->dropped);
+        printf("outlines             %" PRId64 " read, %" PRId64 " turned round, %" PRId64
+               " double or collinear vertices dropped\n",
+               o->read, o->turned, o->dropped);
     if (o->read) printf("coordinates          %s\n", o->crs);
     if (o->read && isfinite(o->east))
         printf("origin               %.10g m east, %.10g m north at x = y = 0\n", o->east, o->north);
@@ -103,8 +119,12 @@ static void print_outlines(const bt_outline_counts *o, const bt_case *c)
         printf("not convex           %" PRId64 " floes by rounding alone: %" PRId64
                " corners left out, which adds %.3g m2\n",
                o->rounded, o->rounded_corners, o->rounded_area);
-    if (o->read && isfinite(o->lon)) printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI, o->lat * 180 / BT_PI);
-    if (o->hulled) printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled, o->hull_area);
+    if (o->read && isfinite(o->lon))
+        printf("origin               %.6f deg E, %.6f deg N at x = y = 0\n", o->lon * 180 / BT_PI,
+               o->lat * 180 / BT_PI);
+    if (o->hulled)
+        printf("not convex           %" PRId64 " floes replaced by their hulls, which adds %.4g m2\n", o->hulled,
+               o->hull_area);
     if (o->split) printf("not convex           %" PRId64 " floes in %" PRId64 " convex parts\n", o->split, o->parts);
     bt_errors warnings = {0};
     bt_outline_warn(o, c, &warnings);
@@ -121,17 +141,22 @@ static void print_body(const bt_case *c)
         return;
     }
     bt_moments m = bt_shape_moments(n, v);
-    double ahead = c->tow.direction - c->body.yaw, across = bt_shape_width(n, v, cos(ahead), sin(ahead)), along = bt_shape_width(n, v, -sin(ahead), cos(ahead));
+    double ahead = c->tow.direction - c->body.yaw, across = bt_shape_width(n, v, cos(ahead), sin(ahead)),
+           along = bt_shape_width(n, v, -sin(ahead), cos(ahead));
     double mass = bt_case_body_mass(c), displaced = c->water.density * m.area * c->body.draft;
-    printf("body                 %.4g m along the tow, %.4g m across, waterline %.4g m2, draft %.4g m, sail %.4g m\n", along, across, m.area, c->body.draft, c->body.sail);
-    printf("body mass            %.4g kg, %.4g kg with added mass; displaced water %.4g kg (ratio %.3f)\n", mass, mass * (1 + c->body.added_mass), displaced, mass / displaced);
+    printf("body                 %.4g m along the tow, %.4g m across, waterline %.4g m2, draft %.4g m, sail %.4g m\n",
+           along, across, m.area, c->body.draft, c->body.sail);
+    printf("body mass            %.4g kg, %.4g kg with added mass; displaced water %.4g kg (ratio %.3f)\n", mass,
+           mass * (1 + c->body.added_mass), displaced, mass / displaced);
     double speed = c->tow.speed;
     if (c->tow.mode == BT_TOW_NONE) {
         printf("tow                  none, free drift\n");
         return;
     }
-    static const char *const modes[] = {[BT_TOW_NONE] = "none", [BT_TOW_SPEED] = "speed", [BT_TOW_LINE] = "line", [BT_TOW_THRUST] = "thrust"};
-    printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", modes[c->tow.mode], speed, bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
+    static const char *const modes[] = {
+        [BT_TOW_NONE] = "none", [BT_TOW_SPEED] = "speed", [BT_TOW_LINE] = "line", [BT_TOW_THRUST] = "thrust"};
+    printf("tow                  %s, %.4g m/s, %.4g m in all, Froude number %.3g\n", modes[c->tow.mode], speed,
+           bt_case_tow_distance(c, c->run.duration), speed / sqrt(gravity * along));
     if (c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST) print_line(c);
 }
 
@@ -140,7 +165,9 @@ static void print_crushing(const bt_case *c, const bt_check_ice *n)
 {
     if (!(c->ice.crushing_pressure > 0) || n->count < 1) return;
     const double line = c->ice.crushing_pressure * n->thickness;
-    printf("crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n", line, line * c->ice.crushing_least * n->thickness, line * n->size);
+    printf(
+        "crushing             %.4g N per m of contact, %.4g N at the first touch; a mean floe's width bears %.4g N\n",
+        line, line * c->ice.crushing_least * n->thickness, line * n->size);
 }
 
 /// Load under which an edge of the mean floe rafts, and the friction of sheets on each other.
@@ -148,7 +175,8 @@ static void print_rafting(const bt_case *c, const bt_check_ice *n)
 {
     if (!(c->ice.rafting_kappa > 0) || n->count < 1) return;
     const double share = c->ice.density / c->water.density, h = n->thickness;
-    printf("rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an edge of a mean floe's width rafts at %.4g N\n",
+    printf("rafting              from %.4g N per m of edge (kappa %.3g, assumed), and %.4g N per m2 of overlap; an "
+           "edge of a mean floe's width rafts at %.4g N\n",
            c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h, c->ice.rafting_kappa,
            c->ice.friction * (c->water.density - c->ice.density) * gravity * h,
            c->ice.rafting_kappa * 0.5 * c->ice.density * (1 - share) * gravity * h * h * n->size);
@@ -158,15 +186,17 @@ static void print_window(const bt_case *c)
 {
     if (c->domain.ends != BT_BOUND_MOVING) return;
     const double way = bt_case_tow_distance(c, c->run.duration);
-    printf("moving window        the body keeps %.4g m from its front and %.4g m from its rear; the tow is %.3g windows long\n", c->domain.ahead,
-           c->domain.length - c->domain.ahead, way / c->domain.length);
+    printf("moving window        the body keeps %.4g m from its front and %.4g m from its rear; the tow is %.3g "
+           "windows long\n",
+           c->domain.ahead, c->domain.length - c->domain.ahead, way / c->domain.length);
 }
 
 /// With a field that was read as it will be; of a field that is still to be made, the strip.
 static void print_lead(const bt_case *c, const bt_lead_stats *lead)
 {
     if (c->lead.mode == BT_LEAD_NONE) return;
-    printf("lead                 %s, %.4g m wide, %.4g m long, %.4g m2 of strip", c->lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed", c->lead.width, c->lead.length,
+    printf("lead                 %s, %.4g m wide, %.4g m long, %.4g m2 of strip",
+           c->lead.mode == BT_LEAD_CHANNEL ? "channel" : "managed", c->lead.width, c->lead.length,
            c->lead.width * c->lead.length);
     if (c->lead.mode == BT_LEAD_MANAGED) printf(", pieces of at most %.4g m", c->lead.floe_size);
     printf("\n");
@@ -183,8 +213,10 @@ static void print_environment(const bt_case *c)
         const bt_table *t = water ? &c->water.table : &c->air.table;
         if (most == 0) continue;
         printf("%-20s (%.4g, %.4g) m/s at the start", names[water], v[0], v[1]);
-        if (t->n > 0) printf(", table of %" PRId64 " rows to %g s, at most %.4g m/s", t->n, t->row[3 * (t->n - 1)], most);
-        else if (water && c->water.tide.major > 0) printf(", tide of %.4g m/s in %.4g h", c->water.tide.major, c->water.tide.period / 3600);
+        if (t->n > 0)
+            printf(", table of %" PRId64 " rows to %g s, at most %.4g m/s", t->n, t->row[3 * (t->n - 1)], most);
+        else if (water && c->water.tide.major > 0)
+            printf(", tide of %.4g m/s in %.4g h", c->water.tide.major, c->water.tide.period / 3600);
         printf("\n");
     }
 }
@@ -205,14 +237,22 @@ static void print_step(const bt_case *c, const bt_check_ice *n)
     printf("steps                %" PRId64 " of %g s = %g s\n", bt_case_steps(c), dt, c->run.duration);
     printf("reference speed      %.4g m/s, contact law solved to %.3g m/s\n", speed, speed * c->solver.tolerance);
     const bt_check_step s = bt_check_step_of(c, n);
-    printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, s.longest, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(s.contact));
+    printf("time step, contact   %g s, at most %g s, the duration of a collision %s: %s\n", dt, s.longest,
+           c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", verdict(s.contact));
     if (n->count < 1) return;
-    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed, s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, verdict(s.floes));
+    printf("time step, floes     moves %.3g %s a step, at most 0.1 (%.3g s to pass one): %s\n", s.passed,
+           s.pieces ? "pieces of the lead" : "floe sizes", s.size / speed, verdict(s.floes));
 }
 
 static const char *bytes(double b, char out[32])
 {
-    snprintf(out, 32, b < 999.5e6 ? "%.3g MB" : b < 999.5e9 ? "%.3g GB" : "%.3g TB", b < 999.5e6 ? b / 1e6 : b < 999.5e9 ? b / 1e9 : b / 1e12);
+    snprintf(out, 32,
+             b < 999.5e6   ? "%.3g MB"
+             : b < 999.5e9 ? "%.3g GB"
+                           : "%.3g TB",
+             b < 999.5e6   ? b / 1e6
+             : b < 999.5e9 ? b / 1e9
+                           : b / 1e12);
     return out;
 }
 
@@ -220,13 +260,15 @@ static const char *bytes(double b, char out[32])
 static void print_cost(const bt_case *c, const bt_comm *comm, const bt_check_ice *n)
 {
     const double per_step = bt_cost_floe_step(n->concentration), seconds = bt_check_seconds(c, n);
-    const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size), several = bt_cost_disk_of(c, n->count, n->corners, 2);
+    const bt_cost_disk d = bt_cost_disk_of(c, n->count, n->corners, comm->size),
+                       several = bt_cost_disk_of(c, n->count, n->corners, 2);
     char a[32], b[32], e[32];
     printf("memory               about %s\n", bytes(bt_cost_memory(c, n->count, comm->size, comm->ranks_here), a));
     printf("frames               %.0f\n", bt_cost_frames(c));
     printf("disk                 about %s, up to %s while it runs", bytes(bt_cost_left(&d), a), bytes(d.most, b));
     if (comm->size == 1) printf("; %s from several ranks, which do not compress", bytes(bt_cost_left(&several), e));
-    printf("\nwall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n", seconds, 1e6 * per_step);
+    printf("\nwall time            rough estimate %.2g s on one core (%.2g us a floe and step at this concentration)\n",
+           seconds, 1e6 * per_step);
 }
 
 static const char *warned(size_t n, char out[64])
@@ -257,7 +299,8 @@ static void print_packing(const bt_case *c, const bt_check_ice *n)
     const bt_packing p = bt_packing_of(c, n->concentration);
     if (p.time == 0) printf("wall ahead           the ice is packed (%g) up to it from the start\n", p.packed);
     else if (isfinite(p.time))
-        printf("wall ahead           reached by packed ice (%g) at about %.3g s, after %.3g m of tow (estimate)\n", p.packed, p.time, p.way);
+        printf("wall ahead           reached by packed ice (%g) at about %.3g s, after %.3g m of tow (estimate)\n",
+               p.packed, p.time, p.way);
 }
 
 static bt_status print_numbers(const char *path, const bt_case *c, bt_field *f, bt_errors *err)
@@ -306,7 +349,8 @@ static bt_status check_study(const options *o, bt_errors *err)
 {
     if (o->file.n_set == 0 && !(o->scale > 0)) return bt_check_study(o->file.path, err);
     bt_errors_add(err, "%s: is a study, and %s is for a case; %s", o->file.path, o->scale > 0 ? "--scale" : "--set",
-                  o->scale > 0 ? "scale its base case, and give that as `base`" : "write what holds for all its members under `set` in the file");
+                  o->scale > 0 ? "scale its base case, and give that as `base`"
+                               : "write what holds for all its members under `set` in the file");
     return BT_ERR_USAGE;
 }
 

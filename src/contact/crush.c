@@ -9,7 +9,8 @@
 #include "contact/row.h"
 #include "contact/work.h"
 
-#define LEAST_WAY 0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
+// of the mean floe size: the contact length is linear over the approach of the step, or over this
+#define LEAST_WAY 0.01
 
 bool bt_crush_on(const bt_params *p) { return p->crush_pressure > 0; }
 
@@ -48,8 +49,8 @@ static int by_bodies(const void *p, const void *q)
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on from part to part is
-/// sliding.
+/// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on
+/// from part to part is sliding.
 static void inherit(const bt_tile *t, const bt_trace *names, const bt_manifold *m, bt_limit *l)
 {
     if (t->n_memory == 0) return;
@@ -92,7 +93,8 @@ static patch patch_of(const bt_world *w, const uint16_t part[2], const bt_manifo
     return o.n > 0 ? (patch){high - low, 0.5 * (low + high)} : (patch){0, NAN};
 }
 
-/// Length of a patch that falls to point i of the manifold: uniform pressure on it, as forces at the points. NaN: to each alike.
+/// Length of a patch that falls to point i of the manifold: uniform pressure on it, as forces at the points. NaN: to
+/// each alike.
 static double share_of(const bt_manifold *m, int i, patch c)
 {
     if (m->n_points == 1) return 1;
@@ -110,7 +112,8 @@ void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, c
     bt_limit *l = &t->limits[j];
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
     const bt_trace names = bt_law_names(w, p, BT_LAW_CRUSHING);
-    const bool rafts = l->trace[BT_LAW_RAFTING] >= 0; // then its edges bear no more than this, and give way as they do when they raft
+    // then its edges bear no more than this, and give way as they do when they raft
+    const bool rafts = l->trace[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
     double gap = INFINITY, approach = 0;
     for (int i = 0; i < m->n_points; i++) {
@@ -121,9 +124,11 @@ void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, c
     }
     const double per_length = w->par.crush_pressure * h * dt, least = w->par.crush_least * h / m->n_points;
     const double way = bt_max(dt * approach - gap, LEAST_WAY * w->par.size);
-    const patch now = patch_of(w, p->part, m, gap + w->par.slop), then = patch_of(w, p->part, m, gap + w->par.slop + way);
+    const patch now = patch_of(w, p->part, m, gap + w->par.slop),
+                then = patch_of(w, p->part, m, gap + w->par.slop + way);
     for (int i = 0; i < m->n_points; i++) {
-        const double length = now.length * share_of(m, i, now), later = bt_max(length, then.length * share_of(m, i, then));
+        const double length = now.length * share_of(m, i, now),
+                     later = bt_max(length, then.length * share_of(m, i, then));
         l->flat[i] = bt_min(l->flat[i], per_length * bt_max(length, least));
         l->most[i] = bt_min(l->most[i], per_length * bt_max(later, least));
         if (later <= bt_max(length, least)) continue; // as long as it gets

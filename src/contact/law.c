@@ -12,14 +12,29 @@
 
 const bt_law bt_laws[BT_LAWS] = {
     [BT_LAW_RIGID] = {.name = "rigid", .what = "a contact bears any load"},
-    [BT_LAW_CRUSHING] = {.name = "crushing", .keys = "ice.crushing", .on = bt_crush_on,
-                         .what = "ice bears a pressure, and what cannot be borne is crushed", .applies = bt_crush_applies,
-                         .bound = bt_crush_bound, .keeps = bt_crush_keeps, .gives_way = bt_crush_gives_way,
-                         .give_way = bt_crush_give_way, .remember = bt_crush_remember, .count = bt_crush_count},
-    [BT_LAW_RAFTING] = {.name = "rafting", .keys = "ice.rafting", .on = bt_raft_on,
-                        .what = "edges bear a line load, and floes that are pressed together harder slide over each other",
-                        .applies = bt_raft_applies, .contact = bt_raft_contact, .bound = bt_raft_bound, .keeps = bt_raft_keeps,
-                        .gives_way = bt_raft_gives_way, .give_way = bt_raft_give_way, .remember = bt_raft_remember,
+    [BT_LAW_CRUSHING] = {.name = "crushing",
+                         .keys = "ice.crushing",
+                         .on = bt_crush_on,
+                         .what = "ice bears a pressure, and what cannot be borne is crushed",
+                         .applies = bt_crush_applies,
+                         .bound = bt_crush_bound,
+                         .keeps = bt_crush_keeps,
+                         .gives_way = bt_crush_gives_way,
+                         .give_way = bt_crush_give_way,
+                         .remember = bt_crush_remember,
+                         .count = bt_crush_count},
+    [BT_LAW_RAFTING] = {.name = "rafting",
+                        .keys = "ice.rafting",
+                        .on = bt_raft_on,
+                        .what =
+                            "edges bear a line load, and floes that are pressed together harder slide over each other",
+                        .applies = bt_raft_applies,
+                        .contact = bt_raft_contact,
+                        .bound = bt_raft_bound,
+                        .keeps = bt_raft_keeps,
+                        .gives_way = bt_raft_gives_way,
+                        .give_way = bt_raft_give_way,
+                        .remember = bt_raft_remember,
                         .count = bt_raft_count},
 };
 
@@ -57,7 +72,8 @@ void bt_laws_reserve(bt_tile *t)
 void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->limits[j];
-    *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}, .trace = {-1, -1, -1}};
+    *l = (bt_limit){
+        .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}, .trace = {-1, -1, -1}};
     // The last first: what has rafted is not measured from what was crushed before.
     for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {
         if (m->n_points == 0 && !bt_laws[law].contact) continue; // sheets are of one law alone
@@ -68,7 +84,8 @@ void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
 
 double bt_laws_overlap(const bt_tile *t)
 {
-    // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it alone.
+    // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it
+    // alone.
     double deepest = 0;
     for (bt_idx j = 0; j < t->n_units; j++)
         for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);

@@ -1,22 +1,25 @@
 // SPDX-License-Identifier: MIT
 // Contact laws: a table with one row a law, and what a law may ask for.
 //
-// Every pair obeys Signorini's conditions and Coulomb's (solve/solver.h). A law bounds the normal impulse of a contact point from above,
+// Every pair obeys Signorini's conditions and Coulomb's (solve/solver.h). A law bounds the normal impulse of a contact
+// point from above,
 //     0 <= λ <= L(w),   w > 0 only if λ = 0,   w < 0 only if λ is at its bound,
-// and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound holds, and the law that sets it
-// gives way. The bounds of all laws have one shape, so that there is one update of a contact for all of them (solve/limit.h):
+// and says what gives way there: a pair to which no law applies is rigid, L = ∞. Where several apply the least bound
+// holds, and the law that sets it gives way. The bounds of all laws have one shape, so that there is one update of a
+// contact for all of them (solve/limit.h):
 //     L(w) = min(most, max(flat, base + slope (−w − place)))
 //
-// Memory. What a law remembers of a pair is one record, bt_trace (space/tiles.h), kept in the tile that owns the pair, sorted by (a, b, part, law). It
-// is state: it goes with the pair to other tiles and ranks, into checkpoints, and into the hash of the state, whatever the law. So does
-// what every pair remembers, its impulses of the last step; they are the record of the rigid law.
+// Memory. What a law remembers of a pair is one record, bt_trace (space/tiles.h), kept in the tile that owns the pair,
+// sorted by (a, b, part, law). It is state: it goes with the pair to other tiles and ranks, into checkpoints, and into
+// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step, travels and is saved
+// in the same way as the record of the rigid law.
 //
-// In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace what the outlines give (contact/raft.h); the
-// sweeps know bounds only; after them `gives_way` tells which points are at the bound and approach, `give_way` books what that took, and
-// `remember` writes the record.
+// In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace what the outlines give
+// (contact/raft.h); the sweeps know bounds only; after them `gives_way` tells which points are at the bound and
+// approach, `give_way` books what that took, and `remember` writes the record.
 //
-// A new law is a row in bt_laws, its keys in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and src/output/record_series.c, and a
-// test in tests/physics. The sweep is not touched.
+// A new law is a row in bt_laws, its keys in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and
+// src/output/record_series.c, and a test in tests/physics. The sweep is not touched.
 #ifndef BERGTOW_LAW_H
 #define BERGTOW_LAW_H
 
@@ -53,9 +56,11 @@ typedef struct bt_law {
     bool (*on)(const bt_params *p);
     /// To this pair?
     bool (*applies)(const bt_world *w, bt_idx a, bt_idx b);
-    /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h). NULL = the outlines.
+    /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h).
+    /// NULL = the outlines.
     bool (*contact)(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_manifold *edge, bt_manifold *sheets);
-    /// Narrow the bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the surfaces that are left.
+    /// Narrow the bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the
+    /// surfaces that are left.
     void (*bound)(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
     /// Brings the record up to date with the poses; does it stay?
     bool (*keeps)(const bt_world *w, bt_trace *r);

@@ -13,7 +13,10 @@ static int count_of(const bt_bodies *s, bt_idx i, int part)
     return part ? s->mark[first].count : (int)(s->offset[i + 1] - first);
 }
 
-static const double *outline_of(const bt_bodies *s, bt_idx i, int part) { return s->outline + 2 * (s->offset[i] + part); }
+static const double *outline_of(const bt_bodies *s, bt_idx i, int part)
+{
+    return s->outline + 2 * (s->offset[i] + part);
+}
 
 /// What lies to the left of the line from (x0, y0) along (ex, ey), an edge of b.
 static void cut(bt_overlap *o, double x0, double y0, double ex, double ey)
@@ -76,7 +79,8 @@ double bt_overlap_area(const bt_overlap *o, double centroid[2])
     return bt_max(0, 0.5 * twice);
 }
 
-/// How far inside an outline, placed at (x, y), point p is from the nearest edge that faces along (nx, ny); INFINITY where none does.
+/// How far inside an outline, placed at (x, y), point p is from the nearest edge that faces along (nx, ny); INFINITY
+/// where none does.
 static double inside_of(const double *q, int n, double x, double y, const double *p, double nx, double ny)
 {
     double least = INFINITY;
@@ -90,7 +94,8 @@ static double inside_of(const double *q, int n, double x, double y, const double
     return least;
 }
 
-void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], const bt_overlap *o, double blend, double grad[2], double *turn)
+void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], const bt_overlap *o,
+                         double blend, double grad[2], double *turn)
 {
     const bt_bodies *s = &w->bodies;
     double off[2];
@@ -103,8 +108,9 @@ void bt_overlap_gradient(const bt_world *w, bt_idx a, bt_idx b, const uint16_t p
         if (!(length > 0)) continue;
         const double middle[2] = {0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])}, nx = ey / length, ny = -ex / length;
         const bool of_b = o->of_b[o->now][k];
-        const double depth = of_b ? inside_of(outline_of(s, a, part[0]), count_of(s, a, part[0]), 0, 0, middle, nx, ny)
-                                  : inside_of(outline_of(s, b, part[1]), count_of(s, b, part[1]), off[0], off[1], middle, nx, ny);
+        const double depth =
+            of_b ? inside_of(outline_of(s, a, part[0]), count_of(s, a, part[0]), 0, 0, middle, nx, ny)
+                 : inside_of(outline_of(s, b, part[1]), count_of(s, b, part[1]), off[0], off[1], middle, nx, ny);
         const double weight = (of_b ? 0.5 : -0.5) * bt_min(1, depth / blend);
         grad[0] += weight * ey;
         grad[1] -= weight * ex;

@@ -3,8 +3,8 @@
 //
 // Order. Units that follow each other should not share a body: the processor then works on several at once, where each
 // would otherwise wait for the velocities of the one before. So a tile's manifolds are coloured first-fit in the
-// order of their gids (every body of the block keeps a mask of the colours it has), and stand by colour. The order follows from the
-// manifolds and their gids alone, and is the same wherever and whenever the pair list was made.
+// order of their gids (every body of the block keeps a mask of the colours it has), and stand by colour. The order
+// follows from the manifolds and their gids alone, and is the same wherever and whenever the pair list was made.
 #include "contact/pack.h"
 
 #include <math.h>
@@ -49,7 +49,8 @@ static bt_idx in_block(const bt_tiles *ts, const bt_tile *t, const bt_idx base[4
     const bt_idx block[4] = {t->right, t->above, t->diagonal};
     if (i >= t->first && i < t->end) return i - t->first;
     for (int k = 0; k < 3; k++)
-        if (block[k] >= 0 && i >= ts->tile[block[k]].first && i < ts->tile[block[k]].end) return base[k + 1] + i - ts->tile[block[k]].first;
+        if (block[k] >= 0 && i >= ts->tile[block[k]].first && i < ts->tile[block[k]].end)
+            return base[k + 1] + i - ts->tile[block[k]].first;
     return -1;
 }
 
@@ -70,7 +71,8 @@ static int colour_units(const bt_world *w, const bt_tile *t, bt_pack_scratch *s,
     int n_colours = 0;
     for (size_t k = 0; k < s->n; k++) {
         const bt_manifold *m = &s->man[k];
-        const bt_idx i = b->inv[m->a].m > 0 ? in_block(ts, t, base, m->a) : -1, j = b->inv[m->b].m > 0 ? in_block(ts, t, base, m->b) : -1;
+        const bt_idx i = b->inv[m->a].m > 0 ? in_block(ts, t, base, m->a) : -1,
+                     j = b->inv[m->b].m > 0 ? in_block(ts, t, base, m->b) : -1;
         const uint64_t used = (i >= 0 ? s->used[i] : 0) | (j >= 0 ? s->used[j] : 0);
         const int colour = ~used ? __builtin_ctzll(~used) : MAX_COLOURS; // none left: at the end, one by one
         if (colour < MAX_COLOURS && i >= 0) s->used[i] |= (uint64_t)1 << colour;
@@ -100,10 +102,12 @@ static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt
 {
     const bt_inv ia = w->bodies.inv[m->a], ib = w->bodies.inv[m->b];
     const bt_point *q = &m->p[0];
-    *u = (bt_unit){.a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0]};
+    *u = (bt_unit){
+        .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0]};
     *g = (bt_gaps){.pair = pair};
     const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
-    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt, xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
+    const double y = ia.i * u->rat * u->rat + ib.i * u->rbt * u->rbt,
+                 xy = ia.i * u->ran[0] * u->rat + ib.i * u->rbn[0] * u->rbt;
     u->w[0] = u->wt = free + 0.5 * (x + y) + sqrt(0.25 * (x - y) * (x - y) + xy * xy);
     u->mn[0] = u->mt = 1 / u->w[0];
 }

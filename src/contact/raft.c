@@ -7,7 +7,8 @@
 #include "contact/overlap.h"
 #include "contact/work.h"
 
-#define LEAST_LENGTH 1e-3 // of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other
+// of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other
+#define LEAST_LENGTH 1e-3
 
 bool bt_raft_on(const bt_params *p) { return p->raft_line > 0; }
 
@@ -60,13 +61,15 @@ static void set_point(bt_manifold *m, double x, double y, const double off[2], d
 }
 
 /// The edge: two points on the line of the gradient, as near to the centroid of the overlap as that line comes.
-static void edge_of(const double grad[2], double turn, double length, double gap, const double centroid[2], const double off[2], bt_manifold *m)
+static void edge_of(const double grad[2], double turn, double length, double gap, const double centroid[2],
+                    const double off[2], bt_manifold *m)
 {
     m->nx = -grad[0] / length, m->ny = -grad[1] / length;
     const double lever = -turn / length, along = centroid[0] * m->nx + centroid[1] * m->ny;
     const double x = lever * m->ny + along * m->nx, y = -lever * m->nx + along * m->ny;
     for (int side = -1; side <= 1; side += 2)
-        set_point(m, x - side * 0.25 * length * m->ny, y + side * 0.25 * length * m->nx, off, gap, side < 0 ? 0xfff00000u : 0xfff00001u);
+        set_point(m, x - side * 0.25 * length * m->ny, y + side * 0.25 * length * m->nx, off, gap,
+                  side < 0 ? 0xfff00000u : 0xfff00001u);
 }
 
 /// False without an edge; `sheets` always.
@@ -92,7 +95,8 @@ static void lengths_of(const bt_manifold *m, double slop, double length[2])
 {
     length[0] = length[1] = 0;
     if (m->n_points < 2) return;
-    const double dx = m->p[1].ra[0] - m->p[0].ra[0], dy = m->p[1].ra[1] - m->p[0].ra[1], tilt = fabs(m->p[1].gap - m->p[0].gap);
+    const double dx = m->p[1].ra[0] - m->p[0].ra[0], dy = m->p[1].ra[1] - m->p[0].ra[1],
+                 tilt = fabs(m->p[1].gap - m->p[0].gap);
     const double all = fabs(m->nx * dy - m->ny * dx), share = tilt > slop ? slop / tilt : 1;
     const int near = m->p[1].gap < m->p[0].gap;
     length[near] = all * share * (1 - 0.5 * share);

@@ -16,7 +16,8 @@ static inline double bt_tangent_velocity(const bt_unit *u, const bt_vel *va, con
 }
 
 /// Add impulses to both velocities: normal total jn = Σ λ, its moments Σ λ ra×n and Σ λ rb×n, tangential jt.
-static inline void bt_apply(const bt_unit *u, double jn, double ma, double mb, double jt, bt_inv ia, bt_inv ib, bt_vel *va, bt_vel *vb)
+static inline void bt_apply(const bt_unit *u, double jn, double ma, double mb, double jt, bt_inv ia, bt_inv ib,
+                            bt_vel *va, bt_vel *vb)
 {
     const double jx = jn * u->nx - jt * u->ny, jy = jn * u->ny + jt * u->nx;
     va->x -= ia.m * jx;

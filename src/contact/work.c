@@ -9,14 +9,16 @@
 static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
 {
     bt_vel v = w->bodies.vel_free[i];
-    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow)) bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
+    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow))
+        bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
     return v;
 }
 
 double bt_contacts_normal_work(const bt_world *w, const bt_unit *u, int i)
 {
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
-    return 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
+    return 0.5 * u->ln[i] *
+           (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
 }
 
 double bt_contacts_work(const bt_world *w, const bt_unit *u)
@@ -25,6 +27,7 @@ double bt_contacts_work(const bt_world *w, const bt_unit *u)
     const bt_vel *va = &w->bodies.vel[u->a], *vb = &w->bodies.vel[u->b];
     double work = 0.5 * u->lt * (bt_tangent_velocity(u, &fa, &fb) + bt_tangent_velocity(u, va, vb));
     const int n = u->n > 0 ? u->n : 1; // sheets have one component here
-    for (int i = 0; i < n; i++) work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
+    for (int i = 0; i < n; i++)
+        work += 0.5 * u->ln[i] * (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, va, vb));
     return work;
 }

@@ -3,8 +3,9 @@
 //
 // Rows in the order of the manifolds (the order of the ids), normal then tangent. W = J M⁻¹ Jᵀ couples contacts that
 // share a movable body. q follows from the solution, q = u − W r with u = J U2 + b, so that what a tow line adds
-// (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the solution. Sheets that
-// lie on each other (contact/raft.h) are contacts, too, whose two components are bounded by a disc.
+// (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the
+// solution. Sheets that lie on each other (contact/raft.h) are contacts, too, whose two components are bounded by a
+// disc.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -51,8 +52,20 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
 static row sheets_of(const bt_world *w, const bt_tile *t, bt_idx j)
 {
     const bt_unit *u = &t->units[j];
-    return (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = 2, .a = u->a, .b = u->b, .nx = u->nx, .ny = u->ny,
-                 .ran = u->ran[0], .rbn = u->rbn[0], .rat = u->rat, .rbt = u->rbt, .ln = u->ln[0], .lt = u->lt, .bound = INFINITY,
+    return (row){.gid_a = w->bodies.gid[u->a],
+                 .gid_b = w->bodies.gid[u->b],
+                 .point = 2,
+                 .a = u->a,
+                 .b = u->b,
+                 .nx = u->nx,
+                 .ny = u->ny,
+                 .ran = u->ran[0],
+                 .rbn = u->rbn[0],
+                 .rat = u->rat,
+                 .rbt = u->rbt,
+                 .ln = u->ln[0],
+                 .lt = u->lt,
+                 .bound = INFINITY,
                  .disc = t->limits[j].flat[0]};
 }
 
@@ -70,10 +83,25 @@ static row *rows_of(const bt_world *w, int *n)
             const double total = u->ln[0] + u->ln[1];
             if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->tile[k], j);
             for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
-                rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a], .gid_b = w->bodies.gid[u->b], .point = i, .a = u->a, .b = u->b, .nx = u->nx,
-                                     .ny = u->ny, .ran = u->ran[i], .rbn = u->rbn[i], .rat = u->rat, .rbt = u->rbt, .bias = u->bias[i],
-                                     .mu = u->mu, .ln = u->ln[i], .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
-                                     .disc = NAN, .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel) : INFINITY};
+                rows[(*n)++] =
+                    (row){.gid_a = w->bodies.gid[u->a],
+                          .gid_b = w->bodies.gid[u->b],
+                          .point = i,
+                          .a = u->a,
+                          .b = u->b,
+                          .nx = u->nx,
+                          .ny = u->ny,
+                          .ran = u->ran[i],
+                          .rbn = u->rbn[i],
+                          .rat = u->rat,
+                          .rbt = u->rbt,
+                          .bias = u->bias[i],
+                          .mu = u->mu,
+                          .ln = u->ln[i],
+                          .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
+                          .disc = NAN,
+                          .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel)
+                                                      : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;
@@ -105,7 +133,13 @@ static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
         const double at[3] = {i < 0 ? NAN : b->pose[i].x, i < 0 ? NAN : b->pose[i].y, i < 0 ? NAN : b->pose[i].yaw};
         memcpy(pose + 3 * g, at, sizeof at);
     }
-    return (bt_fclib_places){.time = (double)w->step * w->par.dt, .dt = w->par.dt, .body = body, .normal = normal, .lever = lever, .n_bodies = (int64_t)b->n_global, .pose = pose};
+    return (bt_fclib_places){.time = (double)w->step * w->par.dt,
+                             .dt = w->par.dt,
+                             .body = body,
+                             .normal = normal,
+                             .lever = lever,
+                             .n_bodies = (int64_t)b->n_global,
+                             .pose = pose};
 }
 
 static int by_contact(const void *a, const void *b)
@@ -197,9 +231,28 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         q[i] = u[i] - wr;
     }
     const bt_fclib_places places = places_of(w, rows, n);
-    bt_status status = bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_laws_on(&w->par) ? bound : NULL, bt_law_on(&w->par, BT_LAW_RAFTING) ? disc : NULL, &places, "bergtow",
-                                              "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {rows, first, at, next, ptr, col, val, q, mu, u, r, near, bound, disc, (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
+    bt_status status =
+        bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_laws_on(&w->par) ? bound : NULL,
+                               bt_law_on(&w->par, BT_LAW_RAFTING) ? disc : NULL, &places, "bergtow",
+                               "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
+    void *arrays[] = {rows,
+                      first,
+                      at,
+                      next,
+                      ptr,
+                      col,
+                      val,
+                      q,
+                      mu,
+                      u,
+                      r,
+                      near,
+                      bound,
+                      disc,
+                      (void *)places.body,
+                      (void *)places.normal,
+                      (void *)places.lever,
+                      (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

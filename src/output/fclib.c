@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
 // The contact problem of one step in the file format of FCLIB, so that other solvers can check ours.
 //
-// Layout as FCLIB's reader (github.com/FrictionalContactLibrary/fclib, src/fclib.h) expects it; every scalar is a dataset
-// of one entry, integers are of 32 bits:
+// Layout as FCLIB's reader (github.com/FrictionalContactLibrary/fclib, src/fclib.h) expects it; every scalar is a
+// dataset of one entry, integers are of 32 bits:
 //     /fclib_local/spacedim                       2
 //     /fclib_local/W/{nzmax, m, n, nz, p, i, x}    nz = −2: compressed rows (p [m+1], i columns, x values)
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
-//     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc about 0 that both
-//                                                  components of a contact lie in (mu is 0), NaN = it is no such contact; where contacts and bodies are
+//     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc about
+//                                                  0 that both components of a contact lie in (mu is 0; NaN: it is
+//                                                  no such contact); where contacts and bodies are
 // A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 
@@ -71,8 +72,8 @@ static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const 
     free(rows);
 }
 
-static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_col, const double *w_val, const double *q,
-                        const double *r)
+static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_col, const double *w_val,
+                        const double *q, const double *r)
 {
     double *u = bt_alloc((size_t)m, sizeof *u);
     for (int i = 0; i < m; i++) {
@@ -103,15 +104,18 @@ static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
     bt_h5_write(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal);
     describe(h, "/places/normal", "1", "from the first body to the second, world frame");
     bt_h5_write(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever);
-    describe(h, "/places/lever", "m", "from the centroid of the first and of the second body to the contact point, world frame, at the start of the step");
+    describe(h, "/places/lever", "m",
+             "from the centroid of the first and of the second body to the contact point, world frame, at the start of "
+             "the step");
     bt_h5_write(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose);
     describe(h, "/places/pose", "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
 }
 
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
                                  const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound, const double *disc, const bt_fclib_places *places,
-                                 const char *title, const char *description, bt_errors *err)
+                                 const double *solution_u, const double *solution_r, const double *bound,
+                                 const double *disc, const bt_fclib_places *places, const char *title,
+                                 const char *description, bt_errors *err)
 {
     bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
     if (status != BT_OK) return status;
@@ -151,5 +155,6 @@ bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *
                                const double *solution_u, const double *solution_r, const char *title,
                                const char *description, bt_errors *err)
 {
-    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL, NULL, NULL, title, description, err);
+    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL,
+                                  NULL, NULL, title, description, err);
 }

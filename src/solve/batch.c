@@ -28,7 +28,8 @@ typedef struct bt_batch {
 } bt_batch;
 
 // One copy for each instruction set that the program is built for, chosen when it starts.
-#if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) && !defined(__clang__)
+#if defined(__x86_64__) && !defined(__AVX2__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) &&    \
+    !defined(__clang__)
 #define FOR_EACH_CPU __attribute__((target_clones("avx2", "default")))
 #else
 #define FOR_EACH_CPU
@@ -39,7 +40,10 @@ bool bt_batch_is_for(const bt_tile *tile) { return !(tile->limits && tile->risin
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
-static kind_of_units kind_of(const bt_tile *tile, const bt_unit *u) { return !tile->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS; }
+static kind_of_units kind_of(const bt_tile *tile, const bt_unit *u)
+{
+    return !tile->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
+}
 
 static bool holds(const bt_batch *o, bt_idx body)
 {
@@ -92,7 +96,8 @@ static bool fits(const bt_batch *o, const bt_unit *u, kind_of_units kind, const 
     return o->kind == kind && !(inv[u->a].m > 0 && holds(o, u->a)) && !(inv[u->b].m > 0 && holds(o, u->b));
 }
 
-/// Each unit goes into the first of the last OPEN batches that is not full, is of its kind and has none of its bodies. Those that filled up leave the window.
+/// Each unit goes into the first of the last OPEN batches that is not full, is of its kind and has none of its bodies.
+/// Those that filled up leave the window.
 static void pack(bt_tile *tile, const bt_inv *inv)
 {
     bt_idx open[OPEN];
@@ -153,7 +158,8 @@ typedef struct {
 INLINE void transpose(motion *m)
 {
     const vec a = __builtin_shufflevector(m->x, m->y, 0, 4, 2, 6), b = __builtin_shufflevector(m->x, m->y, 1, 5, 3, 7);
-    const vec c = __builtin_shufflevector(m->w, m->unused, 0, 4, 2, 6), d = __builtin_shufflevector(m->w, m->unused, 1, 5, 3, 7);
+    const vec c = __builtin_shufflevector(m->w, m->unused, 0, 4, 2, 6),
+              d = __builtin_shufflevector(m->w, m->unused, 1, 5, 3, 7);
     m->x = __builtin_shufflevector(a, c, 0, 1, 4, 5);
     m->y = __builtin_shufflevector(b, d, 0, 1, 4, 5);
     m->w = __builtin_shufflevector(a, c, 2, 3, 6, 7);
@@ -184,11 +190,13 @@ INLINE void store(bt_vel *v, const bt_idx *body, const bool *moves, motion m)
 INLINE void solve_normals(const bt_batch *o, const motion *a, const motion *b, vec *l1, vec *l2)
 {
     const vec zero = {0}, un = o->nx * (b->x - a->x) + o->ny * (b->y - a->y);
-    const vec u1 = un + o->rbn[0] * b->w - o->ran[0] * a->w + o->bias[0], u2 = un + o->rbn[1] * b->w - o->ran[1] * a->w + o->bias[1];
+    const vec u1 = un + o->rbn[0] * b->w - o->ran[0] * a->w + o->bias[0],
+              u2 = un + o->rbn[1] * b->w - o->ran[1] * a->w + o->bias[1];
     const vec b1 = u1 - o->w[0] * o->x[0] - o->w12 * o->x[1], b2 = u2 - o->w12 * o->x[0] - o->w[1] * o->x[1];
     const vec both1 = (o->w12 * b2 - o->w[1] * b1) * o->per_det, both2 = (o->w12 * b1 - o->w[0] * b2) * o->per_det;
     const vec only1 = larger(zero, -b1 * o->mn[0]), only2 = larger(zero, -b2 * o->mn[1]);
-    const mask both = (o->per_det > zero) & (both1 >= zero) & (both2 >= zero), first = (b2 + o->w12 * only1 >= zero) | (only2 == zero);
+    const mask both = (o->per_det > zero) & (both1 >= zero) & (both2 >= zero),
+               first = (b2 + o->w12 * only1 >= zero) | (only2 == zero);
     *l1 = choose(both, both1, choose(first, only1, zero));
     *l2 = choose(both, both2, choose(first, zero, only2));
 }
@@ -207,8 +215,10 @@ INLINE void rim(const bt_batch *o, const vec b[2], vec l[2])
         x[i] = side & 1 ? o->bound[i] : zero;
         x[k] = larger(zero, smaller(o->bound[k], -(b[k] + o->w12 * x[i]) * o->mn[k]));
         const vec slope = b[i] + o->w[i] * x[i] + o->w12 * x[k];
-        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) + x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
-        const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless), take = open & (right | (value < least));
+        const vec value = x[0] * (half * (o->w[0] * x[0] + o->w12 * x[1]) + b[0]) +
+                          x[1] * (half * (o->w12 * x[0] + o->w[1] * x[1]) + b[1]);
+        const mask right = side & 1 ? slope <= zero : slope >= zero, open = ~done & (x[i] < endless),
+                   take = open & (right | (value < least));
         l[0] = choose(take, x[0], l[0]);
         l[1] = choose(take, x[1], l[1]);
         least = choose(take, value, least);
@@ -223,7 +233,8 @@ INLINE void bound_normals(const bt_batch *o, const motion *p, const motion *q, v
     if (!any_of(over)) return;
     const vec zero = {0}, un = o->nx * (q->x - p->x) + o->ny * (q->y - p->y);
     vec b[2], l[2] = {*l1, *l2};
-    for (int i = 0; i < 2; i++) b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
+    for (int i = 0; i < 2; i++)
+        b[i] = un + o->rbn[i] * q->w - o->ran[i] * p->w + o->bias[i] - o->w[i] * o->x[i] - o->w12 * o->x[1 - i];
     const vec alone = larger(zero, smaller(-b[0] * o->mn[0], o->bound[0]));
     rim(o, b, l);
     const mask one = o->mn[1] == zero;
@@ -271,7 +282,8 @@ INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
     b.y += o->mb * jy;
     b.w += o->ib * (d1 * o->rbn[0] + d2 * o->rbn[1]);
     const vec ut = o->nx * (b.y - a.y) - o->ny * (b.x - a.x) + o->rbt * b.w - o->rat * a.w, bound = o->mu * (l1 + l2);
-    const vec t = larger(-bound, smaller(bound, o->x[2] - ut * o->mt)), dt = t - o->x[2], tx = dt * o->ny, ty = dt * o->nx;
+    const vec t = larger(-bound, smaller(bound, o->x[2] - ut * o->mt)), dt = t - o->x[2], tx = dt * o->ny,
+              ty = dt * o->nx;
     a.x += o->ma * tx;
     a.y -= o->ma * ty;
     a.w -= o->ia * (dt * o->rat);
@@ -299,7 +311,8 @@ FOR_EACH_CPU
 static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
 {
     vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = larger(most, batch[k].kind == SHEETS ? update_sheets(&batch[k], v) : update(&batch[k], v, true));
+    for (bt_idx k = 0; k < n; k++)
+        most = larger(most, batch[k].kind == SHEETS ? update_sheets(&batch[k], v) : update(&batch[k], v, true));
     return largest_lane(most);
 }
 
@@ -328,7 +341,8 @@ static double against(const bt_batch *batch, bt_idx n)
     return sum[0] + sum[1] + sum[2] + sum[3];
 }
 
-double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough, int64_t *done, double *most)
+double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+                      int64_t *done, double *most)
 {
     if (!tile->packed) pack(tile, inv);
     if (s->moves) move(tile->batch, tile->n_batches, s->beta);

@@ -5,15 +5,18 @@
 //     list     0       2   3       5  ...
 //     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four units, ny of four units, ...
 //
-// A sweep goes through the batches of a tile in sequence, and updates the four units of each at once: as they share no body that can be moved,
-// that is the same as one after the other. So the order of a tile's updates is that of its batches, the same everywhere.
+// A sweep goes through the batches of a tile in sequence, and updates the four units of each at once: as they share no
+// body that can be moved, that is the same as one after the other. So the order of a tile's updates is that of its
+// batches, the same everywhere.
 //
-// Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever instructions it is
-// translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for AVX2 and for any, and the loader takes the one that fits.
-// The scalar update of src/solve/kernel.h remains for contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch
-// holds units of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
+// Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever
+// instructions it is translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for
+// AVX2 and for any, and the loader takes the one that fits. The scalar update of src/solve/kernel.h remains for
+// contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch holds
+// units of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
 //
-// Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the units.
+// Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
+// units.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
@@ -22,9 +25,11 @@
 /// Are the units of this tile swept in batches?
 bool bt_batch_is_for(const bt_tile *tile);
 
-/// One visit of a sweep to the tile: its move, and passes: at least one, at most `times`, and none after one that changes no more than `enough`, m/s. Updates so many times the list
-/// are counted in *done; the largest update of the first pass in *most. Returns how far it turned against its move, J.
-double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough, int64_t *done, double *most);
+/// One visit of a sweep to the tile: its move, and passes: at least one, at most `times`, and none after one that
+/// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
+/// first pass in *most. Returns how far it turned against its move, J.
+double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+                      int64_t *done, double *most);
 
 /// The units of the list in the order in which they are swept, [n_list]; of a tile that has been swept.
 void bt_batch_order(const bt_tile *tile, bt_idx *unit);

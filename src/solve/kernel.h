@@ -8,10 +8,11 @@
 #include "solve/limit.h"
 #include "contact/row.h"
 
-/// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both press, one of them,
-/// none). Two points of one edge are strongly coupled through the turning of the floes: solved one by one they need 2 to 10
-/// times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points that coincide) the
-/// first of the single cases that holds is taken; so it is for one point, whose second has no mass (mn 0).
+/// Normal impulses of a manifold: the exact solution of their 2×2 complementarity problem, by its four cases (both
+/// press, one of them, none). Two points of one edge are strongly coupled through the turning of the floes: solved one
+/// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points
+/// that coincide) the first of the single cases that holds is taken; so it is for one point, whose second has no mass
+/// (mn 0).
 static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
 {
     const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
@@ -29,10 +30,12 @@ static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt
     }
 }
 
-/// Take the normal impulses l1 and l2, with the friction that they allow: of both points as one. The tangential rows of the points are the
-/// same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two separate unknowns would drift
-/// apart along their null space and eat up the friction cone. Returns the largest correction, m/s.
-static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v, const bt_inv *inv)
+/// Take the normal impulses l1 and l2, with the friction that they allow: of both points as one. The tangential rows of
+/// the points are the same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two
+/// separate unknowns would drift apart along their null space and eat up the friction cone. Returns the largest
+/// correction, m/s.
+static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v,
+                                     const bt_inv *inv)
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
     const double d1 = l1 - u->ln[0], d2 = l2 - u->ln[1];
@@ -54,7 +57,8 @@ static inline void bt_onto_disc(double radius, double *x, double *y)
 }
 
 /// What the friction of sheets would be after a step of its own (contact/raft.h).
-static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x, double *y)
+static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x,
+                                 double *y)
 {
     *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * u->mn[0];
     *y = u->lt - bt_tangent_velocity(u, va, vb) * u->mt;
@@ -102,7 +106,8 @@ static inline double bt_sheets_residual(const bt_unit *u, const bt_limit *k, con
     return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
 }
 
-/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential; two of sheets).
+/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential; two
+/// of sheets).
 static inline double bt_unit_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
 {
     if (k && u->n == 0) return bt_sheets_residual(u, k, v, sum);

@@ -8,9 +8,10 @@
 #include "contact/law.h"
 #include "contact/row.h"
 
-/// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising part of the bound,
-/// λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 + slope W), where it is above the flat part
-/// exactly when that is so at the solution. `place` and not the bias: a rebound is no crushing.
+/// Impulse of point i alone, b: its normal velocity with bias and without this impulse. With w = b + W λ the rising
+/// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
+/// slope W), where it is above the flat part exactly when that is so at the solution. `place` and not the bias: a
+/// rebound is no crushing.
 static inline double bt_limit_point(const bt_limit *l, const bt_unit *u, int i, double b)
 {
     const double rising = (l->base[i] - l->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + l->slope[i] * u->w[i]);
@@ -24,8 +25,8 @@ static inline double bt_limit_bound(const bt_limit *l, const bt_unit *u, int i, 
     return bt_min(l->most[i], bt_max(l->flat[i], l->base[i] + l->slope[i] * bt_max(0, approach)));
 }
 
-/// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose multiplier has
-/// the right sign, and of sides that rounding leaves in doubt the one of least value.
+/// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
+/// multiplier has the right sign, and of sides that rounding leaves in doubt the one of least value.
 static inline void bt_limit_rim(const bt_unit *u, const double b[2], const double c[2], double l[2])
 {
     double least = INFINITY;
@@ -36,15 +37,16 @@ static inline void bt_limit_rim(const bt_unit *u, const double b[2], const doubl
         if (isinf(x[i])) continue;
         x[o] = bt_max(0, bt_min(c[o], -(b[o] + u->w12 * x[i]) * u->mn[o]));
         const double slope = b[i] + u->w[i] * x[i] + u->w12 * x[o];
-        const double value = x[0] * (0.5 * (u->w[0] * x[0] + u->w12 * x[1]) + b[0]) + x[1] * (0.5 * (u->w12 * x[0] + u->w[1] * x[1]) + b[1]);
+        const double value = x[0] * (0.5 * (u->w[0] * x[0] + u->w12 * x[1]) + b[0]) +
+                             x[1] * (0.5 * (u->w12 * x[0] + u->w[1] * x[1]) + b[1]);
         const bool right = side & 1 ? slope <= 0 : slope >= 0;
         if (right || value < least) l[0] = x[0], l[1] = x[1], least = value;
         if (right) return;
     }
 }
 
-/// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point by point, a few times: the
-/// sweeps do the rest.
+/// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point
+/// by point, a few times: the sweeps do the rest.
 static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const double b[2], double l[2])
 {
     enum { TURNS = 4 };
@@ -60,12 +62,15 @@ static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const doubl
         for (int i = 0; i < 2; i++) l[i] = bt_limit_point(k, u, i, b[i] + u->w12 * l[1 - i]);
 }
 
-/// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is below the flat parts.
-static inline void bt_limit_normals(const bt_limit *k, const bt_unit *u, const bt_vel *va, const bt_vel *vb, double l[2])
+/// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is
+/// below the flat parts.
+static inline void bt_limit_normals(const bt_limit *k, const bt_unit *u, const bt_vel *va, const bt_vel *vb,
+                                    double l[2])
 {
     if (!(l[0] > k->flat[0] || l[1] > k->flat[1])) return;
     double b[2] = {0};
-    for (int i = 0; i < u->n; i++) b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
+    for (int i = 0; i < u->n; i++)
+        b[i] = bt_normal_velocity(u, i, va, vb) + u->bias[i] - u->w[i] * u->ln[i] - u->w12 * u->ln[1 - i];
     if (u->n == 1) l[0] = bt_limit_point(k, u, 0, b[0]);
     else bt_limit_two(k, u, b, l);
 }

@@ -63,7 +63,8 @@ static uint64_t mix_double(uint64_t h, double x)
     return mix(h ^ u);
 }
 
-/// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their names.
+/// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
+/// names.
 static uint64_t hash_trace(const bt_trace *r)
 {
     const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A checkpoint from before contact laws had a table goes on to the same bits: its contacts, history and series are laid out as they were then.
+"""A checkpoint from before contact laws had a table goes on to the same bits: its contacts, history and series are laid
+out as they were then.
 
 Red when depths are taken for impulses, or friction is lost.
 """
@@ -24,7 +25,8 @@ def as_it_was(folder, damage=None):
     with h5py.File(folder / "checkpoint.h5", "r+") as f:
         value, law = f["contacts/value"][:], f["contacts/law"][:]
         assert set(law.ravel()) == {0, 1}
-        f["contacts/impulse"], f["contacts/friction"], f["contacts/crushed"] = value[:, :2], value[:, 2], law.astype(np.uint8)
+        f["contacts/impulse"], f["contacts/friction"], f["contacts/crushed"] = value[:, :2], value[:, 2], law.astype(
+            np.uint8)
         for name in [n for n in f["history"] if "raft" in n]:
             del f["history"][name]
         del f["contacts/value"], f["contacts/law"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Where floes lie over each other, as pictures show it: against areas worked out by hand, and against the run's own number."""
+"""Where floes lie over each other, as pictures show it: against areas worked out by hand, and against the run's own
+number."""
 import sys
 
 import matplotlib
@@ -15,7 +16,11 @@ import rafted  # noqa: E402
 from bergtow_read import Run as Reader  # noqa: E402
 
 SQUARE = np.array([[0, 0], [2, 0], [2, 2], [0, 2]], float)
-PRESSED = changed(TOW, domain={"length": 15, "width": 8, "ends_closing": 0.15}, ice__concentration=0.75, ice__rafting={"kappa": 5}, run__duration=15)
+PRESSED = changed(TOW,
+                  domain={"length": 15, "width": 8, "ends_closing": 0.15},
+                  ice__concentration=0.75,
+                  ice__rafting={"kappa": 5},
+                  run__duration=15)
 
 
 @pytest.mark.parametrize("shift, area", [((1, 0.5), 1.5), ((3, 0), 0), ((0, 0), 4), ((-1.5, -1.5), 0.25)])
@@ -30,7 +35,8 @@ def test_floes_that_only_touch_are_left_out():
 
 
 def test_a_run(tmp_path):
-    """The areas drawn add up to the area in the series (which is that at the start of the last step), and the picture has them."""
+    """The areas drawn add up to the area in the series (which is that at the start of the last step), and the picture
+    has them."""
     r = run(tmp_path, PRESSED)
     assert r.summary["rafted_area_m2"] > 0.3
     o, v, pose = r.dataset("/floes/offsets"), r.dataset("/floes/vertices"), r.dataset("/frames/pose")[-1]

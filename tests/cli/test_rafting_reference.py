@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Floes that raft: the dumped problem of a step against an interior-point method that shares nothing with the sweeps.
 
-    u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound;   |r_t| <= μ r_n against u_t
+    u = W r + q,   0 <= r_n <= bound,   u_n > 0 only where r_n = 0, u_n < 0 only where r_n = bound
+    |r_t| <= μ r_n against u_t
     sheets on each other: |(r_x, r_y)| <= R against (u_x, u_y)
 
-For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of such problems. Then the rows that hold, and
-those that give way, are known, and what is left is a system of equations, solved by Newton's method to the last digits.
+For friction bounds that are given this is a convex problem with discs; they follow the normal impulses in a sequence of
+such problems. Then the rows that hold, and those that give way, are known, and what is left is a system of equations,
+solved by Newton's method to the last digits.
 """
 import h5py
 import numpy as np
@@ -35,7 +37,8 @@ class Rafting(Problem):
 def dump(folder, seed):
     """A step of a cluster in which several pairs raft."""
     case = changed(CLUSTER, ice__seed=seed)
-    rafting, contacts = run(folder, changed(case, solver__tolerance=1e-4), "--steps", 200, name="scan").series("rafting", "contacts")
+    rafting, contacts = run(folder, changed(case, solver__tolerance=1e-4), "--steps", 200,
+                            name="scan").series("rafting", "contacts")
     step = int(np.argmax((rafting >= 4) & (contacts >= 8))) + 8
     r = run(folder, case, "--steps", step, "--dump-contacts", f"{step}:{folder / 'dump.h5'}", name="out")
     assert r.series("unconverged")[-1] == 0 and r.series("rafting")[-1] >= 3
@@ -43,7 +46,8 @@ def dump(folder, seed):
 
 
 def interior_point(W, q, low, high, discs, radius):
-    """min ½xᵀWx + qᵀx, low <= x <= high, |x[i, j]| <= R for pairs of rows: x of a primal-dual interior-point method, to some 1e-7."""
+    """min ½xᵀWx + qᵀx, low <= x <= high, |x[i, j]| <= R for pairs of rows: x of a primal-dual interior-point method, to
+    some 1e-7."""
     n = len(q)
     box = np.ones(n, bool)
     box[discs] = False
@@ -73,7 +77,8 @@ def interior_point(W, q, low, high, discs, radius):
         dzl, dzu = np.where(box, (target - zl * dx) / a - zl, 0), np.where(bounded, (target + zu * dx) / b - zu, 0)
         dz = (target - z * ds) / s - z
         length = 1.0
-        for p, dp in ((a[box], dx[box]), (b[bounded], -dx[bounded]), (s, ds), (zl[box], dzl[box]), (zu[bounded], dzu[bounded]), (z, dz)):
+        for p, dp in ((a[box], dx[box]), (b[bounded], -dx[bounded]), (s, ds), (zl[box], dzl[box]),
+                      (zu[bounded], dzu[bounded]), (z, dz)):
             if (dp < 0).any():
                 length = min(length, 0.99 * np.min(-p[dp < 0] / dp[dp < 0]))
         x, a, b, s = x + length * dx, a + length * dx, b - length * dx, s + length * ds
@@ -114,7 +119,8 @@ def from_scratch(p):
 
 
 def polish(p, x):
-    """The equations of the rows that hold and of those that give way, told apart by an approximate solution, solved to the last digits."""
+    """The equations of the rows that hold and of those that give way, told apart by an approximate solution, solved to
+    the last digits."""
     u = p.W @ x + p.q
     small = 2e-5 * SPEED
 
@@ -127,7 +133,8 @@ def polish(p, x):
                     E[[i, j]], J[[i, j]] = v[[i, j]], p.W[[i, j]]
                 else:                                                            # on the rim, against the sliding
                     w = p.W[i, i]
-                    E[i], E[j] = (r[i] ** 2 + r[j] ** 2 - p.disc[k] ** 2) * w / (2 * p.disc[k]), (r[i] * v[j] - r[j] * v[i]) / p.disc[k]
+                    E[i], E[j] = (r[i]**2 + r[j]**2 - p.disc[k]**2) * w / (2 * p.disc[k]), (r[i] * v[j] -
+                                                                                            r[j] * v[i]) / p.disc[k]
                     J[i, i], J[i, j] = r[i] * w / p.disc[k], r[j] * w / p.disc[k]
                     J[j] = (r[i] * p.W[j] - r[j] * p.W[i]) / p.disc[k]
                     J[j, i] += v[j] / p.disc[k]
@@ -164,7 +171,8 @@ def test_impulses_of_a_cluster(tmp_path, seed):
     assert p.sheets.sum() >= 3 and np.all(size <= p.disc[p.sheets] * (1 + 1e-12))
     slides = slide > 1e-6 * SPEED
     np.testing.assert_allclose(size[slides], p.disc[p.sheets][slides], rtol=1e-6)
-    assert np.all((p.r[rows[p.sheets]] * p.u[rows[p.sheets]]).sum(axis=1)[slides] < -(1 - 1e-6) * (size * slide)[slides])
+    assert np.all((p.r[rows[p.sheets]] * p.u[rows[p.sheets]]).sum(axis=1)[slides] < -(1 - 1e-6) *
+                  (size * slide)[slides])
     at_bound = (p.u[::2] < -1e-6 * SPEED) & ~p.sheets
     np.testing.assert_allclose(p.r[::2][at_bound], p.bound[at_bound], rtol=1e-6)
     # Another method, which has seen nothing of the solution.
@@ -188,12 +196,18 @@ def thrown(seed):
     for k in range(4):
         way = np.pi / 2 * (k + 0.3 * rng.random())
         x, y = np.cos(way), np.sin(way)
-        shape = {"shape": "rectangle", "length": 0.7 + 0.2 * rng.random(), "width": 0.7 + 0.2 * rng.random()} if k % 2 else {"shape": "disc", "length": 0.8 + 0.2 * rng.random()}
-        floes.append(shape | {"x": 5 + x, "y": y, "yaw": float(90 * rng.random()), "vx": -0.8 * x, "vy": -0.8 * y, "yaw_rate": float(20 * rng.random() - 10),
-                              "thickness": 0.03 + 0.03 * rng.random()})
-    return {"run": {"dt": 0.05, "duration": 3}, "domain": {"length": 10, "width": 10, "ends": "open", "sides": "open"},
-            "ice": {"concentration": 0, "friction": 0.2, "rafting": {"kappa": 6}}, "body": {"shape": "none"}, "floes": floes,
-            "solver": {"tolerance": TOLERANCE, "max_sweeps": 1000000, "reference_speed": SPEED}}
+        shape = {"shape": "rectangle", "length": 0.7 + 0.2 * rng.random(), "width": 0.7 +
+                 0.2 * rng.random()} if k % 2 else {"shape": "disc", "length": 0.8 + 0.2 * rng.random()}
+        floes.append(
+            shape | {
+                "x": 5 + x, "y": y, "yaw": float(90 * rng.random()), "vx": -0.8 * x, "vy": -0.8 *
+                y, "yaw_rate": float(20 * rng.random() - 10), "thickness": 0.03 + 0.03 * rng.random()
+            })
+    return {
+        "run": {"dt": 0.05, "duration": 3}, "domain": {"length": 10, "width": 10, "ends": "open", "sides": "open"},
+        "ice": {"concentration": 0, "friction": 0.2, "rafting": {"kappa": 6}}, "body": {"shape": "none"},
+        "floes": floes, "solver": {"tolerance": TOLERANCE, "max_sweeps": 1000000, "reference_speed": SPEED}
+    }
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 7, 8, 10, 11, 12])

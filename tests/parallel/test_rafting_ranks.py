@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Floes that raft on any number of ranks and threads, and across stops: the same bits. With a moving window, crushing and rebounds in use, and in a jam.
+"""Floes that raft on any number of ranks and threads, and across stops: the same bits. With a moving window, crushing
+and rebounds in use, and in a jam.
 
-What turns these tests red: a record left behind in a migration, friction of sheets that starts anew on another rank, an area that was looked at before the poses of
-the step, sheets in the order of memory.
+What turns these tests red: a record left behind in a migration, friction of sheets that starts anew on another rank, an
+area that was looked at before the poses of the step, sheets in the order of memory.
 """
 import h5py
 import pytest
@@ -13,8 +14,16 @@ from test_everything import ALL
 from test_ranks import LINE, assert_same, many
 from test_ranks_output import mpirun
 
-WINDOW = changed(ALL, ice__concentration=0.75, ice__rafting={"kappa": 6}, ice__crushing={"pressure": "100 Pa", "least_length": 0.5}, run__duration=24)
-JAM = changed(LINE, ice__rafting={"kappa": 8}, ice__thickness_law="lognormal", domain__ends_closing=0.15, run__duration=20)
+WINDOW = changed(ALL,
+                 ice__concentration=0.75,
+                 ice__rafting={"kappa": 6},
+                 ice__crushing={"pressure": "100 Pa", "least_length": 0.5},
+                 run__duration=24)
+JAM = changed(LINE,
+              ice__rafting={"kappa": 8},
+              ice__thickness_law="lognormal",
+              domain__ends_closing=0.15,
+              run__duration=20)
 CASES = {"window": WINDOW, "jam": JAM}
 
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Floes that slide over each other, against closed forms: the load on two squares pushed together and apart, a row of floes, a plough, momentum and energy.
+// Floes that slide over each other, against closed forms: the load on two squares pushed together and apart, a row of
+// floes, a plough, momentum and energy.
 //
-// What turns these tests red: the moment of the gradient with the other sign, a largest area that is forgotten, friction of the largest area instead of the present one, sides that
-// lie on each other and push, a towed body that rafts, a projection that takes rafted overlap back. Each was tried.
+// What turns these tests red: the moment of the gradient with the other sign, a largest area that is forgotten,
+// friction of the largest area instead of the present one, sides that lie on each other and push, a towed body that
+// rafts, a projection that takes rafted overlap back. Each was tried.
 #include "scene.h"
 
 #include "contact/raft.h"
@@ -70,8 +72,9 @@ static void check_step(const bt_world *w)
     assert_true(st->raft_edge_work >= 0 && st->raft_friction_work >= -1e-9);
 }
 
-/// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more than half under; another pushes it back, where friction
-/// alone resists; pushed again it meets the edge at the depth where it was.
+/// A plate pushes a square of side a onto one that is held, F(d) = q0 a + μ (ρ_w − ρ_i) g h a d, also when it is more
+/// than half under; another pushes it back, where friction alone resists; pushed again it meets the edge at the depth
+/// where it was.
 static void two_squares(void **state)
 {
     (void)state;
@@ -80,7 +83,8 @@ static void two_squares(void **state)
     bt_world *w = bt_world_create(&p);
     add_box(w, BT_STATIC, a, a, -0.5 * a, 0, h);
     const bt_gid floe = add_box(w, BT_DYNAMIC, a, a, 0.5 * a + 0.02, 1e-6, h); // sides that all but lie on each other
-    const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0), left = add_box(w, BT_KINEMATIC, 1, 4, -9.5, 0, 0);
+    const bt_gid right = add_box(w, BT_KINEMATIC, 1, 4, a + 0.55, 0, 0),
+                 left = add_box(w, BT_KINEMATIC, 1, 4, -9.5, 0, 0);
     set_speed(w, right, -v);
     double work = 0, edge = 0, friction = 0, depth = 0;
     while (depth < 0.8 * a) {
@@ -108,7 +112,8 @@ static void two_squares(void **state)
         bt_world_step(w);
         check_step(w);
         depth = 0.5 * a - pose(w, floe)->x;
-        if (touched > 3) CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
+        if (touched > 3)
+            CHECK_CLOSE(load_on(w, left), a * sheet_load() * (depth + v * dt), 0.002 * a * sheet_load() * depth);
         if (touched > 3) assert_true(w->stats.raft_edge_work == 0);
         touched += load_on(w, left) > 0;
     }
@@ -130,7 +135,8 @@ static void two_squares(void **state)
     bt_world_free(w);
 }
 
-/// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they meet as at first.
+/// Pushed on, the floe goes wholly under and comes out behind; once they have parted the pair has forgotten, and they
+/// meet as at first.
 static void out_behind(void **state)
 {
     (void)state;
@@ -163,8 +169,8 @@ static void out_behind(void **state)
     bt_world_free(w);
 }
 
-/// A row of equal floes between a plate and a wall gives way at its weakest contact, and the contacts take turns: shortened by s over m contacts
-/// F = q0 a + μ (ρ_w − ρ_i) g h a s/m.
+/// A row of equal floes between a plate and a wall gives way at its weakest contact, and the contacts take turns:
+/// shortened by s over m contacts F = q0 a + μ (ρ_w − ρ_i) g h a s/m.
 static void confined_row(void **state)
 {
     (void)state;
@@ -198,8 +204,9 @@ static void confined_row(void **state)
     bt_world_free(w);
 }
 
-/// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that
-/// a hull drives into the pack: the hull itself does not raft, and its load is that of the edge behind.
+/// The apex of a triangle, angle φ, is pushed by its base under a straight edge: chord 2 d tan(φ/2), at least the
+/// thickness; F = q0 L + μ (ρ_w − ρ_i) g h d² tan(φ/2). So is a floe that a hull drives into the pack: the hull itself
+/// does not raft, and its load is that of the edge behind.
 static void apex_under_an_edge(void **state)
 {
     (void)state;
@@ -208,7 +215,8 @@ static void apex_under_an_edge(void **state)
     bt_world *w = bt_world_create(&p);
     add_box(w, BT_STATIC, 20, 20, -10, 0, h);
     double corners[6] = {0, 0, height, -0.5 * base, height, 0.5 * base};
-    const bt_gid floe = add(w, BT_DYNAMIC, 3, corners, 2.0 / 3 * height + 0.01, 0, 0, 1.5 * h); // the thinner of the two counts
+    // the thinner of the two counts
+    const bt_gid floe = add(w, BT_DYNAMIC, 3, corners, 2.0 / 3 * height + 0.01, 0, 0, 1.5 * h);
     const bt_gid hull = add_box(w, BT_KINEMATIC, 2, 2, height + 1.02, 0, 2 * h);
     w->towed = hull; // it carries ice, but is towed
     w->tow = bt_alloc(1, sizeof *w->tow);
@@ -229,8 +237,9 @@ static void apex_under_an_edge(void **state)
     bt_world_free(w);
 }
 
-/// A plough as wide as its channel, closed at the end, pushes floes in two lanes, half a floe apart. What it needs for a metre of advance is what goes under on it: the
-/// work of the plough is that of edges and sheets, edges take q0 for the area that went under, and as the channel grows shorter by s its width times s lies twice.
+/// A plough as wide as its channel, closed at the end, pushes floes in two lanes, half a floe apart. What it needs for
+/// a metre of advance is what goes under on it: the work of the plough is that of edges and sheets, edges take q0 for
+/// the area that went under, and as the channel grows shorter by s its width times s lies twice.
 static void plough_in_a_channel(void **state)
 {
     (void)state;
@@ -264,7 +273,8 @@ static void plough_in_a_channel(void **state)
     bt_world_free(w);
 }
 
-/// Random floes driven at each other with spin and friction: momentum to round-off, no work gained, and what the contacts take is what the kinetic energy loses.
+/// Random floes driven at each other with spin and friction: momentum to round-off, no work gained, and what the
+/// contacts take is what the kinetic energy loses.
 static void energy_is_booked(void **state)
 {
     (void)state;
@@ -278,7 +288,8 @@ static void energy_is_booked(void **state)
             double v[2 * BT_MAX_VERTICES];
             const int n = scene_random_polygon(&rng, 5, v);
             add(w, BT_DYNAMIC, n, v, 15 * (i % 3), 15 * (i / 3), 6 * scene_uniform(&rng), 0.3 + scene_uniform(&rng));
-            *vel(w, i) = (bt_vel){-0.08 * (15 * (i % 3) - 15), -0.08 * (15 * (i / 3) - 15) + 0.3 * scene_uniform(&rng), 0.1 * scene_uniform(&rng), 0};
+            *vel(w, i) = (bt_vel){-0.08 * (15 * (i % 3) - 15), -0.08 * (15 * (i / 3) - 15) + 0.3 * scene_uniform(&rng),
+                                  0.1 * scene_uniform(&rng), 0};
         }
         double before = 0, edge = 0, friction = 0, all = 0;
         for (int s = 0; s < 400; s++) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sweeps in batches against the scalar update, unit by unit in the same order: equal bit for bit; and what may stand together in a batch.
+// Sweeps in batches against the scalar update, unit by unit in the same order: equal bit for bit; and what may stand
+// together in a batch.
 #include <stdlib.h>
 #include <string.h>
 
@@ -55,8 +56,17 @@ static bt_unit random_unit(uint64_t *rng, const bt_inv *inv)
 static void make_sheets(bt_unit *u, const bt_inv *inv, uint64_t *rng)
 {
     const bt_inv p = inv[u->a], q = inv[u->b];
-    *u = (bt_unit){.a = u->a, .b = u->b, .nx = 1, .ran = {any(rng)}, .rbn = {any(rng)}, .rat = any(rng), .rbt = any(rng), .ln = {any(rng)}, .lt = any(rng)};
-    u->w[0] = u->wt = p.m + q.m + p.i * (u->ran[0] * u->ran[0] + u->rat * u->rat) + q.i * (u->rbn[0] * u->rbn[0] + u->rbt * u->rbt);
+    *u = (bt_unit){.a = u->a,
+                   .b = u->b,
+                   .nx = 1,
+                   .ran = {any(rng)},
+                   .rbn = {any(rng)},
+                   .rat = any(rng),
+                   .rbt = any(rng),
+                   .ln = {any(rng)},
+                   .lt = any(rng)};
+    u->w[0] = u->wt =
+        p.m + q.m + p.i * (u->ran[0] * u->ran[0] + u->rat * u->rat) + q.i * (u->rbn[0] * u->rbn[0] + u->rbt * u->rbt);
     u->mn[0] = u->mt = 1 / u->wt;
 }
 
@@ -112,8 +122,8 @@ static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep
     for (bt_idx j = 0; o->moves && j < s->tile.n_list; j++) {
         const bt_unit *u = &s->units[order[j]];
         const double *x = s->before[order[j]];
-        against += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) + bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) +
-                   bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
+        against += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
+                   bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
     }
     return against;
 }

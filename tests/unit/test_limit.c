@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// One update of a manifold with bounded impulses against the definition, over random problems; and the windows of a stall.
+// One update of a manifold with bounded impulses against the definition, over random problems; and the windows of a
+// stall.
 #include "scene.h"
 
 #include "output/stall.h"
@@ -29,15 +30,16 @@ static bt_unit random_unit(uint64_t *rng, int n, const bt_inv inv[2])
     return u;
 }
 
-/// After the update: 0 <= λ; w >= 0 below the bound; w <= 0 above zero; λ on its bound L(w) where w < 0. A point with a rising bound is exact
-/// when alone, a pair in the limit of many updates.
+/// After the update: 0 <= λ; w >= 0 below the bound; w <= 0 above zero; λ on its bound L(w) where w < 0. A point with a
+/// rising bound is exact when alone, a pair in the limit of many updates.
 static void the_law_of_one_manifold(void **state)
 {
     (void)state;
     uint64_t rng = 3;
     int bound = 0, held = 0, open = 0, rising = 0;
     for (int k = 0; k < 20000; k++) {
-        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)}, {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
+        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)},
+                               {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
         const int n = 1 + (k & 1);
         bt_unit u = random_unit(&rng, n, inv);
         bt_limit l = {.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
@@ -51,42 +53,56 @@ static void the_law_of_one_manifold(void **state)
             l.most[i] += scene_uniform(&rng);
         }
         bt_vel v[2];
-        for (int i = 0; i < 2; i++) v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
+        for (int i = 0; i < 2; i++)
+            v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
         const double start[2] = {scene_uniform(&rng), n > 1 ? scene_uniform(&rng) : 0};
         for (int i = 0; i < n; i++) u.ln[i] = start[i];
         const bool flat = l.slope[0] == 0 && l.slope[1] == 0;
         for (int turn = 0; turn < (n == 1 || flat ? 1 : 300); turn++) bt_update_unit(&u, &l, v, inv);
         double sum = 0;
-        const bool tame = u.w[0] * u.w[1] - u.w12 * u.w12 > 0.05 * u.w[0] * u.w[1]; // turns converge by w12²/(w1 w2) each
+        // turns converge by w12²/(w1 w2) each
+        const bool tame = u.w[0] * u.w[1] - u.w12 * u.w12 > 0.05 * u.w[0] * u.w[1];
         if (n > 1 && !flat && !tame) continue;
         assert_true(bt_unit_residual(&u, &l, v, &sum) < 1e-9);
         for (int i = 0; i < n; i++) {
-            const double w = bt_normal_velocity(&u, i, &v[0], &v[1]) + u.bias[i], approach = bt_max(0, -(w - u.bias[i] + l.place[i]));
+            const double w = bt_normal_velocity(&u, i, &v[0], &v[1]) + u.bias[i],
+                         approach = bt_max(0, -(w - u.bias[i] + l.place[i]));
             const double limit = bt_min(l.most[i], bt_max(l.flat[i], l.base[i] + l.slope[i] * approach)), tol = 1e-7;
             assert_true(u.ln[i] >= 0 && u.ln[i] <= limit + tol);
             if (u.ln[i] > tol) assert_true(w <= tol);
             if (u.ln[i] < limit - tol) assert_true(w >= -tol);
             assert_true(bt_limit_bound(&l, &u, i, v) == limit || fabs(bt_limit_bound(&l, &u, i, v) - limit) < 1e-12);
-            open += u.ln[i] == 0, held += u.ln[i] > 0 && w > -tol, bound += w < -1e-3, rising += w < -1e-3 && u.ln[i] > l.flat[i] + tol && u.ln[i] < l.most[i] - tol;
+            open += u.ln[i] == 0, held += u.ln[i] > 0 && w > -tol, bound += w < -1e-3,
+                rising += w < -1e-3 && u.ln[i] > l.flat[i] + tol && u.ln[i] < l.most[i] - tol;
         }
     }
     assert_true(open > 1000 && held > 1000 && bound > 1000 && rising > 1000);
 }
 
-/// Sheets: at the end of many updates the friction is on the rim of its disc and against the sliding, or inside and nothing slides.
+/// Sheets: at the end of many updates the friction is on the rim of its disc and against the sliding, or inside and
+/// nothing slides.
 static void the_law_of_sheets(void **state)
 {
     (void)state;
     uint64_t rng = 5;
     int slides = 0, sticks = 0;
     for (int k = 0; k < 5000; k++) {
-        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)}, {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
-        bt_unit u = {.a = 0, .b = 1, .nx = 1, .ran = {scene_uniform(&rng) - 0.5}, .rbn = {scene_uniform(&rng) - 0.5}, .rat = scene_uniform(&rng) - 0.5, .rbt = scene_uniform(&rng) - 0.5};
-        u.w[0] = u.wt = inv[0].m + inv[1].m + inv[0].i * (u.ran[0] * u.ran[0] + u.rat * u.rat) + inv[1].i * (u.rbn[0] * u.rbn[0] + u.rbt * u.rbt);
+        const bt_inv inv[2] = {{0.2 + scene_uniform(&rng), 3 * scene_uniform(&rng)},
+                               {k % 3 ? scene_uniform(&rng) : 0, k % 3 ? 2 * scene_uniform(&rng) : 0}};
+        bt_unit u = {.a = 0,
+                     .b = 1,
+                     .nx = 1,
+                     .ran = {scene_uniform(&rng) - 0.5},
+                     .rbn = {scene_uniform(&rng) - 0.5},
+                     .rat = scene_uniform(&rng) - 0.5,
+                     .rbt = scene_uniform(&rng) - 0.5};
+        u.w[0] = u.wt = inv[0].m + inv[1].m + inv[0].i * (u.ran[0] * u.ran[0] + u.rat * u.rat) +
+                        inv[1].i * (u.rbn[0] * u.rbn[0] + u.rbt * u.rbt);
         u.mn[0] = u.mt = 1 / u.wt;
         const bt_limit l = {.flat = {scene_uniform(&rng)}};
         bt_vel v[2];
-        for (int i = 0; i < 2; i++) v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
+        for (int i = 0; i < 2; i++)
+            v[i] = (bt_vel){2 * scene_uniform(&rng) - 1, 2 * scene_uniform(&rng) - 1, scene_uniform(&rng) - 0.5, 0};
         for (int turn = 0; turn < 400; turn++) bt_update_unit(&u, &l, v, inv);
         double sum = 0;
         assert_true(bt_unit_residual(&u, &l, v, &sum) < 1e-9);
@@ -122,13 +138,17 @@ static void no_bound_is_rigid(void **state)
     }
 }
 
-/// Windows of 1 m of asked path at 0.5 m/s: stands for 10 s, goes for 10 s, holds (asks for nothing), creeps at 4 % and at 6 %.
+/// Windows of 1 m of asked path at 0.5 m/s: stands for 10 s, goes for 10 s, holds (asks for nothing), creeps at 4 % and
+/// at 6 %.
 static void stall_windows(void **state)
 {
     (void)state;
     bt_stall s = {0};
     double x = 3;
-    const struct { double asked, moves, time; int64_t windows; } parts[] = {{0.5, 0, 10, 5}, {0.5, 0.4, 10, 5}, {0, 0, 100, 5}, {0.5, 0.02, 10, 10}, {0.5, 0.03, 10, 10}};
+    const struct {
+        double asked, moves, time;
+        int64_t windows;
+    } parts[] = {{0.5, 0, 10, 5}, {0.5, 0.4, 10, 5}, {0, 0, 100, 5}, {0.5, 0.02, 10, 10}, {0.5, 0.03, 10, 10}};
     bt_stall_add(&s, 0.05, 0.1, x, 0, 1);
     for (int p = 0; p < 5; p++) {
         for (int k = 0; k < (int)(parts[p].time / 0.1 + 0.5); k++) {
