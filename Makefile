@@ -16,9 +16,10 @@ MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
 HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
 
-# -ffp-contract=off and never -ffast-math: the same bits in every build of one compiler, for any processor. So the program is built for every x86-64
-# (and ARM): src/solve/batch.c alone, where the time goes, is translated for AVX2 as well.
-# -Wno-psabi: how vectors of four are handed to functions is of no matter where all of those are inlined.
+# -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
+# same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
+# for AVX2.
+# -Wno-psabi: how vectors of four are passed to functions does not matter, as all of those are inlined.
 BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -MMD -MP -ffp-contract=off -fno-math-errno \
           -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
@@ -27,9 +28,11 @@ endif
 OPT_release := -O3 -g -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -DBT_VALIDATE
-OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
-OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow -fno-sanitize-recover=undefined,float-cast-overflow
-# Every loop that may run in parallel does: BT_VALIDATE. gcc's libgomp is not known to a thread sanitizer, hence clang.
+OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow \
+               -fno-sanitize-recover=undefined,float-cast-overflow
+OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow \
+               -fno-sanitize-recover=undefined,float-cast-overflow
+# BT_VALIDATE: every loop that may run in parallel does. The thread sanitizer does not know gcc's libgomp, hence clang.
 OPT_tsan    := -O1 -g -fsanitize=thread -DBT_VALIDATE -Wno-pass-failed
 OPT_coverage := -O1 -g --coverage -fprofile-abs-path -fprofile-update=atomic
 ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
@@ -53,7 +56,8 @@ TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 
-.PHONY: all help deps demo report test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
+.PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
+        test test-long lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -64,7 +68,8 @@ help: ## this list
 # The stamp changes when the flags do, so that a new flag rebuilds everything.
 STAMP := $(BUILD)/flags
 $(STAMP): FORCE
-	@[ -n "$(HDF5_LIBS)" ] && command -v $(firstword $(CC)) >/dev/null || { echo "the compiler or a library is missing; run: make deps"; exit 1; }
+	@[ -n "$(HDF5_LIBS)" ] && command -v $(firstword $(CC)) >/dev/null || \
+	  { echo "the compiler or a library is missing; run: make deps"; exit 1; }
 	@mkdir -p $(BUILD)
 	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@
 FORCE:
@@ -106,7 +111,8 @@ $(BUILD)/tests/fuzz/test_corpus: tests/fuzz/test_corpus.c $(HARNESS_OBJ) $(BUILD
 # build/fuzz/fuzz_NAME (CONFIG=fuzz)
 $(HARNESS:%=$(BUILD)/fuzz_%): $(BUILD)/fuzz_%: tests/fuzz/entry.c $(HARNESS_OBJ) $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  FUZZ $@'
-	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
+	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) \
+	  -o $@
 
 tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
 
@@ -117,18 +123,23 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev libxxhash-dev \
-        libcmocka-dev python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil \
-        python3-yaml python3-jinja2 python3-pytest ffmpeg chromium chromium-driver python3-selenium
+DEPS := build-essential pkg-config git \
+        libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
+        libxxhash-dev libcmocka-dev \
+        python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
+        python3-pytest ffmpeg chromium chromium-driver python3-selenium
 
 deps: ## install the Debian packages that are missing
-	@missing=$$(for p in $(DEPS); do dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
+	@missing=$$(for p in $(DEPS); do \
+	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages (on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages" \
+	  "(on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
-	$$as apt-get update -qq && $$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+	$$as apt-get update -qq && \
+	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
 
 # For make lint, and for the other checks of developers; make test needs none of them.
 DEPS_LINT := cppcheck shellcheck pyflakes3
@@ -167,7 +178,7 @@ test: deps ## every test: units, known answers, same bits, command line, short r
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
-test-long: deps ## studies that take minutes: intervals over fields, 2,000 s in 80 % ice, halved time step, tolerance cut tenfold, kills, soak
+test-long: deps ## tests that take minutes: intervals over fields, long tows, finer steps and tolerance, kills, soak
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
@@ -182,25 +193,26 @@ partition-study: $(STUDY) ## cut tile graphs of a million floes into up to 4,096
 	mv partition/quality.csv.new partition/quality.csv
 
 BENCH ?= default
-bench: deps ## time a floe and step over sizes, threads and ranks (BENCH=quick a minute, BENCH=full to 300,000 floes)
+bench: deps ## time per floe and step over sizes, threads, ranks (BENCH=quick: a minute, full: to 300,000 floes)
 	@$(AGAIN) CONFIG=release all build/release/triad
 	$(PYTHON) cases/scaling/bench.py $(BENCH)
 
-fullscale: deps ## resistance of an 80 m berg at 20 to 95 % ice beside the estimates, at full scale: table and picture in out/fullscale
+fullscale: deps ## resistance of an 80 m berg in 20 to 95 % ice beside the estimates: table, picture in out/fullscale
 	@$(AGAIN) CONFIG=release all
 	$(PYTHON) cases/fullscale/study.py concentration
 
-lint: all ## names of external symbols, licence lines, syntax; cppcheck, shellcheck, pyflakes
+lint: all ## names of external symbols, licence lines, length of lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh
 
 tidy: all ## clang-tidy over the program (minutes)
 	@tests/tidy.sh
 
-asan: ## tests of units and physics, kept hostile input, and runs on threads and ranks under AddressSanitizer and UBSan; BT_PYTEST=tests/cli for Python tests, too
+# BT_PYTEST=tests/cli: these Python tests, too.
+asan: ## unit and physics tests, kept hostile input, and runs on threads and ranks under ASan and UBSan
 	@$(AGAIN) CONFIG=asan all tests
 	@tests/sanitize.sh asan $(TEST_BIN:build/$(CONFIG)/%=build/asan/%)
 
-tsan: ## tows on threads and ranks, and the tests that use threads, under ThreadSanitizer (clang, libomp with archer)
+tsan: ## tows on threads and ranks, and the tests that use threads, under ThreadSanitizer (clang, archer)
 	@$(AGAIN) CONFIG=tsan all build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_phases
 	@tests/sanitize.sh tsan build/tsan/tests/unit/test_contacts build/tsan/tests/unit/test_phases
 
@@ -212,13 +224,13 @@ coverage: ## lines of src/ and partition/ that the tests reach: build/coverage/t
 	@$(AGAIN) CONFIG=coverage all tests
 	@tests/coverage.sh $(TEST_BIN:build/$(CONFIG)/%=build/coverage/%)
 
-# make fuzz TARGET=case TIME=600
+# make fuzz TARGET=case TIME=600; targets: case, setup, values, study, table, outlines, field, checkpoint
 TIME ?= 60
-fuzz: all ## hostile input by libFuzzer: TARGET=case, setup, values, study, table, outlines, field or checkpoint, TIME in seconds
+fuzz: all ## hostile input by libFuzzer: TARGET=case, study, outlines, field, ..., TIME in seconds
 	@$(AGAIN) CONFIG=fuzz build/fuzz/fuzz_$(or $(TARGET),case)
 	@tests/fuzz/fuzz.sh $(or $(TARGET),case) $(TIME)
 
-validate: deps ## the program with assertions, checks of the division, and teams of threads for every loop: build/validate/bergtow
+validate: deps ## build/validate/bergtow: assertions, checks of the division, teams of threads for every loop
 	@$(AGAIN) CONFIG=validate all
 
 install: all ## install the program into DESTDIR PREFIX
@@ -227,4 +239,5 @@ install: all ## install the program into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(HARNESS_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(patsubst %.o,%.d,$(LIB_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
+-include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
-// The cut of a tile graph: groups contracted, heavy vertices set apart, ways to cut it compared, labels kept close to the old.
+// The cut of a cell graph: groups contracted, heavy vertices set apart, ways to cut it compared, labels kept close to
+// the old.
 //
 //   1. Every group becomes one vertex; edges between the same two vertices are added up.
-//   2. While the heaviest vertex weighs a share (what is left / parts left) or more, it gets a part of its own. What remains
-//      is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and METIS,
-//      given one, misses the balance of all others.
+//   2. While the heaviest vertex weighs a share (what is left / parts left) or more, it gets a part of its own. What
+//      remains is divided into the other parts, and balance is judged on those: the vertex cannot be divided, and
+//      METIS, given one, misses the balance of all others.
 //   3. Three cuts: the labels before, METIS, and coordinate bisection, which costs a tenth of METIS, cannot fail and
 //      has the smaller cut where the field is even; each refined (refine.c). Of those in balance the smallest edge cut
-//      wins, but the labels before are kept while their cut is at most KEEP times that: METIS starts anew each time, and half of the tiles would change hands
-//      because a heavy spot has moved on by one.
-//   4. Labels of a new cut are exchanged so that little moves: the (new part, old part) overlaps in falling order, each taken
-//      if both are free. Such a matching keeps at least half of the weight that the best one would. The best (Hungarian
-//      method) costs n_parts³, 7·10¹⁰ operations at 4,096 parts, against n log n here with n tiles.
+//      wins, but the labels before are kept while their cut is at most KEEP times that: METIS starts anew each time,
+//      and half of the cells would change hands because a heavy spot has moved on by one.
+//   4. Labels of a new cut are exchanged so that little moves: the (new part, old part) overlaps in falling order, each
+//      taken if both are free. Such a matching keeps at least half of the weight that the best one would. The best
+//      (Hungarian method) costs n_parts³, 7·10¹⁰ operations at 4,096 parts, against n log n here with n cells.
 #include "partition/cut.h"
 
 #include <limits.h>
@@ -22,7 +23,8 @@
 #include "partition/cut_method.h"
 
 static const double KEEP = 1.25;  // what the old labels may be worse by
-static const double CLOSE = 1.1;  // imbalances within this factor of the best count as equal when none is within the tolerance
+// imbalances within this factor of the best count as equal when none is within the tolerance
+static const double CLOSE = 1.1;
 
 // A graph that owns its arrays, and where the vertices of the larger graph went (−1 nowhere).
 typedef struct owned {
@@ -126,7 +128,8 @@ static int set_apart(const bt_graph *g, int n_parts, heavy *order, int64_t *rest
     }
     qsort(order, (size_t)g->n, sizeof *order, heaviest_first);
     int n = 0;
-    while (n < g->n && n_parts - n > 1 && *rest > 0 && order[n].weight >= *rest / (n_parts - n) + (*rest % (n_parts - n) != 0))
+    while (n < g->n && n_parts - n > 1 && *rest > 0 &&
+           order[n].weight >= *rest / (n_parts - n) + (*rest % (n_parts - n) != 0))
         *rest -= order[n++].weight;
     return n;
 }
@@ -175,9 +178,10 @@ static const trial *better_of(const trial *t, int n, double tolerance)
     return kept && (double)kept->cut <= KEEP * (double)best->cut ? kept : best;
 }
 
-// The label that most of a contracted vertex's weight had before, −1 for none; then that of the neighbour it shares most with.
-// false if there were no labels before to speak of: a part had none.
-static bool labels_before(const bt_graph *g, const bt_graph *whole, const int *of, const int *before, int n_parts, int *part)
+// The label that most of a contracted vertex's weight had before, −1 for none; then that of the neighbour it shares
+// most with. false if there were no labels before to speak of: a part had none.
+static bool labels_before(const bt_graph *g, const bt_graph *whole, const int *of, const int *before, int n_parts,
+                          int *part)
 {
     int64_t *most = bt_alloc((size_t)g->n, sizeof *most), *link = bt_alloc((size_t)n_parts, sizeof *link);
     int *count = bt_alloc((size_t)n_parts, sizeof *count);
@@ -216,8 +220,8 @@ static bool labels_before(const bt_graph *g, const bt_graph *whole, const int *o
 }
 
 // A cut of the light vertices by METIS or bisection, a part each for the heavy ones.
-static bool cut_anew(const bt_graph *g, const owned *light, int n_heavy, const heavy *order, int n_parts, double tolerance,
-                     trial *t)
+static bool cut_anew(const bt_graph *g, const owned *light, int n_heavy, const heavy *order, int n_parts,
+                     double tolerance, trial *t)
 {
     int rest = n_parts - n_heavy, *part = bt_alloc((size_t)light->g.n, sizeof *part);
     bool good = true;
@@ -277,8 +281,8 @@ static void relabel(const bt_graph *g, int n_parts, const int *before, int *part
 }
 
 // Labels of the contracted graph c, of which whole is the original.
-static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n_parts, double tolerance, const int *before,
-                                    int *part)
+static bt_cut_method cut_contracted(const owned *c, const bt_graph *whole, int n_parts, double tolerance,
+                                    const int *before, int *part)
 {
     const bt_graph *g = &c->g;
     int64_t rest;
@@ -401,7 +405,8 @@ bool bt_graph_is_valid(const bt_graph *g)
             int u = g->to[e];
             if (u < 0 || u >= g->n || g->edge[e] < 0) return false;
             bool back = u == v;
-            for (int f = g->start[u]; !back && f < g->start[u + 1]; f++) back = g->to[f] == v && g->edge[f] == g->edge[e];
+            for (int f = g->start[u]; !back && f < g->start[u + 1]; f++)
+                back = g->to[f] == v && g->edge[f] == g->edge[e];
             if (!back) return false;
         }
     return true;

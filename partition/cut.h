@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT
-// A weighted graph of tiles and its cut into parts of equal work: which rank owns which tile.
+// A weighted graph of cells and its cut into parts of equal work: which rank owns which cell.
 #ifndef BT_CUT_H
 #define BT_CUT_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-/// Undirected graph in compressed rows: every edge stands in the rows of both of its ends, with the same weight. Sums of all
-/// weights and of all edges must fit into int64_t; loops (an edge from a vertex to itself) are ignored.
+/// Undirected graph in compressed rows: every edge stands in the rows of both of its ends, with the same weight. Sums
+/// of all weights and of all edges must fit into int64_t; loops (an edge from a vertex to itself) are ignored.
 typedef struct bt_graph {
-    int n;                 ///< vertices (tiles)
+    int n;                 ///< vertices (cells)
     const int *start;      ///< [n+1] first neighbour of each vertex
     const int *to;         ///< [start[n]] neighbours
     const int64_t *edge;   ///< [start[n]] >= 0: what is exchanged when the two ends lie in different parts (floes)
-    const int64_t *weight; ///< [n] >= 0: work; any unit
+    const int64_t *weight; ///< [n] >= 0: work; any contact
     const double (*at)[2]; ///< [n] m, position of the vertex
-    const int *group;      ///< [n] vertices of the same group >= 0 stay together (tiles under a large body), −1 = free; NULL = none
+    /// [n] vertices of the same group >= 0 stay together (cells under a large body), −1 = free; NULL = none
+    const int *group;
 } bt_graph;
 
 typedef enum {
@@ -33,14 +34,16 @@ typedef struct bt_cut_quality {
     bt_cut_method method; ///< what made it
 } bt_cut_quality;
 
-/// Cut the graph into n_parts >= 1 parts of equal weight, with little weight on the edges between them and few labels changed.
-/// part: in, the labels before (outside 0 ... n_parts − 1: none); out, the labels. tolerance: imbalance that is as good as none,
-/// e.g. 0.04 (labels before are kept up to 1.25 times that). A vertex or group heavier than a part's share gets a part of its own, and the rest is balanced without
-/// it. A part is empty only if there are fewer vertices (a group counts as one) than parts. q may be NULL.
-/// Deterministic: the same graph and labels before give the same labels. Not to be called by two threads at once (METIS).
-/// SIGTERM is blocked in the calling thread while METIS runs, and its handler is as before on return. All other threads of the
-/// process must block SIGTERM: METIS's handler would crash in them. (Block it before MPI_Init and the first parallel
-/// region, whose threads inherit that, and unblock it in the main thread afterwards.)
+/// Cut the graph into n_parts >= 1 parts of equal weight, with little weight on the edges between them and few labels
+/// changed.
+/// part: in, the labels before (outside 0 ... n_parts − 1: none); out, the labels. tolerance: imbalance that is as good
+/// as none, e.g. 0.04 (labels before are kept up to 1.25 times that). A vertex or group heavier than a part's share
+/// gets a part of its own, and the rest is balanced without it. A part is empty only if there are fewer vertices (a
+/// group counts as one) than parts. q may be NULL.
+/// Deterministic: the same graph and labels before give the same labels. Not to be called by two threads at once
+/// (METIS). SIGTERM is blocked in the calling thread while METIS runs, and its handler is as before on return. All
+/// other threads of the process must block SIGTERM: METIS's handler would crash in them. (Block it before MPI_Init and
+/// the first parallel region, whose threads inherit that, and unblock it in the main thread afterwards.)
 void bt_cut(const bt_graph *g, int n_parts, double tolerance, int *part, bt_cut_quality *q);
 
 /// Quality of labels. before: as in bt_cut, NULL = none. method is BT_CUT_NONE.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The map of the tiles: which rank owns which, who holds the bodies of one, and how the map is cut anew.
+// The map of the cells: which rank owns which, who holds the bodies of one, and how the map is cut anew.
 #include "partition/division.h"
 
 #include <math.h>
@@ -12,7 +12,7 @@
 
 int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     const bt_domain *d = w->domain;
     if ((t->wrap_x == 1 && x != 0) || (t->wrap_y == 1 && y != 0)) return -1;
     if (t->wrap_x) x = ((x % t->wrap_x) + t->wrap_x) % t->wrap_x;
@@ -27,12 +27,14 @@ int bt_division_owner(const bt_world *w, int32_t x, int32_t y)
     return p < 0 ? -1 : w->domain->owner[p];
 }
 
-int bt_division_holders(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_HOLDERS])
+int bt_division_sharers(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_SHARERS])
 {
     int n = 0;
-    for (int k = 0; k < BT_MAX_HOLDERS; k++) {
+    for (int k = 0; k < BT_MAX_SHARERS; k++) {
         const int64_t here = k == 4 ? bt_division_place(w, x, y) : 0;
-        const int r = k < 4 ? bt_division_owner(w, x - (k & 1), y - (k >> 1)) : here >= 0 && w->domain->under[here] ? w->domain->large_owner : -1;
+        const int r = k < 4                                 ? bt_division_owner(w, x - (k & 1), y - (k >> 1))
+                      : here >= 0 && w->domain->under[here] ? w->domain->large_owner
+                                                            : -1;
         bool known = r < 0;
         for (int i = 0; i < n && !known; i++) known = rank[i] == r;
         if (!known) rank[n++] = r;
@@ -42,7 +44,7 @@ int bt_division_holders(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX
 
 bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int32_t out[2])
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     out[0] = ((x ^ phase) & 1) ? x - 1 : x;
     out[1] = ((y ^ phase >> 1) & 1) ? y - 1 : y;
     if (t->wrap_x > 1) out[0] = (out[0] + t->wrap_x) % t->wrap_x;
@@ -50,7 +52,10 @@ bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int
     return bt_division_place(w, out[0], out[1]) >= 0;
 }
 
-static bool movable_large(const bt_world *w, bt_idx i) { return w->bodies.large[i] && w->bodies.motion[i] == BT_DYNAMIC; }
+static bool movable_large(const bt_world *w, bt_idx i)
+{
+    return w->bodies.large[i] && w->bodies.motion[i] == BT_DYNAMIC;
+}
 
 double bt_division_large_path(const bt_world *w)
 {
@@ -60,17 +65,17 @@ double bt_division_large_path(const bt_world *w)
     return most;
 }
 
-/// Tiles that large movable bodies may meet floes of, until they have moved by two floes.
+/// Cells that large movable bodies may meet floes of, until they have moved by two floes.
 static void mark_under(bt_world *w)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_domain *d = w->domain;
     memset(d->under, 0, (size_t)d->n_x * (size_t)d->n_y);
     d->large_path = bt_division_large_path(w);
     d->drift = 0;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (!movable_large(w, i)) continue;
-        const bt_tile_range r = bt_pairs_range(w, i, t->margin_max + 4 * w->par.size + t->reach + t->allowance);
+        const bt_cell_range r = bt_pairs_range(w, i, t->margin_max + 4 * w->par.size + t->reach + t->allowance);
         for (int32_t y = r.y0; y <= r.y1; y++)
             for (int32_t x = r.x0; x <= r.x1; x++) {
                 const int64_t p = bt_division_place(w, x, y);
@@ -82,11 +87,12 @@ static void mark_under(bt_world *w)
 /// Owners of the new box from the map before: the rank of the place, or of the nearest place there was.
 static int *carry_over(const bt_world *w, const bt_domain *before)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     int *owner = bt_alloc((size_t)t->n_x * (size_t)t->n_y, sizeof *owner);
     for (int32_t y = 0; y < t->n_y; y++)
         for (int32_t x = 0; x < t->n_x; x++) {
-            const double px = (t->low_x + x + 0.5) * t->side_x / before->side_x, py = (t->low_y + y + 0.5) * t->side_y / before->side_y;
+            const double px = (t->low_x + x + 0.5) * t->side_x / before->side_x,
+                         py = (t->low_y + y + 0.5) * t->side_y / before->side_y;
             const int32_t bx = (int32_t)bt_max(0, bt_min(before->n_x - 1, floor(px) - before->low_x));
             const int32_t by = (int32_t)bt_max(0, bt_min(before->n_y - 1, floor(py) - before->low_y));
             owner[(int64_t)y * t->n_x + x] = before->owner ? before->owner[(int64_t)by * before->n_x + bx] : -1;
@@ -97,17 +103,19 @@ static int *carry_over(const bt_world *w, const bt_domain *before)
 /// Work counted since the last check, on the places of the new box: a cut that is due now is made from it.
 static double *carry_work(const bt_world *w, const bt_domain *before)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     double *work = bt_alloc((size_t)t->n_x * (size_t)t->n_y, sizeof *work);
     for (int64_t p = 0; before->work && p < (int64_t)before->n_x * before->n_y; p++) {
-        const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / t->side_x, py = (before->low_y + p / before->n_x + 0.5) * before->side_y / t->side_y;
-        const int32_t x = (int32_t)bt_max(0, bt_min(t->n_x - 1, floor(px) - t->low_x)), y = (int32_t)bt_max(0, bt_min(t->n_y - 1, floor(py) - t->low_y));
+        const double px = (before->low_x + p % before->n_x + 0.5) * before->side_x / t->side_x,
+                     py = (before->low_y + p / before->n_x + 0.5) * before->side_y / t->side_y;
+        const int32_t x = (int32_t)bt_max(0, bt_min(t->n_x - 1, floor(px) - t->low_x)),
+                      y = (int32_t)bt_max(0, bt_min(t->n_y - 1, floor(py) - t->low_y));
         work[(int64_t)y * t->n_x + x] += before->work[p];
     }
     return work;
 }
 
-/// Work of every tile of the box, over the ranks: what was counted, or the number of bodies.
+/// Work of every cell of the box, over the ranks: what was counted, or the number of bodies.
 static int64_t *gather_work(bt_world *w)
 {
     const bt_domain *d = w->domain;
@@ -116,7 +124,7 @@ static int64_t *gather_work(bt_world *w)
     int64_t *work = bt_alloc(n, sizeof *work);
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->large[i] || (d->dealt && !d->owned[i])) continue;
-        const int64_t p = bt_division_place(w, b->tile[i][0], b->tile[i][1]);
+        const int64_t p = bt_division_place(w, b->cell[i][0], b->cell[i][1]);
         if (p >= 0) work[p] += d->dealt ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
     }
     if (!d->dealt) return work; // every rank has counted them all
@@ -125,16 +133,17 @@ static int64_t *gather_work(bt_world *w)
     return work;
 }
 
-/// The graph of the tiles: edges to the eight neighbours, weighted with what a cut there makes the ranks hold twice.
+/// The graph of the cells: edges to the eight neighbours, weighted with what a cut there makes the ranks hold twice.
 static void cut_map(bt_world *w)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_domain *d = w->domain;
     const int n = d->n_x * d->n_y;
     int64_t *work = gather_work(w);
     double dealt = 0;
     if (d->comm->rank == 0) {
-        int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to), *group = bt_alloc((size_t)n, sizeof *group);
+        int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to),
+            *group = bt_alloc((size_t)n, sizeof *group);
         int64_t *edge = bt_alloc(8 * (size_t)n, sizeof *edge);
         double (*at)[2] = bt_alloc((size_t)n, sizeof *at);
         int64_t cut = 0, all = 0;
@@ -154,7 +163,13 @@ static void cut_map(bt_world *w)
             group[p] = d->under[p] ? 0 : -1;
             at[p][0] = x * t->side_x, at[p][1] = y * t->side_y;
         }
-        const bt_graph g = {.n = n, .start = start, .to = to, .edge = edge, .weight = work, .at = (const double (*)[2])at, .group = group};
+        const bt_graph g = {.n = n,
+                            .start = start,
+                            .to = to,
+                            .edge = edge,
+                            .weight = work,
+                            .at = (const double(*)[2])at,
+                            .group = group};
         bt_cut_quality q;
         bt_cut(&g, d->comm->size, TOLERANCE, d->owner, &q);
         dealt = q.imbalance;
@@ -180,7 +195,7 @@ static void cut_map(bt_world *w)
 
 void bt_division_map(bt_world *w, bool cut)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_domain *d = w->domain;
     int *owner = carry_over(w, d);
     double *work = carry_work(w, d);
@@ -195,7 +210,8 @@ void bt_division_map(bt_world *w, bool cut)
     if (cut || !d->dealt) {
         cut_map(w);
         memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
-        d->steps = 0; // only now: where floes drift through the tiles, labels are renewed more often than the balance is looked at
+        // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at
+        d->steps = 0;
     }
     d->due = false;
     for (int64_t p = 0; p < (int64_t)d->n_x * d->n_y; p++)

@@ -10,18 +10,19 @@
 /// What is exchanged with one other rank.
 typedef struct bt_link {
     int rank;
-    // bodies that this rank's tiles of a phase may change and the other holds, and the reverse; both sides list them in the same order
+    // bodies that this rank's cells of a phase may change and the other holds, and the reverse; both sides list them in
+    // the same order
     bt_idx *send[BT_PHASES], *receive[BT_PHASES];   ///< [n_...] indices of bodies
     bt_idx n_send[BT_PHASES], n_receive[BT_PHASES];
-    // of these, the ones that units of this step touch: at the front of chosen lists
+    // of these, the ones that contacts of this step touch: at the front of chosen lists
     bt_idx *send_now[BT_PHASES], *receive_now[BT_PHASES];
     bt_idx n_send_now[BT_PHASES], n_receive_now[BT_PHASES];
     double *out, *in;                               ///< [3 × longest list] values on the way
     uint8_t *flags_out, *flags_in;                  ///< [sum of the lists] touched or not
     bt_idx n_flags_out, n_flags_in;
-    // tiles of which the other must know a value, and the reverse
-    bt_idx *tell_send;                             ///< [n_tell_send] tiles here
-    int32_t (*tell_receive)[2];                    ///< [n_tell_receive] coordinates of tiles there
+    // cells of which the other must know a value, and the reverse
+    bt_idx *tell_send;                             ///< [n_tell_send] cells here
+    int32_t (*tell_receive)[2];                    ///< [n_tell_receive] coordinates of cells there
     bt_idx n_tell_send, n_tell_receive;
     double *tell_out, *tell_in;
 } bt_link;
@@ -30,14 +31,15 @@ struct bt_domain {
     const bt_comm *comm;
     bool dealt;              ///< bodies are where the map says; before that every rank holds all
     bool due;                ///< a new division is due
-    // the map: owner of every tile of the box
+    // the map: owner of every cell of the box
     int *owner;              ///< [n_y][n_x] rank
-    uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the tile too
+    uint8_t *under;          ///< [n_y][n_x] 1 = near a large movable body: its rank holds the cell too
     int32_t low_x, low_y, n_x, n_y;
-    double side_x, side_y;   ///< of the tiles it was made for, m
+    double side_x, side_y;   ///< of the cells it was made for, m
     int large_owner;         ///< rank that owns the large movable bodies
     double large_path;       ///< path of the large movable bodies when the division was made, m
-    double drift;            ///< way of the water through tiles that do not move with it (periodic directions), since then, m
+    /// way of the water through cells that do not move with it (periodic directions), since then, m
+    double drift;
     uint8_t *owned;          ///< [n bodies] this rank answers for the body
     bt_idx cap_owned;
     // links
@@ -45,41 +47,41 @@ struct bt_domain {
     int n_links;
     MPI_Request *request;    ///< [2 n_links]
     int n_requests;
-    uint8_t *touched;        ///< [n bodies] bit p: a unit of phase p touches it
+    uint8_t *touched;        ///< [n bodies] bit p: a contact of phase p touches it
     // work since the last check
-    double *work;            ///< [n_y][n_x] of this rank's tiles, s, modelled
+    double *work;            ///< [n_y][n_x] of this rank's cells, s, modelled
     int64_t steps;           ///< since then
     double exchange_s;       ///< wall time in exchanges since asked
     bt_domain_stats stats;
 };
 
-/// Work of a body at rest, s: what a tile counts for before anything has been measured (partition/README.md).
+/// Work of a body at rest, s: what a cell counts for before anything has been measured (partition/README.md).
 #define BT_WORK_AT_REST 2e-9
 
-/// Place of tile (x, y) in the map, −1 outside.
+/// Place of cell (x, y) in the map, −1 outside.
 int64_t bt_division_place(const bt_world *w, int32_t x, int32_t y);
 
 /// Longest path of a large movable body, m; −1 = there is none.
 double bt_division_large_path(const bt_world *w);
 
-/// Rank that owns tile (x, y) of the map; −1 outside.
+/// Rank that owns cell (x, y) of the map; −1 outside.
 int bt_division_owner(const bt_world *w, int32_t x, int32_t y);
 
-enum { BT_MAX_HOLDERS = 5 };
-/// Ranks that hold the bodies of tile (x, y), each once; returns their number.
-int bt_division_holders(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_HOLDERS]);
+enum { BT_MAX_SHARERS = 5 };
+/// Ranks that hold the bodies of cell (x, y), each once; returns their number.
+int bt_division_sharers(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX_SHARERS]);
 
-/// Tile of the phase that touches the bodies of tile (x, y); false when there is none.
+/// Cell of the phase that touches the bodies of cell (x, y); false when there is none.
 bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int32_t out[2]);
 
-/// Collective. The links for the tiles as they are now.
+/// Collective. The links for the cells as they are now.
 void bt_halo_connect(bt_world *w);
 void bt_halo_free(bt_domain *d);
 
 /// Collective. Ends the run when bodies are lost or doubled.
 void bt_domain_check(bt_world *w);
 
-/// Collective. A map for the tiles as they are now: renewed from the one before, or cut anew.
+/// Collective. A map for the cells as they are now: renewed from the one before, or cut anew.
 void bt_division_map(bt_world *w, bool cut);
 
 #endif

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The division of a world among ranks as the program sees it: sums over the ranks, the measure of balance.
 //
-// Work of a tile, modelled from counts rather than timed, so that a run can be repeated: what a unit, a pair and a body
-// cost in a step. Timing single tiles costs more than it tells, and noise would move tiles to and fro.
+// Work of a cell, modelled from counts rather than timed, so that a run can be repeated: what a contact, a pair and a
+// body cost in a step. Timing single cells costs more than it tells, and noise would move cells to and fro.
 #include "partition/domain.h"
 
 #include <math.h>
@@ -11,17 +11,23 @@
 
 #include "partition/division.h"
 
-#define IMBALANCE 0.05 // of the work, above which tiles are dealt anew
+#define IMBALANCE 0.05 // of the work, above which cells are dealt anew
 enum { CHECK_STEPS = 10 };
 // Seconds, measured on one core (see partition/README.md): only their ratios matter.
-#define UNIT_SWEEP 30e-9
-#define UNIT_STEP 300e-9
+#define CONTACT_SWEEP 30e-9
+#define CONTACT_STEP 300e-9
 #define PAIR 60e-9
 #define BODY 120e-9
 
 static const bt_exchange exchange = {
-    .maxima = bt_domain_maxima, .owns_tile = bt_domain_owns_tile, .owns_large = bt_domain_owns_large, .due = bt_domain_due,
-    .migrate = bt_domain_migrate, .connect = bt_domain_connect, .send = bt_domain_send, .receive = bt_domain_receive,
+    .maxima = bt_domain_maxima,
+    .owns_cell = bt_domain_owns_cell,
+    .owns_large = bt_domain_owns_large,
+    .due = bt_domain_due,
+    .migrate = bt_domain_migrate,
+    .connect = bt_domain_connect,
+    .send = bt_domain_send,
+    .receive = bt_domain_receive,
 };
 
 void bt_domain_create(bt_world *w, const bt_comm *comm)
@@ -57,7 +63,10 @@ double bt_domain_exchange_time(const bt_world *w)
     return t;
 }
 
-bool bt_domain_owns_tile(const bt_world *w, int32_t x, int32_t y) { return !w->domain || bt_division_owner(w, x, y) == w->domain->comm->rank; }
+bool bt_domain_owns_cell(const bt_world *w, int32_t x, int32_t y)
+{
+    return !w->domain || bt_division_owner(w, x, y) == w->domain->comm->rank;
+}
 
 bool bt_domain_owns_large(const bt_world *w) { return !w->domain || w->domain->large_owner == w->domain->comm->rank; }
 
@@ -105,17 +114,20 @@ void bt_domain_note(bt_world *w)
 {
     bt_domain *d = w->domain;
     if (!d) return;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     int64_t large = 0; // the large bodies' own work is done where they are
     while (large < (int64_t)d->n_x * d->n_y - 1 && !d->under[large]) large++;
     for (bt_idx k = 0; k < t->n; k++) {
-        bt_tile *tile = &t->tile[k];
-        if (!tile->own) continue;
+        bt_cell *cell = &t->cell[k];
+        if (!cell->own) continue;
         const bool last = k == t->n - 1;
-        d->work[last ? large : bt_division_place(w, tile->x, tile->y)] += tile->n_units * UNIT_STEP + (double)tile->updates * UNIT_SWEEP + tile->n_pairs * PAIR + (tile->end - tile->first) * (last || bt_tiles_moves(t, k) ? BODY : BT_WORK_AT_REST);
-        tile->updates = 0;
+        d->work[last ? large : bt_division_place(w, cell->x, cell->y)] +=
+            cell->n_contacts * CONTACT_STEP + (double)cell->updates * CONTACT_SWEEP + cell->n_pairs * PAIR +
+            (cell->end - cell->first) * (last || bt_cells_moves(t, k) ? BODY : BT_WORK_AT_REST);
+        cell->updates = 0;
     }
-    d->drift += w->par.dt * ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
+    d->drift += w->par.dt *
+                ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));
     const double path = bt_division_large_path(w);
     const bool far = path >= 0 && path - d->large_path + d->drift > 2 * w->par.size;
     if (++d->steps >= CHECK_STEPS) {

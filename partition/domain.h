@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The division of a world among ranks: who owns which tile, and what is sent to whom. w->domain == NULL: one rank, nothing to do.
+// The division of a world among ranks: who owns which cell, and what is sent to whom. w->domain == NULL: one rank,
+// nothing to do.
 #ifndef BERGTOW_DOMAIN_H
 #define BERGTOW_DOMAIN_H
 
 #include "bergtow/comm.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "bergtow/world.h"
 #include "space/exchange.h"
 #include "space/phases.h"
@@ -13,13 +14,15 @@ typedef struct bt_domain bt_domain;
 
 /// What the division costs.
 typedef struct bt_domain_stats {
-    int64_t divisions;       ///< times tiles were dealt anew
-    double imbalance;        ///< work of the busiest rank / mean − 1 over the checks, mean of those after the first division
+    int64_t divisions;       ///< times cells were dealt anew
+    /// work of the busiest rank / mean − 1 over the checks, mean of those after the first division
+    double imbalance;
     double worst_imbalance;  ///< largest of them
     int64_t checks;
-    double dealt_imbalance;  ///< the same of the work that a division was made from, just after it: mean of those after the first division
+    /// the same of the work that a division was made from, just after it: mean of those after the first division
+    double dealt_imbalance;
     double worst_dealt_imbalance;
-    double cut;              ///< share of neighbouring tile pairs that lie on different ranks, last division
+    double cut;              ///< share of neighbouring cell pairs that lie on different ranks, last division
     double halo;             ///< bodies held but not owned / bodies owned, all ranks, last division
     int64_t moved;           ///< bodies that went to another rank
 } bt_domain_stats;
@@ -34,14 +37,16 @@ bt_domain_stats bt_domain_get_stats(const bt_world *w);
 void bt_domain_note(bt_world *w);
 /// Wall time spent waiting for other ranks since the last call, s.
 double bt_domain_exchange_time(const bt_world *w);
-/// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what its tiles need?
+/// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what
+/// its cells need?
 bool bt_domain_is_valid(bt_world *w);
-/// Collective. Ends the run with the id of a body if it is not. With -DBT_VALIDATE after every migration and every BT_VALIDATE_STEPS steps.
+/// Collective. Ends the run with the id of a body if it is not. With -DBT_VALIDATE after every migration and every
+/// BT_VALIDATE_STEPS steps.
 void bt_domain_validate(bt_world *w);
 enum { BT_VALIDATE_STEPS = 20 };
 
-/// Does this rank answer for the contacts of tile (x, y); for the large movable bodies; for body i?
-bool bt_domain_owns_tile(const bt_world *w, int32_t x, int32_t y);
+/// Does this rank answer for the contacts of cell (x, y); for the large movable bodies; for body i?
+bool bt_domain_owns_cell(const bt_world *w, int32_t x, int32_t y);
 bool bt_domain_owns_large(const bt_world *w);
 bool bt_domain_owns(const bt_world *w, bt_idx i);
 
@@ -57,29 +62,32 @@ double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *
 
 /// Is a new division due?
 bool bt_domain_due(const bt_world *w);
-/// After labelling: choose owners, move bodies (owned and ghosts) and traces to where they belong now. Takes and returns the traces. Collective.
-bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n);
-/// After the tiles have been made: what is exchanged with whom. Collective.
+/// After labelling: choose owners, move bodies (owned and ghosts) and traces to where they belong now. Takes and
+/// returns the traces. Collective.
+bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n);
+/// After the cells have been made: what is exchanged with whom. Collective.
 void bt_domain_connect(bt_world *w);
 
-/// What is to be done with the value, above 0, of a tile of another rank.
-typedef void bt_take_tile(bt_tiles *t, int32_t x, int32_t y, double value);
-/// Tell a value [n tiles] of the tiles of this rank to the ranks that have tiles within two of them, and take theirs. Collective.
-void bt_domain_tell_tiles(bt_world *w, const double *value, bt_take_tile *take);
-/// After the detection: which bodies the units of this step touch. Collective.
+/// What is to be done with the value, above 0, of a cell of another rank.
+typedef void bt_take_cell(bt_cells *t, int32_t x, int32_t y, double value);
+/// Tell a value [n cells] of the cells of this rank to the ranks that have cells within two of them, and take theirs.
+/// Collective.
+void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take);
+/// After the detection: which bodies the contacts of this step touch. Collective.
 void bt_domain_select(bt_world *w);
 /// Floes here that have a contact with a large movable body of another rank.
 void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
 /// Floes here that have a contact of this step on another rank.
 void bt_domain_moved_elsewhere(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
-/// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
+/// After a phase: send what its border cells changed in v (an array over the bodies), and receive what others did.
 void bt_domain_send(bt_world *w, int phase, bt_vel *v);
 void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
 /// After the solve: velocities of large bodies, the tow line's impulse, and displacements (an array over the bodies, or
 /// NULL) to all ranks. Collective.
 void bt_domain_settle(bt_world *w, bt_vel *shift);
 
-/// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the caller frees. Collective.
+/// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the
+/// caller frees. Collective.
 void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);
 
 /// Largest value of every body over the ranks that hold it: x [n bodies]. Collective.

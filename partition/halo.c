@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MIT
-// What ranks exchange: velocities of shared bodies after each phase, values of tiles, and what only some of them know.
+// What ranks exchange: velocities of shared bodies after each phase, values of cells, and what only some of them know.
 //
-// Lists. A body of tile t is touched in phase p by one tile, T_p(t), whose rank sends its velocity to all others that hold t. Both sides
-// go through the tiles they hold in the same order, so they make the same lists without a word. Of these bodies few have a
-// contact in a given step: after the detection the sender says which (one byte each), and only those travel in the sweeps.
+// Lists. A body of cell t is touched in phase p by one cell, T_p(t), whose rank sends its velocity to all others that
+// hold t. Both sides go through the cells they hold in the same order, so they make the same lists without a word. Of
+// these bodies few have a contact in a given step: after the detection the sender says which (one byte each), and only
+// those travel in the sweeps.
 #include <stdlib.h>
 #include <string.h>
 
 #include "partition/division.h"
 #include "partition/domain.h"
 
-enum { TAG_FLAGS = 10, TAG_TILES = 11, TAG_VELOCITIES = 20 };
+enum { TAG_FLAGS = 10, TAG_CELLS = 11, TAG_VELOCITIES = 20 };
 
 void bt_halo_free(bt_domain *d)
 {
@@ -22,7 +23,8 @@ void bt_halo_free(bt_domain *d)
             free(l->send_now[p]);
             free(l->receive_now[p]);
         }
-        void *arrays[] = {l->out, l->in, l->flags_out, l->flags_in, l->tell_send, l->tell_receive, l->tell_out, l->tell_in};
+        void *arrays[] = {l->out,       l->in,           l->flags_out, l->flags_in,
+                          l->tell_send, l->tell_receive, l->tell_out,  l->tell_in};
         for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     }
     free(d->link);
@@ -41,8 +43,8 @@ static bt_link *link_to(bt_domain *d, int rank)
     return &d->link[d->n_links++];
 }
 
-/// Append the movable bodies of a tile to a list whose capacity is the power of two above its length.
-static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_tile *t)
+/// Append the movable bodies of a cell to a list whose capacity is the power of two above its length.
+static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_cell *t)
 {
     for (bt_idx i = t->first; i < t->end; i++) {
         if (w->bodies.motion[i] != BT_DYNAMIC) continue;
@@ -51,57 +53,61 @@ static void append(bt_idx **list, bt_idx *n, const bt_world *w, const bt_tile *t
     }
 }
 
-static bool is_under(const bt_domain *d, const bt_tile *t) { return d->under[(int64_t)(t->y - d->low_y) * d->n_x + t->x - d->low_x]; }
+static bool is_under(const bt_domain *d, const bt_cell *t)
+{
+    return d->under[(int64_t)(t->y - d->low_y) * d->n_x + t->x - d->low_x];
+}
 
-/// Lists of bodies for the tiles that this rank holds.
+/// Lists of bodies for the cells that this rank holds.
 static void list_bodies(bt_world *w)
 {
     bt_domain *d = w->domain;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     const int me = d->comm->rank;
     for (bt_idx k = 0; k < t->n - 1; k++) {
-        const bt_tile *tile = &t->tile[k];
-        if (tile->end == tile->first) continue;
-        int holder[BT_MAX_HOLDERS];
-        const int n = bt_division_holders(w, tile->x, tile->y, holder);
+        const bt_cell *cell = &t->cell[k];
+        if (cell->end == cell->first) continue;
+        int holder[BT_MAX_SHARERS];
+        const int n = bt_division_sharers(w, cell->x, cell->y, holder);
         for (int p = 0; p < BT_PHASES; p++) {
             int32_t at[2];
             int solver = -1;
-            if (p == BT_COLOURS) solver = is_under(d, tile) ? d->large_owner : -1;
-            else if (bt_division_toucher(w, p, tile->x, tile->y, at)) solver = bt_division_owner(w, at[0], at[1]);
+            if (p == BT_COLOURS) solver = is_under(d, cell) ? d->large_owner : -1;
+            else if (bt_division_toucher(w, p, cell->x, cell->y, at)) solver = bt_division_owner(w, at[0], at[1]);
             if (solver < 0) continue;
             for (int h = 0; h < n; h++) {
                 if (holder[h] == me && solver != me) {
                     bt_link *l = link_to(d, solver);
-                    append(&l->receive[p], &l->n_receive[p], w, tile);
+                    append(&l->receive[p], &l->n_receive[p], w, cell);
                 } else if (holder[h] != me && solver == me) {
                     bt_link *l = link_to(d, holder[h]);
-                    append(&l->send[p], &l->n_send[p], w, tile);
+                    append(&l->send[p], &l->n_send[p], w, cell);
                 }
             }
         }
     }
 }
 
-/// Does rank r hold a tile within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far that has converged.
+/// Does rank r hold a cell within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far
+/// that has converged.
 static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     memset(near, 0, (size_t)w->domain->comm->size);
     for (int32_t dy = -2; dy <= 2; dy++)
         for (int32_t dx = -2; dx <= 2; dx++) {
             if ((t->wrap_x == 1 && dx) || (t->wrap_y == 1 && dy)) continue;
-            int holder[BT_MAX_HOLDERS];
-            const int n = bt_division_holders(w, x + dx, y + dy, holder);
+            int holder[BT_MAX_SHARERS];
+            const int n = bt_division_sharers(w, x + dx, y + dy, holder);
             for (int h = 0; h < n; h++) near[holder[h]] = 1;
         }
 }
 
-/// Lists of tiles of which a value is told: at the border of the map's parts only.
+/// Lists of cells of which a value is told: at the border of the map's parts only.
 static void list_told(bt_world *w)
 {
     bt_domain *d = w->domain;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     const int me = d->comm->rank;
     uint8_t *near = bt_alloc((size_t)d->comm->size, 1);
     for (int32_t y = d->low_y; y < d->low_y + d->n_y; y++)
@@ -118,7 +124,7 @@ static void list_told(bt_world *w)
                     if (r == me || !near[r]) continue;
                     bt_link *l = link_to(d, r);
                     l->tell_send = bt_realloc(l->tell_send, (size_t)l->n_tell_send + 1, sizeof *l->tell_send);
-                    l->tell_send[l->n_tell_send++] = bt_tiles_at(t, x, y);
+                    l->tell_send[l->n_tell_send++] = bt_cells_at(t, x, y);
                 }
             }
         }
@@ -128,7 +134,7 @@ static void list_told(bt_world *w)
 static void mark_owned(bt_world *w)
 {
     bt_domain *d = w->domain;
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     if (b->n > d->cap_owned) {
         d->cap_owned = b->n;
@@ -137,18 +143,18 @@ static void mark_owned(bt_world *w)
     }
     double held[2] = {0, 0};
     for (bt_idx k = 0; k < t->n; k++) {
-        bt_tile *tile = &t->tile[k];
-        const bool own = k < t->n - 1 ? tile->own : d->comm->rank == 0;
-        for (bt_idx i = tile->first; i < tile->end; i++) d->owned[i] = own;
-        if (k < t->n - 1) held[own] += tile->end - tile->first;
-        // Whoever holds a body of the block waits for what the tile does to it.
-        const bt_idx block[4] = {k, tile->right, tile->above, tile->diagonal};
-        tile->border = k == t->n - 1;
-        for (int j = 0; j < 4 && tile->own && k < t->n - 1; j++) {
+        bt_cell *cell = &t->cell[k];
+        const bool own = k < t->n - 1 ? cell->own : d->comm->rank == 0;
+        for (bt_idx i = cell->first; i < cell->end; i++) d->owned[i] = own;
+        if (k < t->n - 1) held[own] += cell->end - cell->first;
+        // Whoever holds a body of the block waits for what the cell does to it.
+        const bt_idx block[4] = {k, cell->right, cell->above, cell->diagonal};
+        cell->border = k == t->n - 1;
+        for (int j = 0; j < 4 && cell->own && k < t->n - 1; j++) {
             if (block[j] < 0) continue;
-            const bt_tile *other = &t->tile[block[j]];
-            int holder[BT_MAX_HOLDERS];
-            if (bt_division_holders(w, other->x, other->y, holder) > 1) tile->border = true;
+            const bt_cell *other = &t->cell[block[j]];
+            int holder[BT_MAX_SHARERS];
+            if (bt_division_sharers(w, other->x, other->y, holder) > 1) cell->border = true;
         }
     }
     bt_sum sums[2] = {{0}, {0}};
@@ -200,21 +206,25 @@ static void wait_all(bt_domain *d)
     d->n_requests = 0;
 }
 
-void bt_domain_tell_tiles(bt_world *w, const double *value, bt_take_tile *take)
+void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take)
 {
     bt_domain *d = w->domain;
     if (!d) return;
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         for (bt_idx i = 0; i < l->n_tell_send; i++) l->tell_out[i] = value[l->tell_send[i]];
-        if (l->n_tell_receive) MPI_Irecv(l->tell_in, l->n_tell_receive, MPI_DOUBLE, l->rank, TAG_TILES, d->comm->mpi, &d->request[d->n_requests++]);
-        if (l->n_tell_send) MPI_Isend(l->tell_out, l->n_tell_send, MPI_DOUBLE, l->rank, TAG_TILES, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_tell_receive)
+            MPI_Irecv(l->tell_in, l->n_tell_receive, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
+        if (l->n_tell_send)
+            MPI_Isend(l->tell_out, l->n_tell_send, MPI_DOUBLE, l->rank, TAG_CELLS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
     wait_all(d);
     for (int k = 0; k < d->n_links; k++) {
         const bt_link *l = &d->link[k];
         for (bt_idx i = 0; i < l->n_tell_receive; i++)
-            if (l->tell_in[i] > 0) take(w->tiles, l->tell_receive[i][0], l->tell_receive[i][1], l->tell_in[i]);
+            if (l->tell_in[i] > 0) take(w->cells, l->tell_receive[i][0], l->tell_receive[i][1], l->tell_in[i]);
     }
 }
 
@@ -222,14 +232,14 @@ void bt_domain_select(bt_world *w)
 {
     bt_domain *d = w->domain;
     if (!d) return;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     if (w->bodies.n > 0) memset(d->touched, 0, (size_t)w->bodies.n); // a rank that owns nothing has no array
     for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_tile *tile = &t->tile[t->order[i]];
-        if (!tile->border) continue;
-        for (bt_idx j = 0; j < tile->n_units; j++) {
-            d->touched[tile->units[j].a] |= (uint8_t)(1 << tile->phase);
-            d->touched[tile->units[j].b] |= (uint8_t)(1 << tile->phase);
+        const bt_cell *cell = &t->cell[t->order[i]];
+        if (!cell->border) continue;
+        for (bt_idx j = 0; j < cell->n_contacts; j++) {
+            d->touched[cell->contacts[j].a] |= (uint8_t)(1 << cell->phase);
+            d->touched[cell->contacts[j].b] |= (uint8_t)(1 << cell->phase);
         }
     }
     for (int k = 0; k < d->n_links; k++) {
@@ -243,8 +253,12 @@ void bt_domain_select(bt_world *w)
                 if (now) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];
             }
         }
-        if (l->n_flags_in) MPI_Irecv(l->flags_in, l->n_flags_in, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
-        if (l->n_flags_out) MPI_Isend(l->flags_out, l->n_flags_out, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi, &d->request[d->n_requests++]);
+        if (l->n_flags_in)
+            MPI_Irecv(l->flags_in, l->n_flags_in, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
+        if (l->n_flags_out)
+            MPI_Isend(l->flags_out, l->n_flags_out, MPI_BYTE, l->rank, TAG_FLAGS, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
     wait_all(d);
     for (int k = 0; k < d->n_links; k++) {
@@ -276,12 +290,16 @@ void bt_domain_send(bt_world *w, int phase, bt_vel *v)
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         const bt_idx n_in = l->n_receive_now[phase], n_out = l->n_send_now[phase];
-        if (n_in) MPI_Irecv(l->in, 3 * n_in, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+        if (n_in)
+            MPI_Irecv(l->in, 3 * n_in, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi,
+                      &d->request[d->n_requests++]);
         for (bt_idx i = 0; i < n_out; i++) {
             const bt_vel *x = &v[l->send_now[phase][i]];
             l->out[3 * i] = x->x, l->out[3 * i + 1] = x->y, l->out[3 * i + 2] = x->w;
         }
-        if (n_out) MPI_Isend(l->out, 3 * n_out, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi, &d->request[d->n_requests++]);
+        if (n_out)
+            MPI_Isend(l->out, 3 * n_out, MPI_DOUBLE, l->rank, TAG_VELOCITIES + phase, d->comm->mpi,
+                      &d->request[d->n_requests++]);
     }
 }
 

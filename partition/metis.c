@@ -9,10 +9,10 @@
 //   - contiguous parts asked of a graph that is not connected: an error. Contiguity is not asked for.
 //   - it sets its own handlers of SIGTERM and SIGABRT and afterwards puts the caller's back as one-shot
 //     ones (SA_RESETHAND); the actions are saved and restored here.
-//   - its handler of SIGTERM jumps out of whatever METIS was doing: the caller never learns of the signal, and a jump out of
-//     malloc leaves the heap locked (seen: a hang in the free that follows). So SIGTERM is blocked meanwhile and
-//     comes after. METIS raises it itself only for arguments that cannot occur here. In another thread the handler would
-//     jump into nowhere: see cut.h. Rejected: to let it return METIS_ERROR and raise the signal again.
+//   - its handler of SIGTERM jumps out of whatever METIS was doing: the caller never learns of the signal, and a jump
+//     out of malloc leaves the heap locked (seen: a hang in the free that follows). So SIGTERM is blocked meanwhile and
+//     comes after. METIS raises it itself only for arguments that cannot occur here. In another thread the handler
+//     would jump into nowhere: see cut.h. Rejected: to let it return METIS_ERROR and raise the signal again.
 #include "partition/cut_method.h"
 
 #include <limits.h>
@@ -54,7 +54,8 @@ static int call_metis(idx_t n, idx_t *start, idx_t *to, idx_t *weight, idx_t *ed
     pthread_sigmask(SIG_BLOCK, &set, &mask);
     sigaction(SIGTERM, NULL, &term);
     sigaction(SIGABRT, NULL, &abrt);
-    int status = METIS_PartGraphKway(&n, &one, start, to, weight, NULL, edge, &n_parts, NULL, NULL, options, &cut, part);
+    int status =
+        METIS_PartGraphKway(&n, &one, start, to, weight, NULL, edge, &n_parts, NULL, NULL, options, &cut, part);
     sigaction(SIGTERM, &term, NULL);
     sigaction(SIGABRT, &abrt, NULL);
     pthread_sigmask(SIG_SETMASK, &mask, NULL);

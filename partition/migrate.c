@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Bodies and traces of contacts to the ranks that own or hold them.
 //
-// Every owned body is sent, complete, to all ranks that hold its tile under the new map; ghosts are dropped first and come back the
-// same way. So after a migration every copy of a body is that of its owner.
+// Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and
+// come back the same way. So after a migration every copy of a body is that of its owner.
 #include <stdlib.h>
 #include <string.h>
 
@@ -19,7 +19,8 @@ typedef struct {
 
 static parcels new_parcels(int size)
 {
-    return (parcels){bt_alloc((size_t)size, sizeof(char *)), bt_alloc((size_t)size, sizeof(size_t)), bt_alloc((size_t)size, sizeof(size_t)), size};
+    return (parcels){bt_alloc((size_t)size, sizeof(char *)), bt_alloc((size_t)size, sizeof(size_t)),
+                     bt_alloc((size_t)size, sizeof(size_t)), size};
 }
 
 static void add(parcels *p, int rank, const void *data, size_t n)
@@ -66,7 +67,8 @@ static char *deliver(const bt_comm *c, parcels *p, int tag, size_t *n_in)
         }
     for (int r = 0; r < c->size; r++)
         for (uint64_t done = 0; done < out[r]; done += PIECE)
-            MPI_Isend(p->data[r] + done, (int)(out[r] - done < PIECE ? out[r] - done : PIECE), MPI_BYTE, r, tag, c->mpi, &request[n++]);
+            MPI_Isend(p->data[r] + done, (int)(out[r] - done < PIECE ? out[r] - done : PIECE), MPI_BYTE, r, tag, c->mpi,
+                      &request[n++]);
     MPI_Waitall(n, request, MPI_STATUSES_IGNORE);
     free(request);
     free(out);
@@ -91,7 +93,8 @@ static void pack(const bt_bodies *b, bt_idx i, parcels *p, int rank)
     for (int k = 0; k < bt_n_body_fields; k++) add(p, rank, field_of(b, k, i), bt_body_fields[k].size);
     const int64_t first = b->offset[i], n = b->offset[i + 1] - first;
     add(p, rank, &n, sizeof n);
-    for (int k = 0; k < bt_n_vertex_fields; k++) add(p, rank, vertices_of(b, k, first), (size_t)n * bt_vertex_fields[k].size);
+    for (int k = 0; k < bt_n_vertex_fields; k++)
+        add(p, rank, vertices_of(b, k, first), (size_t)n * bt_vertex_fields[k].size);
 }
 
 /// Append the bodies of a delivery.
@@ -127,9 +130,11 @@ static void compact(bt_bodies *b, const uint8_t *keep)
     for (bt_idx i = 0; i < b->n; i++) {
         if (!keep[i]) continue;
         if (n != i) {
-            for (int k = 0; k < bt_n_body_fields; k++) memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
+            for (int k = 0; k < bt_n_body_fields; k++)
+                memcpy(field_of(b, k, n), field_of(b, k, i), bt_body_fields[k].size);
             const int64_t from = b->offset[i], to = b->offset[n], m = b->offset[i + 1] - from;
-            for (int k = 0; k < bt_n_vertex_fields; k++) memmove(vertices_of(b, k, to), vertices_of(b, k, from), (size_t)m * bt_vertex_fields[k].size);
+            for (int k = 0; k < bt_n_vertex_fields; k++)
+                memmove(vertices_of(b, k, to), vertices_of(b, k, from), (size_t)m * bt_vertex_fields[k].size);
             b->offset[n + 1] = to + m;
         }
         n++;
@@ -143,7 +148,8 @@ static void shrink(bt_bodies *b)
     const bt_idx cap = b->n + b->n / 8 + 16;
     if (b->cap <= cap + cap / 4) return;
     for (int k = 0; k < bt_n_body_fields; k++) {
-        void **array = (void **)((char *)b + bt_body_fields[k].array), *small = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
+        void **array = (void **)((char *)b + bt_body_fields[k].array),
+             *small = bt_alloc_aligned((size_t)cap, bt_body_fields[k].size);
         memcpy(small, *array, (size_t)b->n * bt_body_fields[k].size);
         free(*array);
         *array = small;
@@ -171,13 +177,13 @@ static void move_bodies(bt_world *w)
             continue;
         }
         if (d->dealt && !d->owned[i]) continue;
-        int rank[BT_MAX_HOLDERS];
-        const int n = bt_division_holders(w, b->tile[i][0], b->tile[i][1], rank);
+        int rank[BT_MAX_SHARERS];
+        const int n = bt_division_sharers(w, b->cell[i][0], b->cell[i][1], rank);
         for (int k = 0; k < n; k++) {
             if (rank[k] == me) keep[i] = 1;
             else if (d->dealt) pack(b, i, &p, rank[k]); // at first every rank has all
         }
-        d->stats.moved += d->dealt && bt_division_owner(w, b->tile[i][0], b->tile[i][1]) != me;
+        d->stats.moved += d->dealt && bt_division_owner(w, b->cell[i][0], b->cell[i][1]) != me;
     }
     for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;
     compact(b, keep);
@@ -196,14 +202,15 @@ static void move_bodies(bt_world *w)
 static int solver_of(const bt_world *w, bt_idx a, bt_idx b)
 {
     const bt_bodies *s = &w->bodies;
-    if ((s->large[a] && s->motion[a] == BT_DYNAMIC) || (s->large[b] && s->motion[b] == BT_DYNAMIC)) return w->domain->large_owner;
+    if ((s->large[a] && s->motion[a] == BT_DYNAMIC) || (s->large[b] && s->motion[b] == BT_DYNAMIC))
+        return w->domain->large_owner;
     int32_t at[2];
-    bt_tiles_owner(w->tiles, s->tile[s->large[a] ? b : a], s->tile[s->large[b] ? a : b], at);
+    bt_cells_owner(w->cells, s->cell[s->large[a] ? b : a], s->cell[s->large[b] ? a : b], at);
     return bt_division_owner(w, at[0], at[1]);
 }
 
 /// Traces by the rank they go to; those that stay are kept in trace [*n].
-static void sort_traces(const bt_world *w, bt_trace *trace, int64_t *n, parcels *p)
+static void sort_traces(const bt_world *w, bt_memory *trace, int64_t *n, parcels *p)
 {
     const bt_domain *d = w->domain;
     int64_t kept = 0;
@@ -215,7 +222,7 @@ static void sort_traces(const bt_world *w, bt_trace *trace, int64_t *n, parcels 
     *n = kept;
 }
 
-bt_trace *bt_domain_migrate(bt_world *w, bt_trace *trace, int64_t *n)
+bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n)
 {
     bt_domain *d = w->domain;
     if (!d) return trace;

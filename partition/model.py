@@ -21,10 +21,16 @@ BODY, SUM = 24, 150  # bytes: three velocities of a body; one exact sum with its
 def options():
     p = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     p.add_argument("table", nargs="?", type=pathlib.Path, default=pathlib.Path(__file__).with_name("quality.csv"))
-    p.add_argument("--compute", type=float, default=15, help="ns a contact point and sweep on one core (default: %(default)s)")
+    p.add_argument("--compute",
+                   type=float,
+                   default=15,
+                   help="ns a contact point and sweep on one core (default: %(default)s)")
     p.add_argument("--contacts", type=float, default=4.3, help="contact points a floe (default: %(default)s)")
     p.add_argument("--sweeps", type=float, default=50, help="sweeps a step (default: %(default)s)")
-    p.add_argument("--floe", type=float, default=1500, help="ns a floe and step outside the sweeps (default: %(default)s)")
+    p.add_argument("--floe",
+                   type=float,
+                   default=1500,
+                   help="ns a floe and step outside the sweeps (default: %(default)s)")
     p.add_argument("--ghost", type=float, default=500, help="ns a ghost floe and step (default: %(default)s)")
     p.add_argument("--alpha", type=float, default=1.5, help="latency of a message, us (default: %(default)s)")
     p.add_argument("--beta", type=float, default=12, help="bandwidth of a rank, GB/s (default: %(default)s)")
@@ -49,14 +55,18 @@ def step(row, o, wait):
 
 
 def table(rows, o, strong):
-    print("| ranks | floes a rank | T, ms | efficiency | if all wait in each colour | waiting | ghosts | latency | bandwidth | sums |")
+    print(
+        "| ranks | floes a rank | T, ms | efficiency | if all wait in each colour | waiting | ghosts | latency | "
+        "bandwidth | sums |"
+    )
     print("|" + " ---: |" * 10)
     first = sum(step(rows[0], o, "imbalance").values())
     for row in rows:
         ranks = int(row["parts"])
         terms, strict = step(row, o, "imbalance"), step(row, o, "phase_imbalance")
         time, ideal = sum(terms.values()), first / ranks if strong else first
-        share = "".join(f" {100 * terms[k] / time:.1f} % |" for k in ("waiting", "ghosts", "latency", "bandwidth", "sums"))
+        share = "".join(f" {100 * terms[k] / time:.1f} % |" for k in ("waiting", "ghosts", "latency", "bandwidth",
+                                                                      "sums"))
         print(f"| {ranks} | {int(row['floes']) // ranks} | {1e3 * time:.4g} | {100 * ideal / time:.0f} % "
               f"| {100 * ideal / sum(strict.values()):.0f} % |{share}")
 

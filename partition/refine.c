@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Shifts vertices between neighbour parts: first for balance, then for a smaller cut.
 //
-// Balance. The heaviest part is to lose weight, but its neighbours may be full themselves. So a search from neighbour to
-// neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the way there
-// (diffusion along a shortest path). A shift counts only if every part on its way then weighs less than the heaviest did:
-// the sorted loads fall, so it ends. Rejected: moving vertices only from a part to a lighter neighbour; with some
-// ten tiles a part it stops with slopes of one tile a part over the whole field.
+// Balance. The heaviest part is to lose weight, but its neighbours may be full themselves. So a search from neighbour
+// to neighbour finds the nearest parts lighter than a share, and one vertex is shifted along every link of the way
+// there (diffusion along a shortest path). A shift counts only if every part on its way then weighs less than the
+// heaviest did: the sorted loads fall, so it ends. Rejected: moving vertices only from a part to a lighter neighbour;
+// with some ten cells a part it stops with slopes of one cell a part over the whole field.
 // Cut. A vertex goes to the neighbour part that it has more edges with, as long as that stays within the limit
 // (the greedy pass of Karypis & Kumar 1998).
 #include "partition/cut_method.h"
@@ -60,9 +60,9 @@ static void shift(parts *p, int v, int b)
     list_add(p, v);
 }
 
-// Vertex of a to give to its neighbour b, −1 if none: one that brings a within the limit (and, where b is the end of the way,
-// keeps b within it) before others, and of those the one that lowers the cut most. With `nearest` the one whose weight
-// is nearest to what a has too much: the first rule may offer nothing but a berg's tiles.
+// Vertex of a to give to its neighbour b, −1 if none: one that brings a within the limit (and, where b is the end of
+// the way, keeps b within it) before others, and of those the one that lowers the cut most. With `nearest` the one
+// whose weight is nearest to what a has too much: the first rule may offer nothing but a berg's cells.
 static int vertex_to_give(const parts *p, int a, int b, bool end, bool nearest)
 {
     const bt_graph *g = p->g;
@@ -143,7 +143,8 @@ static void balance(parts *p)
     for (int64_t i = 0; i < (int64_t)SHIFTS * p->n; i++) {
         int heavy = -1;
         for (int a = 0; a < p->n; a++)
-            if (p->load[a] > p->limit && p->count[a] > 1 && !p->stuck[a] && (heavy < 0 || p->load[a] > p->load[heavy])) heavy = a;
+            if (p->load[a] > p->limit && p->count[a] > 1 && !p->stuck[a] && (heavy < 0 || p->load[a] > p->load[heavy]))
+                heavy = a;
         if (heavy < 0) return;
         p->stuck[heavy] = !relieve(p, heavy);
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// What one rank knows and all must: large bodies after the solve, islands over ranks, largest values; and the checks of a division.
+// What one rank knows and all must: large bodies after the solve, islands over ranks, largest values; and the checks of
+// a division.
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,12 +15,12 @@ void bt_domain_settle(bt_world *w, bt_vel *shift)
     bt_domain *d = w->domain;
     if (!d) return;
     bt_bodies *b = &w->bodies;
-    const bt_tiles *t = w->tiles;
-    const size_t most = 6 * (size_t)(b->n - t->n_tiled) + BT_MAX_BRANCHES;
+    const bt_cells *t = w->cells;
+    const size_t most = 6 * (size_t)(b->n - t->n_in_cells) + BT_MAX_BRANCHES;
     double *x = bt_alloc(most, sizeof *x);
     for (int pass = 0; pass < 2; pass++) {
         size_t n = 0;
-        for (bt_idx i = t->n_tiled; i < b->n; i++) {
+        for (bt_idx i = t->n_in_cells; i < b->n; i++) {
             if (b->motion[i] != BT_DYNAMIC) continue;
             double *from[6] = {&b->vel[i].x, &b->vel[i].y, &b->vel[i].w, NULL, NULL, NULL};
             if (shift) from[3] = &shift[i].x, from[4] = &shift[i].y, from[5] = &shift[i].w;
@@ -45,7 +46,9 @@ static void *gather(const bt_comm *c, const void *mine, size_t n, size_t size, s
     uint64_t total[1] = {n * size}; // in 64 bits first: a sum beyond 2 GB is an error, not a wrong length
     MPI_Allreduce(MPI_IN_PLACE, total, 1, MPI_UINT64_T, MPI_SUM, c->mpi);
     if (total[0] > INT32_MAX) {
-        fprintf(stderr, "bergtow: rank %d: %" PRIu64 " bytes of shared bodies are too many for one message; take fewer ranks\n", c->rank, total[0]);
+        fprintf(stderr,
+                "bergtow: rank %d: %" PRIu64 " bytes of shared bodies are too many for one message; take fewer ranks\n",
+                c->rank, total[0]);
         bt_comm_abort(BT_ERR_NUMERIC);
     }
     const int bytes = (int)(n * size);
@@ -71,8 +74,8 @@ void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t
 /// Is body i held by another rank too?
 static bool shared(const bt_world *w, bt_idx i)
 {
-    int holder[BT_MAX_HOLDERS];
-    return w->bodies.large[i] || bt_division_holders(w, w->bodies.tile[i][0], w->bodies.tile[i][1], holder) > 1;
+    int holder[BT_MAX_SHARERS];
+    return w->bodies.large[i] || bt_division_sharers(w, w->bodies.cell[i][0], w->bodies.cell[i][1], holder) > 1;
 }
 
 typedef struct { bt_gid gid; double x; } value;
@@ -204,7 +207,8 @@ void bt_domain_add_by_name(const bt_world *w, const bt_idx *up, const bt_gid *na
 
 // --- checks ----------------------------------------------------------------------------------------------------------
 
-/// Collective. Ends the run, after rank 0 has told why: a rank that leaves at once would take it down in the middle of its message.
+/// Collective. Ends the run, after rank 0 has told why: a rank that leaves at once would take it down in the middle of
+/// its message.
 static _Noreturn void end_all(const bt_comm *c, bt_errors *err)
 {
     bt_comm_errors(c, err);
@@ -233,10 +237,14 @@ void bt_domain_check(bt_world *w)
     if ((bt_gid)sums[0].v != b->n_global || (uint64_t)sums[1].v != wanted) {
         int64_t *first = bt_alloc((size_t)d->comm->size + 1, sizeof *first);
         for (int r = 0; r <= d->comm->size; r++) first[r] = bt_comm_first(d->comm, r, b->n_global);
-        double *rows = bt_alloc((size_t)n, sizeof *rows), *block = bt_alloc((size_t)(first[d->comm->rank + 1] - first[d->comm->rank]), sizeof *block);
+        double *rows = bt_alloc((size_t)n, sizeof *rows),
+               *block = bt_alloc((size_t)(first[d->comm->rank + 1] - first[d->comm->rank]), sizeof *block);
         bt_errors err = {0};
         bt_comm_rows_by_gid(d->comm, first, n, gid, 1, rows, block, &err);
-        bt_errors_add(&err, "step %" PRId64 ": after a migration %" PRId64 " of %" PRId64 " bodies are owned; this is an error of the program: report the case, and go on with another number of ranks",
+        bt_errors_add(&err,
+                      "step %" PRId64 ": after a migration %" PRId64 " of %" PRId64
+                      " bodies are owned; this is an error of the program: report the case, and go on with another "
+                      "number of ranks",
                       w->step, (int64_t)sums[0].v, b->n_global);
         end_all(d->comm, &err);
     }
@@ -255,21 +263,23 @@ static int by_copy(const void *p, const void *q)
     return (a->state > b->state) - (a->state < b->state);
 }
 
-/// Least gid of a body that stands in the wrong tile here, or under the wrong name; INT64_MAX = none.
+/// Least gid of a body that stands in the wrong cell here, or under the wrong name; INT64_MAX = none.
 static bt_gid misplaced(const bt_world *w)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_gid bad = INT64_MAX;
     for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx i = t->tile[k].first; i < t->tile[k].end; i++) {
-            const bool here = k == t->n - 1 ? b->large[i] : b->tile[i][0] == t->tile[k].x && b->tile[i][1] == t->tile[k].y;
+        for (bt_idx i = t->cell[k].first; i < t->cell[k].end; i++) {
+            const bool here =
+                k == t->n - 1 ? b->large[i] : b->cell[i][0] == t->cell[k].x && b->cell[i][1] == t->cell[k].y;
             if ((!here || bt_world_index(w, b->gid[i]) != i) && b->gid[i] < bad) bad = b->gid[i];
         }
     return bad;
 }
 
-/// Collective. Least gid of a body that is not the same on all ranks that must hold it, or that some of them does not hold; −1 = none.
+/// Collective. Least gid of a body that is not the same on all ranks that must hold it, or that some of them does not
+/// hold; −1 = none.
 static bt_gid find_fault(const bt_world *w)
 {
     const bt_domain *d = w->domain;
@@ -278,12 +288,14 @@ static bt_gid find_fault(const bt_world *w)
     copy *mine = bt_alloc((size_t)b->n, sizeof *mine);
     size_t n = 0, n_all;
     for (bt_idx i = 0; i < b->n; i++) {
-        int holder[BT_MAX_HOLDERS];
-        const int holders = b->large[i] ? d->comm->size : bt_division_holders(w, b->tile[i][0], b->tile[i][1], holder);
+        int holder[BT_MAX_SHARERS];
+        const int holders = b->large[i] ? d->comm->size : bt_division_sharers(w, b->cell[i][0], b->cell[i][1], holder);
         if (holders == 1) continue;
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
-        const double state[] = {p->x, p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->stirred[i], b->home[i].copy, b->home[i].lap};
+        const double state[] = {
+            p->x,          p->y, p->yaw, v->x, v->y, v->w, b->inv[i].m, b->inv[i].i, b->disturbed[i], b->home[i].copy,
+            b->home[i].lap};
         uint64_t h = 0;
         for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
             uint64_t u;
@@ -300,7 +312,8 @@ static bt_gid find_fault(const bt_world *w)
     for (size_t k = 0, same = 0; k < n_all; k++) {
         same = k > 0 && all[k].gid == all[k - 1].gid ? same + 1 : 1;
         const bool last = k + 1 == n_all || all[k + 1].gid != all[k].gid;
-        const bool sound = (same == 1 || (all[k].state == all[k - 1].state && all[k].holders == all[k - 1].holders)) && (!last || (int64_t)same == all[k].holders);
+        const bool sound = (same == 1 || (all[k].state == all[k - 1].state && all[k].holders == all[k - 1].holders)) &&
+                           (!last || (int64_t)same == all[k].holders);
         if (!sound && all[k].gid < bad) bad = all[k].gid;
     }
     free(mine);
@@ -319,7 +332,10 @@ void bt_domain_validate(bt_world *w)
     const bt_gid bad = find_fault(w);
     if (bad < 0) return;
     bt_errors err = {0};
-    bt_errors_add(&err, "step %" PRId64 ": body %" PRId64 " is not the same on all ranks that need it; this is an error of the program: report the case, and go on with another number of ranks",
+    bt_errors_add(&err,
+                  "step %" PRId64 ": body %" PRId64
+                  " is not the same on all ranks that need it; this is an error of the program: report the case, and "
+                  "go on with another number of ranks",
                   w->step, bad);
     end_all(w->domain->comm, &err);
 }

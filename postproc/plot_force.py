@@ -93,22 +93,25 @@ def mark_window(axes, run):
 
 
 def draw_balance(axes, run, factor, unit):
-    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + inertia.
+    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + other laws + inertia.
 
-    Coriolis force and tilt are drawn where they reach a hundredth of the tow.
+    Of the force laws beside drag, those are drawn that reach a hundredth of the tow.
     """
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 2.8, None),
-                                               ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
-                                               ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
-                                               ("coriolis_force", "Coriolis", style.CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
-                                               ("tilt_force", "tilt", style.TILT, 1.6, (1, 1)),
-                                               ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))):
+    lines = [("tow_force", "tow force", style.TOW, 2.8, None),
+             ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
+             ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
+             ("coriolis_force", "Coriolis", style.CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
+             ("tilt_force", "tilt", style.TILT, 1.6, (1, 1)),
+             ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))]
+    laws = [name for name in run.series_names if name.endswith("_force") and name not in [line[0] for line in lines]]
+    lines += [(name, name[:-6].replace("_", " "), style.LAWS[k % len(style.LAWS)], 1.6, (4, 1)) for k, name in enumerate(laws)]
+    for name, label, colour, width, dashes in lines:
         if name in run:
             mean = running_mean(run[name], samples)
-            if name in ("coriolis_force", "tilt_force") and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
+            if name in ("coriolis_force", "tilt_force", *laws) and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
                 continue
             line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=label)
             if dashes:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Are the files of an ensemble what the program left? Seals and digests (XXH3, 128 bits) as src/base/seal.h and src/run/ensemble_record.h have them.
+"""Are the files of an ensemble what the program left? Seals and digests (XXH3, 128 bits) as src/base/checksum.h and src/run/ensemble_record.h have them.
 
 The digest is made by libxxhash, which the program itself is linked to, or by the Python package xxhash. On a machine that has neither nothing can be
 checked, and available() says so.

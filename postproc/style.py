@@ -32,6 +32,7 @@ DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
 CORIOLIS = "#b8860b"  # Coriolis force
 TILT = "#4d4d4d"      # force of the sea-surface tilt
+LAWS = ("#c2417c", "#1b4f9c", "#7a5b00")  # force laws that are added
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 

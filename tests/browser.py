@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A headless browser (Debian's chromium) for tests of pages, with what they did on the network and wrote to the console."""
+"""A headless browser (Debian's chromium) for tests of pages, with what they did on the network and wrote to the
+console."""
 import json
 import time
 from contextlib import contextmanager
@@ -7,7 +8,8 @@ from contextlib import contextmanager
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 
-FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-extensions", "--no-first-run", "--disable-background-networking", "--window-size=1280,1000")
+FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--disable-extensions",
+         "--no-first-run", "--disable-background-networking", "--window-size=1280,1000")
 
 
 @contextmanager
@@ -48,5 +50,6 @@ def opened(driver, path):
 
 
 def complaints(driver):
-    """What stands in the console: errors, and what the content security policy refused. Not that a test reads pixels."""
+    """What stands in the console: errors, and what the content security policy refused. Not that a test reads
+    pixels."""
     return [entry["message"] for entry in driver.get_log("browser") if "willReadFrequently" not in entry["message"]]

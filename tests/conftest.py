@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Puts tests/ on the path, so that the tests of every folder find harness.py, and says early that the program is missing."""
+"""Puts tests/ on the path, so that the tests of every folder find harness.py, and says early that the program is
+missing."""
 import os
 
 import harness

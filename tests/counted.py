@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a run says of collisions and panel loads, counted anew from the rows and series of its result.h5 over the window of its summary.json."""
+"""What a run says of collisions and panel loads, counted anew from the rows and series of its result.h5 over the window
+of its summary.json."""
 import h5py
 import numpy as np
 import pytest
@@ -10,26 +11,33 @@ def _most(values, none=0.0):
 
 
 def assert_counted_over_the_window(run):
-    """Every number of "impacts" in summary.json and every array of /panels; a case with output.panels and samples of one step. Returns the window's start."""
+    """Every number of "impacts" in summary.json and every array of /panels; a case with output.panels and samples of
+    one step. Returns the window's start."""
     summary, window = run.summary["impacts"], run.summary["window"]
     start, end = window["start_s"], window["end_s"]
     with h5py.File(run.dir / "result.h5") as f:
         rows = {name: d[:] for name, d in f["impacts"].items()}
-        series = {name: f["series"][name][:] for name in ("time", "ice_resistance", "collision_resistance", "largest_push")}
+        series = {
+            name: f["series"][name][:]
+            for name in ("time", "ice_resistance", "collision_resistance", "largest_push")
+        }
         panels, attributes = {name: d[:] for name, d in f["panels"].items()}, dict(f["panels"].attrs)
     late, steps = (rows["time"] >= start) & (rows["time"] <= end), (series["time"] >= start) & (series["time"] <= end)
     dt = run.summary["dt_s"]
     hours = steps.sum() * dt / 3600
-    assert summary["from_s"] == start == attributes["from"] and attributes["steps"] == steps.sum() == window["n_samples"]
+    assert summary["from_s"] == start == attributes["from"] and attributes["steps"] == steps.sum(
+    ) == window["n_samples"]
     assert summary["collisions_whole_run"] == len(rows["time"]) and summary["collisions"] == late.sum()
-    assert summary["hours"] == pytest.approx(hours, rel=1e-12) and summary["collisions_per_hour"] == pytest.approx(late.sum() / hours, rel=1e-12)
+    assert summary["hours"] == pytest.approx(hours, rel=1e-12) and summary["collisions_per_hour"] == pytest.approx(
+        late.sum() / hours, rel=1e-12)
     # The largest, in the window and before it.
     peaks = rows["peak"][late]
     if len(peaks):
         at = np.flatnonzero(late)[peaks.argmax()]
         big = summary["largest"]
-        for key, name in (("peak_n", "peak"), ("mean_n", "mean"), ("impulse_ns", "impulse"), ("approach_m_s", "approach"), ("effective_mass_kg", "effective_mass"),
-                          ("time_s", "time"), ("floe", "floe"), ("panel", "panel"), ("x_m", "x"), ("y_m", "y"), ("duration_s", "duration")):
+        for key, name in (("peak_n", "peak"), ("mean_n", "mean"), ("impulse_ns", "impulse"),
+                          ("approach_m_s", "approach"), ("effective_mass_kg", "effective_mass"), ("time_s", "time"),
+                          ("floe", "floe"), ("panel", "panel"), ("x_m", "x"), ("y_m", "y"), ("duration_s", "duration")):
             assert big[key] == rows[name][at], key
     else:
         assert summary["largest"] is None
@@ -41,7 +49,9 @@ def assert_counted_over_the_window(run):
     assert [e["per_hour"] for e in summary["exceedance"]] == pytest.approx([r / hours for r in ranks])
     # Of steps.
     push = series["largest_push"]
-    assert summary["largest_push_n"] == push[steps].max() and summary["start_largest_push_n"] == (push[~steps].max() if (~steps).any() else None)
+    assert summary["largest_push_n"] == push[steps].max() and summary["start_largest_push_n"] == (push[~steps].max() if
+                                                                                                  (~steps).any() else
+                                                                                                  None)
     collision, ice = series["collision_resistance"][steps].mean(), series["ice_resistance"][steps].mean()
     assert summary["mean_collision_resistance_n"] == pytest.approx(collision, rel=1e-9, abs=1e-9)
     assert summary["mean_push_resistance_n"] == pytest.approx(ice - collision, rel=1e-9, abs=1e-9)

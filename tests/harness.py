@@ -70,8 +70,8 @@ def write_case(folder, case, name="case.yml"):
 def environment(**extra):
     """The caller's, without what would tell the program how many threads or ranks to use.
 
-    Threads wait passively: on a machine that is busy with something else, threads that spin at a barrier take the very core
-    that the thread they wait for would need (20 times slower, seen with two threads on two cores).
+    Threads wait passively: on a machine that is busy with something else, threads that spin at a barrier take the very
+    core that the thread they wait for would need (20 times slower, seen with two threads on two cores).
     """
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "OMP_"))}
     return kept | {"OMP_WAIT_POLICY": "passive"} | {k: str(v) for k, v in extra.items()}
@@ -123,7 +123,9 @@ def datasets(path):
     def take(name, item):
         if isinstance(item, h5py.Dataset):
             value = item[()]
-            raw = value.tobytes() if isinstance(value, (np.ndarray, np.generic)) and item.dtype.kind != "O" else repr(value).encode()
+            raw = value.tobytes() if isinstance(value,
+                                                (np.ndarray,
+                                                 np.generic)) and item.dtype.kind != "O" else repr(value).encode()
             found["/" + name] = (str(item.dtype), item.shape, raw)
 
     with h5py.File(path) as f:

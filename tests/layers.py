@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The layers of the program: who calls and includes whom, held against the order below.
 
-    tests/layers.py             every upward edge, circle, doubled type name and stray public include; exit code 1 if any
+    tests/layers.py             upward edges, circles, doubled type names, stray public includes; exit code 1 if any
     tests/layers.py --picture   the picture in docs/architecture.md, from the objects and sources as they are
     tests/layers.py --write     puts that picture into docs/architecture.md
 
@@ -154,7 +154,8 @@ def picture(edges, files):
     rows = [f"{'layer':<10} {'files':>5} {'lines':>6}  {'what it holds':<36} calls", "-" * 110]
     for folder in reversed(ORDER):
         below = [x for x in reversed(ORDER) if x in uses[folder]]
-        rows.append(f"{folder:<10} {count[folder]:>5} {lines[folder]:>6}  {LAYERS[folder]:<36} {wrapped(below)}".rstrip())
+        rows.append(
+            f"{folder:<10} {count[folder]:>5} {lines[folder]:>6}  {LAYERS[folder]:<36} {wrapped(below)}".rstrip())
     return "\n".join(["```", *rows, "```"])
 
 
@@ -170,8 +171,13 @@ def wrapped(names, width=57, indent=61):
 
 
 def main():
-    listed = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "src/*.[ch]", "partition/*.[ch]", "include/*.h"],
-                            cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    listed = subprocess.run([
+        "git", "ls-files", "--cached", "--others", "--exclude-standard", "src/*.[ch]", "partition/*.[ch]", "include/*.h"
+    ],
+                            cwd=ROOT,
+                            capture_output=True,
+                            text=True,
+                            check=True).stdout.split()
     files = [f for f in sorted(set(listed)) if (ROOT / f).exists() and "/study/" not in f]
     called, included = calls(ROOT / "build/release"), includes(files)
     shown, page = picture(called, files), ROOT / "docs/architecture.md"

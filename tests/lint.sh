@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# House rules that a machine can check: names of external symbols, licence lines, include guards, and what cppcheck, shellcheck and pyflakes find.
-# A checker that is not installed is left out and named; where CI=true it must be there. clang-tidy takes minutes: make tidy.
+# House rules that a machine can check: names of external symbols, licence lines, include guards, length of lines, and
+# what cppcheck, shellcheck and pyflakes find. A checker that is not installed is left out and named; where CI=true it
+# must be there. clang-tidy takes minutes: make tidy.
 bad=0
 complain() { echo "lint: $*"; bad=1; }
 have() {
@@ -25,9 +26,16 @@ done
 for f in $(files '*.h'); do
     grep -q '^#ifndef \(BERGTOW\|BT\)_.*_H$' "$f" || complain "$f: no include guard BERGTOW_..._H or BT_..._H"
 done
+python=${PYTHON:-/usr/bin/python3}
 for f in $(files '*.py'); do
-    "${PYTHON:-/usr/bin/python3}" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
+    "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
+"$python" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
+# shellcheck disable=SC2046 # one word a file
+"$python" tests/columns.py $(files '*.c' '*.h' 'tests/*.py' 'cases/*.py' '*.md' \
+    '*.sh' '*.js' '*.css' '*.html' '*.yml' '*.supp' \
+    Makefile .ci/run .clang-tidy) ||
+    complain "lines of more than 120 characters: see above"
 later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is left for later: $later"
 
 # shellcheck disable=SC2046 # one word a file
@@ -35,8 +43,9 @@ if have shellcheck; then shellcheck $(files '*.sh' .ci/run) || complain "shellch
 # shellcheck disable=SC2046
 if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
 if have cppcheck; then
-    cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" --suppressions-list=tests/cppcheck.supp \
-        --suppress=missingIncludeSystem -Iinclude -Isrc -I. -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
+    cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" \
+        --suppressions-list=tests/cppcheck.supp --suppress=missingIncludeSystem \
+        -Iinclude -Isrc -I. -D_GNU_SOURCE '-DBT_REVISION=""' '-DBT_COMPILER=""' '-DBT_FLAGS=""' \
         --template='{file}:{line}: {id}: {message}' src partition || complain "cppcheck: see above"
 fi
 exit $bad

@@ -13,24 +13,37 @@ import soundness  # noqa: E402
 
 FINISHED, FAILED, WAITING = 1, 2, 0
 UNITS = {"ice.concentration": "1", "tow.speed": "m/s", "ice.thickness": "m", "ice.friction": "1"}
-ESTIMATES = {"lichey_hellmer": 80.0, "marchenko_compaction": 5.0, "marchenko_rafting": 40.0, "marchenko_momentum": 160.0, "dilute_limit": 20.0, "open_water_drag": 300.0}
+ESTIMATES = {
+    "lichey_hellmer": 80.0, "marchenko_compaction": 5.0, "marchenko_rafting": 40.0, "marchenko_momentum": 160.0,
+    "dilute_limit": 20.0, "open_water_drag": 300.0
+}
 TEXT = h5py.string_dtype()
 
 
 def member(series, parameters, condition, **changes):
     """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N)."""
-    return {"series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5, "status": FINISHED, "reason": "", "warnings": [],
-            "peaks": None, "hours": len(series) / 3600, "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None} | changes
+    return {
+        "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
+        "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
+        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None
+    } | changes
 
 
 def numbers(m):
     """Nested numbers of summary.json."""
     x, start = m["series"], m["start"]
     steady = x[np.arange(1, len(x) + 1) >= start]
-    estimates = {name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"} for name, f in m["estimates"].items()}
-    return {"mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0, "stalled_windows": 0, "concentration": 0.5,
-            "window": {"start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0, "correlation_time_s": 1.0} | m.get("window", {}),
-            "impacts": {"from_s": 0.0, "hours": m["hours"]}, "estimates": estimates} | m.get("summary", {})
+    estimates = {
+        name: {"force_n": f, "low_n": f, "high_n": f, "valid": name != "marchenko_compaction"}
+        for name, f in m["estimates"].items()
+    }
+    return {
+        "mean_ice_resistance_n": steady.mean(), "mean_ice_resistance_se_n": 0.0, "unconverged_steps": 0,
+        "stalled_windows": 0, "concentration": 0.5, "window": {
+            "start_s": max(start, 1.0), "end_s": float(len(x)), "n_samples": len(steady), "n_independent": 100.0,
+            "correlation_time_s": 1.0
+        } | m.get("window", {}), "impacts": {"from_s": 0.0, "hours": m["hours"]}, "estimates": estimates
+    } | m.get("summary", {})
 
 
 def flat(nested, prefix=""):
@@ -47,10 +60,17 @@ def write_member(folder, m):
     folder.mkdir(parents=True, exist_ok=True)
     nested = numbers(m)
     nested["window"]["warning"] = m["window_warning"]
-    nested["estimates"] |= {"curves": {"concentration": [0.0, 0.5, 1.0], "valid_range": {k: [0.0, 1.0] for k in m["estimates"]}, **{k: [0.0, f, 2 * f] for k, f in m["estimates"].items()}},
-                            "thickness_m": 1.0, "width_m": 2.0, "speed_along_m_s": 0.1, "length_scale": 1.0}
+    nested["estimates"] |= {
+        "curves": {
+            "concentration": [0.0, 0.5, 1.0], "valid_range": {k: [0.0, 1.0]
+                                                              for k in m["estimates"]},
+            **{k: [0.0, f, 2 * f]
+               for k, f in m["estimates"].items()}
+        }, "thickness_m": 1.0, "width_m": 2.0, "speed_along_m_s": 0.1, "length_scale": 1.0
+    }
     (folder / "case.resolved.yml").write_text("ice: {}\n")
-    (folder / "summary.json").write_text(json.dumps(nested | {"title": "made up", "warnings": m["warnings"], "stopped": None}))
+    (folder / "summary.json").write_text(
+        json.dumps(nested | {"title": "made up", "warnings": m["warnings"], "stopped": None}))
     with h5py.File(folder / "result.h5", "w") as f:
         f["case"] = f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
@@ -59,9 +79,10 @@ def write_member(folder, m):
 
 
 def seal(path, kind="ensemble 1"):
-    """The seal of a file with room for one, as src/base/seal.h has it."""
+    """The seal of a file with room for one, as src/base/checksum.h has it."""
     raw = path.read_bytes()
-    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {soundness.digest(raw[soundness.SEAL_BYTES:])}\n".encode()
+    digest = soundness.digest(raw[soundness.SEAL_BYTES:])
+    text = soundness.MAGIC + f"kind: {kind}\nbytes: {len(raw)}\nxxh128: {digest}\n".encode()
     path.write_bytes(text.ljust(soundness.SEAL_BYTES, b"\0") + raw[soundness.SEAL_BYTES:])
 
 
@@ -84,13 +105,16 @@ def write(folder, members, title="made up", sampling="grid"):
         f["members/id"], f["members/condition"] = np.arange(1, n + 1), np.array([m["condition"] for m in members])
         f["members/repeat"], f["members/seed"] = np.array([r - 1 for _, r, _ in rows]), np.arange(n) + 100
         f["members/status"] = np.array([m["status"] for m in members])
-        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", ["0"] * n), ("reason", [m["reason"] for m in members])):
+        for key, texts in (("name", [name for *_, name in rows]), ("state_hash", ["0"] * n),
+                           ("reason", [m["reason"] for m in members])):
             f.create_dataset(f"members/{key}", data=texts, dtype=TEXT)
         for group in ("parameters", "summary"):
             f.create_group(group)
         for key in members[0]["parameters"]:
             values = [m["parameters"][key] for m in members]
-            data = f.create_dataset(f"parameters/{key}", data=values, dtype=TEXT if isinstance(values[0], str) else float)
+            data = f.create_dataset(f"parameters/{key}",
+                                    data=values,
+                                    dtype=TEXT if isinstance(values[0], str) else float)
             data.attrs["units"], data.attrs["key"] = UNITS.get(key, "1"), key
         summaries = [dict(flat(numbers(m))) if ok else {} for m, ok in zip(members, done)]
         for key in dict.fromkeys(k for s in summaries for k in s):
@@ -102,7 +126,8 @@ def write(folder, members, title="made up", sampling="grid"):
         for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", ice)):
             f.create_dataset(f"series/{key}", data=values).attrs["units"] = "s" if key == "time" else "N"
         f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(study)
-        f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(all(m["status"] != WAITING for m in members))
+        f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(
+            all(m["status"] != WAITING for m in members))
         f.attrs["n_finished"], f.attrs["n_failed"] = sum(done), sum(m["status"] == FAILED for m in members)
     for (m, _, name), ok in zip(rows, done):
         if ok:

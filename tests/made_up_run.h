@@ -64,7 +64,8 @@ static inline bt_sample sample(int step)
 {
     bt_sample s;
     double values[sizeof s / sizeof(double)];
-    for (size_t k = 0; k < sizeof values / sizeof *values; k++) values[k] = 100.0 * (double)k + sin(step + 0.1 * (double)k);
+    for (size_t k = 0; k < sizeof values / sizeof *values; k++)
+        values[k] = 100.0 * (double)k + sin(step + 0.1 * (double)k);
     memcpy(&s, values, sizeof s);
     s.time = 0.1 * (step + 1);
     s.ice_resistance = 1000 + 10 * sin(1.7 * step * step);
@@ -113,7 +114,11 @@ static inline bt_status record_frame(bt_record *r, int k, bt_errors *err)
     bt_frame_row rows[BODIES] = {0};
     frame(k, pose, force, speed);
     for (int i = 0; i < BODIES; i++)
-        rows[i] = (bt_frame_row){.x = pose[i][0], .y = pose[i][1], .yaw = pose[i][2], .contact_force = i < FLOES ? force[i] : -1, .speed = speed[i]};
+        rows[i] = (bt_frame_row){.x = pose[i][0],
+                                 .y = pose[i][1],
+                                 .yaw = pose[i][2],
+                                 .contact_force = i < FLOES ? force[i] : -1,
+                                 .speed = speed[i]};
     return bt_record_frame(r, 0.5 * k, rows, err);
 }
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
-"""Cases drawn at random from the table of keys: draw(seed) gives one, judge() says what is wrong with what the program made of it.
+"""Cases drawn at random from the table of keys: draw(seed) gives one, judge() says what is wrong with what the program
+made of it.
 
-Every key of `bergtow --list-keys --json` stands in exactly one of three places: FREE (drawn by itself, log-uniform within a sub-range of its range where a run
-still means something, now and then at a bound of the range), SCENE (drawn with others, so that the case holds together), LEFT_OUT (with the reason). A new key
-has to be entered in one of them: cli/test_random_cases.py compares. Enumerations are uniform. Fields are small: tens of floes.
+Every key of `bergtow --list-keys --json` stands in exactly one of three places: FREE (drawn by itself, log-uniform
+within a sub-range of its range where a run still means something, now and then at a bound of the range), SCENE (drawn
+with others, so that the case holds together), LEFT_OUT (with the reason). A new key has to be entered in one of them:
+cli/test_random_cases.py compares. Enumerations are uniform. Fields are small: tens of floes.
 
-A seed gives the same case for ever, as long as the tables are the same. For runs of another kind (ranks, threads, kills, resumes) take `Draw` on a seed of
-their own, and leave the case alone.
+A seed gives the same case for ever, as long as the tables are the same. For runs of another kind (ranks, threads,
+kills, resumes) take `Draw` on a seed of their own, and leave the case alone.
 """
 import json
 import math
@@ -23,49 +25,101 @@ from harness import ROOT, environment, write_case
 STEPS = 50
 
 LEFT_OUT = {
-    "run.title": "text", "reference.source": "text", "run.threads": "said on the command line",
-    "ice.field": "file", "ice.outlines": "file", "ice.outlines_crs": "of a file", "ice.origin_lon": "of a file", "ice.origin_lat": "of a file",
-    "ice.origin_east": "of a file", "ice.origin_north": "of a file",
-    "ice.nonconvex": "of a file", "water.current_table": "file", "air.wind_table": "file",
+    "run.title": "text",
+    "reference.source": "text",
+    "run.threads": "said on the command line",
+    "ice.field": "file",
+    "ice.outlines": "file",
+    "ice.outlines_crs": "of a file",
+    "ice.origin_lon": "of a file",
+    "ice.origin_lat": "of a file",
+    "ice.origin_east": "of a file",
+    "ice.origin_north": "of a file",
+    "ice.nonconvex": "of a file",
+    "water.current_table": "file",
+    "air.wind_table": "file",
 }
 
-# Low, high; and the bounds of the range that are drawn, too: "" none, "l" the least, "m" the most, "lm" both. A bound is left out where it asks for hours
-# (sweeps), or where no run can end well (a tolerance of 1, a wind of 100 m/s over floes of 10 cm).
+# Low, high; and the bounds of the range that are drawn, too: "" none, "l" the least, "m" the most, "lm" both. A bound
+# is left out where it asks for hours (sweeps), or where no run can end well (a tolerance of 1, a wind of 100 m/s over
+# floes of 10 cm).
 FREE = {
-    "domain.wall_friction": (1e-3, 1, "lm"), "domain.wall_restitution": (1e-2, 1, "lm"),
-    "ice.density": (700, 1000, "lm"), "ice.friction": (1e-3, 1, "lm"), "ice.restitution": (1e-2, 1, "lm"),
-    "ice.crushing.least_length": (1e-2, 10, "lm"), "ice.rafting.kappa": (2, 30, "l"), "ice.added_mass": (1e-2, 1, "lm"), "ice.added_inertia": (1e-2, 1, "lm"),
-    "ice.drag.water_form": (0.01, 10, "lm"), "ice.drag.water_skin": (1e-4, 0.1, "lm"), "ice.drag.air_form": (0.01, 10, "l"), "ice.drag.air_skin": (1e-4, 0.1, "l"),
-    "ice.seed": (1, 1e6, "lm"), "ice.shake": (0.1, 100, "l"), "ice.thickness_spread": (0.01, 1, "l"),
-    "body.density": (300, 2000, ""), "body.added_mass": (0.01, 2, "lm"), "body.added_inertia": (0.01, 2, "lm"), "body.friction": (1e-3, 1, "lm"),
-    "body.restitution": (1e-2, 1, "lm"), "body.drag.water_form": (0.01, 10, "lm"), "body.drag.water_skin": (1e-5, 0.1, "lm"),
-    "body.drag.air_form": (0.01, 10, "l"), "body.drag.air_skin": (1e-5, 0.1, "l"), "body.yaw": (1, 360, "lm"),
-    "water.density": (900, 1100, "lm"), "air.density": (0.5, 2, "lm"), "water.tide.inclination": (1, 360, "lm"), "water.tide.phase": (1, 360, "lm"),
-    "solver.tolerance": (1e-5, 1e-1, ""), "solver.max_sweeps": (10, 500, ""), "solver.inner_sweeps": (1, 10, "l"), "solver.turn_rows": (1, 1e5, "l"),
-    "solver.tile": (2, 10, "lm"), "solver.plain": None, "solver.warm_start": None, "solver.slop": (1e-5, 1e-2, "l"), "solver.position_sweeps": (10, 300, "l"),
+    "domain.wall_friction": (1e-3, 1, "lm"),
+    "domain.wall_restitution": (1e-2, 1, "lm"),
+    "ice.density": (700, 1000, "lm"),
+    "ice.friction": (1e-3, 1, "lm"),
+    "ice.restitution": (1e-2, 1, "lm"),
+    "ice.crushing.least_length": (1e-2, 10, "lm"),
+    "ice.rafting.kappa": (2, 30, "l"),
+    "ice.added_mass": (1e-2, 1, "lm"),
+    "ice.added_inertia": (1e-2, 1, "lm"),
+    "ice.drag.water_form": (0.01, 10, "lm"),
+    "ice.drag.water_skin": (1e-4, 0.1, "lm"),
+    "ice.drag.air_form": (0.01, 10, "l"),
+    "ice.drag.air_skin": (1e-4, 0.1, "l"),
+    "ice.seed": (1, 1e6, "lm"),
+    "ice.shake": (0.1, 100, "l"),
+    "ice.thickness_spread": (0.01, 1, "l"),
+    "body.density": (300, 2000, ""),
+    "body.added_mass": (0.01, 2, "lm"),
+    "body.added_inertia": (0.01, 2, "lm"),
+    "body.friction": (1e-3, 1, "lm"),
+    "body.restitution": (1e-2, 1, "lm"),
+    "body.drag.water_form": (0.01, 10, "lm"),
+    "body.drag.water_skin": (1e-5, 0.1, "lm"),
+    "body.drag.air_form": (0.01, 10, "l"),
+    "body.drag.air_skin": (1e-5, 0.1, "l"),
+    "body.yaw": (1, 360, "lm"),
+    "water.density": (900, 1100, "lm"),
+    "air.density": (0.5, 2, "lm"),
+    "water.tide.inclination": (1, 360, "lm"),
+    "water.tide.phase": (1, 360, "lm"),
+    "solver.tolerance": (1e-5, 1e-1, ""),
+    "solver.max_sweeps": (10, 500, ""),
+    "solver.inner_sweeps": (1, 10, "l"),
+    "solver.turn_rows": (1, 1e5, "l"),
+    "solver.tile": (2, 10, "lm"),
+    "solver.plain": None,
+    "solver.warm_start": None,
+    "solver.slop": (1e-5, 1e-2, "l"),
+    "solver.position_sweeps": (10, 300, "l"),
     "solver.rest_speed": (1e-5, 1e-2, "lm"),
-    "guard.overlap": (0.5, 100, "m"), "guard.energy": (1e3, 1e12, "m"), "guard.unconverged": (100, 1e9, "m"), "guard.escape": [True],
-    "impact.conversion": None, "impact.corner": None, "impact.pressure": (1e4, 1e8, "m"), "impact.corner_angle": (10, 170, "m"), "impact.panels": (1, 100, "l"),
-    "output.sample_every": (1, 60, "l"), "output.progress": (0.01, 100, "l"), "output.checkpoint_steps": (5, 60, "l"), "output.checkpoint_wall": (0.1, 600, "l"),
+    "guard.overlap": (0.5, 100, "m"),
+    "guard.energy": (1e3, 1e12, "m"),
+    "guard.unconverged": (100, 1e9, "m"),
+    "guard.escape": [True],
+    "impact.conversion": None,
+    "impact.corner": None,
+    "impact.pressure": (1e4, 1e8, "m"),
+    "impact.corner_angle": (10, 170, "m"),
+    "impact.panels": (1, 100, "l"),
+    "output.sample_every": (1, 60, "l"),
+    "output.progress": (0.01, 100, "l"),
+    "output.checkpoint_steps": (5, 60, "l"),
+    "output.checkpoint_wall": (0.1, 600, "l"),
     "output.panels": None,
-    "estimate.p_star": (1e2, 1e5, "lm"), "estimate.p_s": (1e2, 1e5, "lm"), "estimate.c_si": (0.1, 10, "lm"), "estimate.phi_j": (0.1, 1, "m"),
-    "estimate.length_scale": (1, 100, "m"), "reference.mean_force": (1, 1e6, "lm"),
+    "estimate.p_star": (1e2, 1e5, "lm"),
+    "estimate.p_s": (1e2, 1e5, "lm"),
+    "estimate.c_si": (0.1, 10, "lm"),
+    "estimate.phi_j": (0.1, 1, "m"),
+    "estimate.length_scale": (1, 100, "m"),
+    "reference.mean_force": (1, 1e6, "lm"),
 }
 
 SCENE = set("""
-run.dt run.duration
-domain.frame domain.length domain.width domain.x0 domain.y0 domain.ends domain.sides domain.ends_closing domain.sides_closing domain.ahead
-ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max
-ice.size_exponent ice.thickness ice.thickness_law ice.crushing.pressure ice.start
-body.shape body.length body.width body.vertices body.x body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass
-tow.mode tow.speed tow.direction tow.ramp tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
-tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y tow.branch2.length tow.branch2.stiffness
-tow.branch2.damping tow.branch2.breaking_load tow.vessel.mass tow.vessel.added_mass tow.vessel.bollard_pull tow.vessel.free_speed tow.vessel.free_resistance
-tow.vessel.lateral_drag tow.vessel.lookahead
-lead.mode lead.width lead.length lead.floe_size
-water.current_x water.current_y water.tide.major water.tide.minor water.tide.period water.latitude water.tilt water.slope_x water.slope_y air.wind_x air.wind_y
-solver.reference_speed impact.duration impact.least_speed output.frame_interval output.window_start
-estimate.kappa estimate.kappa_low estimate.kappa_high
+run.dt run.duration domain.frame domain.length domain.width domain.x0 domain.y0 domain.ends domain.sides
+domain.ends_closing domain.sides_closing domain.ahead ice.concentration ice.x_min ice.x_max ice.y_min ice.y_max
+ice.shape ice.sides ice.aspect ice.size ice.size_law ice.size_spread ice.size_min ice.size_max ice.size_exponent
+ice.thickness ice.thickness_law ice.crushing.pressure ice.start body.shape body.length body.width body.vertices body.x
+body.y body.vx body.vy body.yaw_rate body.draft body.sail body.mass tow.mode tow.speed tow.direction tow.ramp
+tow.programme tow.waypoints tow.turn_radius tow.line_length tow.line_stiffness tow.line_damping tow.hull_x tow.hull_y
+tow.line.type tow.line.diameter tow.line.branches tow.line.breaking_load tow.branch2.hull_x tow.branch2.hull_y
+tow.branch2.length tow.branch2.stiffness tow.branch2.damping tow.branch2.breaking_load tow.vessel.mass
+tow.vessel.added_mass tow.vessel.bollard_pull tow.vessel.free_speed tow.vessel.free_resistance tow.vessel.lateral_drag
+tow.vessel.lookahead lead.mode lead.width lead.length lead.floe_size water.current_x water.current_y water.tide.major
+water.tide.minor water.tide.period water.latitude water.tilt water.slope_x water.slope_y air.wind_x air.wind_y
+solver.reference_speed impact.duration impact.least_speed output.frame_interval output.window_start estimate.kappa
+estimate.kappa_low estimate.kappa_high
 """.split())
 
 
@@ -111,7 +165,8 @@ def polygon(d, size):
     """Convex and anticlockwise: points on an ellipse, none too near the next."""
     n, squeeze = d.one(range(3, 13)), d.flat(0.4, 1)
     angles = [2 * math.pi * (k + d.flat(-0.3, 0.3)) / n for k in range(n)]
-    return [[float(f"{0.5 * size * math.cos(a):.6g}"), float(f"{0.5 * size * squeeze * math.sin(a):.6g}")] for a in angles]
+    return [[float(f"{0.5 * size * math.cos(a):.6g}"),
+             float(f"{0.5 * size * squeeze * math.sin(a):.6g}")] for a in angles]
 
 
 class Scene:
@@ -232,7 +287,8 @@ class Scene:
             v["ice.sides"] = d.one((3, 4, 5, 6, 8, 12, 32))
         law = self.choose("ice.size_law")
         if law == "power":
-            v["ice.size_min"], v["ice.size_max"], v["ice.size_exponent"] = size * d.flat(0.4, 0.8), size * d.flat(1, 1.8), d.flat(0.5, 4)
+            v["ice.size_min"], v["ice.size_max"], v["ice.size_exponent"] = size * d.flat(0.4, 0.8), size * d.flat(
+                1, 1.8), d.flat(0.5, 4)
         elif d.chance(0.7):
             v["ice.size_spread"] = d.flat(0, 0.4)
         self.choose("ice.thickness_law")
@@ -256,7 +312,8 @@ class Scene:
         # Along the domain there is room; across it, and on a bent way, what the nearest wall leaves.
         along = d.chance(0.6) or self.ends == "moving"
         bent = d.chance(0.25)
-        ahead = (self.x0 + self.length - self.x if self.way > 0 else self.x - self.x0) - self.radius if self.ends == "wall" else math.inf
+        ahead = (self.x0 + self.length - self.x if self.way > 0 else self.x -
+                 self.x0) - self.radius if self.ends == "wall" else math.inf
         back = 0 if self.way > 0 else 180
         angle = back + d.flat(-8, 8) if along else d.flat(-180, 180)
         free = ahead if along and not bent and self.sides != "wall" else self.room()
@@ -323,7 +380,8 @@ class Scene:
         if d.chance(0.3):
             v["tow.hull_x"], v["tow.hull_y"] = d.flat(-inside, inside), d.flat(-inside, inside)
         if two and d.chance(0.5):
-            v["tow.branch2.length"], v["tow.branch2.stiffness"], v["tow.branch2.damping"] = length * d.flat(0.9, 1.3), pull * d.log(0.1, 10), v["tow.line_damping"] * d.log(0.1, 10)
+            v["tow.branch2.length"], v["tow.branch2.stiffness"], v["tow.branch2.damping"] = length * d.flat(
+                0.9, 1.3), pull * d.log(0.1, 10), v["tow.line_damping"] * d.log(0.1, 10)
             v["tow.branch2.breaking_load"] = pull * d.log(1e-5, 1)
             v["tow.branch2.hull_x"], v["tow.branch2.hull_y"] = d.flat(-inside, inside), d.flat(-inside, inside)
 
@@ -371,7 +429,8 @@ class Scene:
             v[f"domain.{name}_closing"] = min(10, free / self.duration * d.flat(0, 1))
 
     def by_hand(self):
-        """Floes given by hand, in a part of the domain that the field leaves free; circles apart from each other, the body and the walls."""
+        """Floes given by hand, in a part of the domain that the field leaves free; circles apart from each other, the
+        body and the walls."""
         d, v = self.d, self.value
         alone = d.chance(0.3) or self.ends == "moving"
         split = self.x0 + (0 if alone else 0.65) * self.length
@@ -383,8 +442,10 @@ class Scene:
                 v["ice.x_max"] = split
         else:
             if d.chance(0.15):
-                v["ice.x_min"], v["ice.x_max"] = self.x0 + d.flat(0.01, 0.2) * self.length, self.x0 + d.flat(0.7, 0.99) * self.length
-                v["ice.y_min"], v["ice.y_max"] = self.y0 + d.flat(0.01, 0.2) * self.width, self.y0 + d.flat(0.7, 0.99) * self.width
+                v["ice.x_min"], v["ice.x_max"] = self.x0 + d.flat(0.01, 0.2) * self.length, self.x0 + d.flat(
+                    0.7, 0.99) * self.length
+                v["ice.y_min"], v["ice.y_max"] = self.y0 + d.flat(0.01, 0.2) * self.width, self.y0 + d.flat(
+                    0.7, 0.99) * self.width
             return
         taken = [(self.x, self.y, self.radius)] if self.radius else []
         for _ in range(d.one(range(1, 7))):
@@ -405,7 +466,8 @@ class Scene:
                          "yaw_rate": max(-360, min(360, d.sign(math.degrees(self.speed / radius) * d.log(0.01, 1))))}
             if d.chance(0.3):
                 floe["thickness"] = min(100, self.size * d.log(0.005, 0.5))
-            if d.chance(0.2) and self.ends != "moving" and self.mode != "speed" and not any(f"domain.{n}_closing" in v for n in ("ends", "sides")):
+            if d.chance(0.2) and self.ends != "moving" and self.mode != "speed" and not any(f"domain.{n}_closing" in v
+                                                                                            for n in ("ends", "sides")):
                 floe["fixed"] = True
             self.floes.append(floe)
 
@@ -414,14 +476,18 @@ class Scene:
 
     def rest(self):
         d, v, dt = self.d, self.value, self.value["run.dt"]
-        if v["domain.frame"] == "basin" and self.ends == "moving" and self.x == self.x0 + 0.5 * self.length and not {"tow.waypoints", "lead.mode"} & set(v):
+        if v["domain.frame"] == "basin" and self.ends == "moving" and self.x == self.x0 + 0.5 * self.length and not {
+                "tow.waypoints", "lead.mode"
+        } & set(v):
             v["domain.ahead"] = 0.5 * self.length # says where the body stands
             del v["body.x"]
         low, middle, high = sorted(d.flat(1, 30) for _ in range(3))
         v["estimate.kappa_low"], v["estimate.kappa"], v["estimate.kappa_high"] = low, middle, high
-        for key, value in (("solver.reference_speed", self.most * d.log(0.1, 10)), ("impact.duration", dt * d.log(0.01, 10)),
-                           ("impact.least_speed", self.speed * d.log(1e-3, 1)), ("output.frame_interval", self.duration * d.log(0.01, 2)),
-                           ("output.window_start", self.duration * d.flat(0, 0.9))):
+        for key, value in (("solver.reference_speed", self.most * d.log(0.1, 10)),
+                           ("impact.duration", dt * d.log(0.01, 10)), ("impact.least_speed",
+                                                                       self.speed * d.log(1e-3, 1)),
+                           ("output.frame_interval", self.duration * d.log(0.01, 2)), ("output.window_start",
+                                                                                       self.duration * d.flat(0, 0.9))):
             if d.chance(0.3):
                 v[key] = value
 
@@ -477,10 +543,12 @@ def may_be_null(path, case, summary):
     reference = value_of(case, "reference.mean_force")
     rules = (
         (r"title|stopped|lead|reference|window\.(warning|reason)|.*\.source", True),
-        (r"start_peak_.*|.*\.start_peak_n", True), # no step before the window
+        (r"start_peak_.*|.*\.start_peak_n", True),  # no step before the window
         (r"outlines\.origin_.*", True),
-        (r".*_force_n|.*_ice_resistance.*_n|.*_se_n|peak_line_tension_n|budget\..*|window\..*|estimates.*|impacts.*", not body),
-        (r"(mean|peak)_line_tension.*_n", not body or value_of(case, "tow.mode") not in ("line", "thrust") or window == 0),
+        (r".*_force_n|.*_ice_resistance.*_n|.*_se_n|peak_line_tension_n|budget\..*|window\..*|estimates.*|impacts.*",
+         not body),
+        (r"(mean|peak)_line_tension.*_n", not body or value_of(case, "tow.mode") not in ("line", "thrust")
+         or window == 0),
         (r"mean_line_tension_2.*_n", value_of(case, "tow.line.branches", 1) != 2),
         (r"mean_vessel_thrust.*_n", not body or value_of(case, "tow.mode") != "thrust" or window == 0),
         (r"window\.series\..*\.change.*", window < 12),
@@ -488,9 +556,9 @@ def may_be_null(path, case, summary):
         (r".*_low_n|.*_high_n", window < 2),
         (r".*_force_n|.*_ice_resistance.*_n|budget\..*|window\..*|reference\.ratio", window == 0),
         (r".*_se_n|sd_.*|window\.n_independent|window\.correlation_time_s", window < 3 or not body),
-        (r"budget\..*relative", True), # over the largest force, which may be 0
+        (r"budget\..*relative", True),  # over the largest force, which may be 0
         (r"reference\.ratio", not body or reference == 0),
-        (r"sweep_bytes_per_contact|lead\.mean_piece_m", True), # no contact in the last step, no piece
+        (r"sweep_bytes_per_contact|lead\.mean_piece_m", True),  # no contact in the last step, no piece
         (r"memory_per_floe_b|ns_per_floe_step|max_overlap_relative", summary["n_floes"] == 0),
         (r"impacts.*", True),
         (r"estimates.*", True),
@@ -516,8 +584,12 @@ def has(case):
     body, mode = value_of(case, "body.shape") != "none", value_of(case, "tow.mode")
     line = body and mode in ("line", "thrust")
     return {
-        "always": True, "with a towed body": body, "with a tow line": line, "with a tow line of two branches": line and value_of(case, "tow.line.branches", 1) == 2,
-        "with a vessel": line and mode == "thrust", "where collisions are told apart": body and value_of(case, "impact.conversion", "duration") != "none",
+        "always": True,
+        "with a towed body": body,
+        "with a tow line": line,
+        "with a tow line of two branches": line and value_of(case, "tow.line.branches", 1) == 2,
+        "with a vessel": line and mode == "thrust",
+        "where collisions are told apart": body and value_of(case, "impact.conversion", "duration") != "none",
         "with a moving window": value_of(case, "domain.ends") == "moving",
     }
 
@@ -540,7 +612,8 @@ def judge_result(case, folder, whole=True):
             group = f.get(name)
             none = group is not None and name == "panels" and group.attrs.get("steps") == 0 # means of no step
             for key, item in (group.items() if group else ()):
-                if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not np.isfinite(item[()]).all() and not (none and key.startswith("mean_")):
+                if isinstance(item, h5py.Dataset) and item.dtype.kind == "f" and not np.isfinite(
+                        item[()]).all() and not (none and key.startswith("mean_")):
                     wrong.append(f"{name}/{key}: not finite")
     if pose.shape[1] != floes:
         wrong.append(f"{pose.shape[1]} floes in the frames, {floes} outlines")
@@ -566,7 +639,10 @@ def judge_guards(case, folder, summary, pose):
     x0, y0 = resolved(folder, "x0"), resolved(folder, "y0")
     length, width = value_of(case, "domain.length"), value_of(case, "domain.width")
     bounds = ((value_of(case, "domain.ends"), x0, length), (value_of(case, "domain.sides"), y0, width))
-    beyond = [np.abs(pose[:, k] - low - extent / 2) > extent / 2 + 1e-9 * (abs(low) + extent) for k, (_, low, extent) in enumerate(bounds)]
+    beyond = [
+        np.abs(pose[:, k] - low - extent / 2) > extent / 2 + 1e-9 * (abs(low) + extent)
+        for k, (_, low, extent) in enumerate(bounds)
+    ]
     for k, (bound, _, _) in enumerate(bounds):
         # Whoever has left by an open side may go round the end of a wall, as the guard has it.
         out = np.sum(beyond[k] & ~(beyond[1 - k] & (bounds[1 - k][0] == "open")))
@@ -578,7 +654,8 @@ def judge_guards(case, folder, summary, pose):
 
 
 def judge(case, folder, checked, ran):
-    """What is wrong with `bergtow check` and `bergtow run` of a case, each a completed process; folder: of the result."""
+    """What is wrong with `bergtow check` and `bergtow run` of a case, each a completed process; folder: of the
+    result."""
     wrong = []
     for p in (checked, ran):
         if re.search(r"runtime error|Sanitizer|Assertion|MPI_ABORT|Signal:", p.stderr):
@@ -590,7 +667,8 @@ def judge(case, folder, checked, ran):
     if checked.returncode == 3 and ran.returncode != 3:
         wrong.append(f"check refuses and run ends with {ran.returncode}: {checked.stderr}")
     # What shows only when the field is made.
-    if checked.returncode == 0 and ran.returncode == 3 and not re.search(r"cannot pack|has no room for the two largest|overlap by .* at the start", ran.stderr):
+    if checked.returncode == 0 and ran.returncode == 3 and not re.search(
+            r"cannot pack|has no room for the two largest|overlap by .* at the start", ran.stderr):
         wrong.append(f"check does not refuse, and run does: {ran.stderr}")
     if ran.returncode and "bergtow: " not in ran.stderr:
         wrong.append(f"run: exit code {ran.returncode} without a message")
@@ -610,11 +688,16 @@ def call_on(program, *arguments, timeout=120):
     """One thread unless said otherwise; a leak is a finding, but for those of Open MPI."""
     env = environment(OMP_NUM_THREADS=1, ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=1",
                       LSAN_OPTIONS=f"suppressions={ROOT}/tests/lsan.supp:print_suppressions=0")
-    return subprocess.run([str(program), *map(str, arguments)], env=env, capture_output=True, text=True, timeout=timeout)
+    return subprocess.run([str(program), *map(str, arguments)],
+                          env=env,
+                          capture_output=True,
+                          text=True,
+                          timeout=timeout)
 
 
 def tried(seed, table, program, folder):
-    """Exit code of the run of a seed's case on one or two threads, and what is wrong with it, each with the case to paste."""
+    """Exit code of the run of a seed's case on one or two threads, and what is wrong with it, each with the case to
+    paste."""
     case = draw(seed, table)
     here = folder / f"seed{seed}"
     path = write_case(here, case)

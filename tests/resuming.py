@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What the tests of checkpoints share: killing a run at a moment, taking it up, and holding two results against each other."""
+"""What the tests of checkpoints share: killing a run at a moment, taking it up, and holding two results against each
+other."""
 import os
 import signal
 import subprocess
@@ -11,22 +12,30 @@ import numpy as np
 from harness import BERGTOW, DONE, Run, changed, differing, environment, write_case
 
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
-# A bridle whose second branch breaks, way-points, collisions, panel loads, samples of three steps, floes that go from rank to rank. Checkpoints so often
-# that most kills fall into the writing of one.
+# A bridle whose second branch breaks, way-points, collisions, panel loads, samples of three steps, floes that go from
+# rank to rank. Checkpoints so often that most kills fall into the writing of one.
 CASE = {
     "run": {"dt": 0.1, "duration": 22},
     "domain": {"length": 30, "width": 12},
     "ice": {"concentration": 0.7, "size": 1, "x_max": 25},
     "body": {"x": 27, "length": 2},
-    "tow": {"mode": "thrust", "programme": [[0, 0], [2, 0.5], [22, 0.5]], "waypoints": [[20, 0], [14, 2], [-60, 2]], "turn_radius": 2, "line_length": 3,
-            "line_stiffness": 2000, "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 120},
-            "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}},
+    "tow": {
+        "mode": "thrust", "programme": [[0, 0], [2, 0.5], [22, 0.5]], "waypoints": [[20, 0], [14, 2],
+                                                                                    [-60, 2]], "turn_radius": 2,
+        "line_length": 3, "line_stiffness": 2000, "line": {"branches": 2,
+                                                           "breaking_load": 0}, "branch2": {"breaking_load": 120},
+        "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
+    },
     "solver": {"tile": 2.5, "max_sweeps": 40},
     "output": {"sample_every": 3, "frame_interval": 0.7, "panels": True, "checkpoint_steps": 8},
 }
-# What differs between a run and its twin that was stopped: wall times, what they make, and what the division among ranks has cost.
-TIMES = {"wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "threads", "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
-         "edge_cut", "halo_share", "memory_per_floe_b", "sweep_bytes_per_contact"}
+# What differs between a run and its twin that was stopped: wall times, what they make, and what the division among
+# ranks has cost.
+TIMES = {
+    "wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "threads", "divisions", "moved_floes", "imbalance",
+    "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance", "edge_cut", "halo_share", "memory_per_floe_b",
+    "sweep_bytes_per_contact"
+}
 
 
 def command(ranks, *arguments):
@@ -36,7 +45,12 @@ def command(ranks, *arguments):
 
 def started(ranks, *arguments, cwd=None, stderr=subprocess.PIPE):
     """In a process group of its own, so that all of it can be killed at once."""
-    return subprocess.Popen(command(ranks, *arguments), cwd=cwd, env=environment(OMP_NUM_THREADS=1, **ROOT), stdout=subprocess.PIPE, stderr=stderr, text=True,
+    return subprocess.Popen(command(ranks, *arguments),
+                            cwd=cwd,
+                            env=environment(OMP_NUM_THREADS=1, **ROOT),
+                            stdout=subprocess.PIPE,
+                            stderr=stderr,
+                            text=True,
                             start_new_session=True)
 
 
@@ -88,14 +102,16 @@ def check_readable(folder):
     if (folder / "result.h5").exists():
         with h5py.File(folder / "result.h5") as f:
             n = len(f["frames/time"])
-            assert len({len(v) for v in f["series"].values()}) == 1 and f["frames/pose"].shape[0] == n == len(f["xdmf"]) - 2
+            assert len({len(v)
+                        for v in f["series"].values()}) == 1 and f["frames/pose"].shape[0] == n == len(f["xdmf"]) - 2
             assert np.isfinite(f["frames/pose"][:]).all()
 
 
 def assert_same_result(one, other, but=()):
     """State, series, frames, events, collisions, panels, descriptions and summary; not the wall times.
 
-    but: ("/case_as_given",) after a kill before the first checkpoint: such a run starts again from its resolved case, which is then the one given.
+    but: ("/case_as_given",) after a kill before the first checkpoint: such a run starts again from its resolved case,
+    which is then the one given.
     """
     a, b = Run(one, None), Run(other, None)
     assert b.summary is not None and a.hash == b.hash
@@ -120,5 +136,6 @@ def uninterrupted(folder, case=CASE, name="whole"):
     write_case(folder, case)
     done(1, "run", "case.yml", "-o", f"{name}-often", "--quiet", "--threads", 1, cwd=folder)
     assert Run(folder / name, None).hash == Run(folder / f"{name}-often", None).hash
-    assert set(differing(folder / name / "result.h5", folder / f"{name}-often" / "result.h5")) <= {"/case", "/case_as_given"}
+    assert set(differing(folder / name / "result.h5",
+                         folder / f"{name}-often" / "result.h5")) <= {"/case", "/case_as_given"}
     return folder / f"{name}-often", seconds

@@ -1,9 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# Runs the compiled test programs given as arguments, then short runs under the sanitizers, then the Python tests, and closes with one line of counts.
-# A program that crashes, or prints no count, is a failure of its own. A sanitizer that is not installed counts as skipped, and is named.
+# Runs the compiled test programs given as arguments, then short runs under the sanitizers, then the Python tests, and
+# ends with one line of counts. A program that crashes or prints no count is itself a failure. A sanitizer that is not
+# installed counts as skipped, and is named.
 passed=0 failed=0 skipped=0
-# Threads that spin at a barrier while another program has the core stop everything on a busy machine; the program itself sees to that in main.c.
+# On a busy machine threads that spin at a barrier keep the others from the core, and everything stalls; bergtow itself
+# sees to this in main.c.
 export GOMP_SPINCOUNT="${GOMP_SPINCOUNT:-5000}"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT

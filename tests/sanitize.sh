@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# sanitize.sh asan|tsan|valgrind [short] PROGRAM...: the test programs given, then short runs of bergtow that go through setting up, towing, writing, stopping
-# and reading back, on threads and ranks, each watched. A finding, a wrong exit code or a different state hash ends it with an error; exit code 77: a tool
-# is missing. With `short` a part of it, for make test; valgrind then watches the release build. BT_PYTEST names Python tests to run on the build as well (asan).
+# sanitize.sh asan|tsan|valgrind [short] PROGRAM...: the given test programs, then short runs of bergtow that set up,
+# tow, write, stop and read back, on threads and ranks, each of them watched. A finding, a wrong exit code or another
+# state hash ends it with an error; exit code 77: a tool is missing. With `short` only a part of it, for make test;
+# valgrind then watches the release build. BT_PYTEST names Python tests to run on the build as well (asan).
 # shellcheck disable=SC2086 # commands of several words
 set -u
 kind=$1
@@ -18,21 +19,25 @@ trap 'rm -rf "$dir"' EXIT
 export OMP_WAIT_POLICY=passive OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 watch=
 case $kind in
-asan) # A leak of Open MPI is not ours; one of ours is an error. Under mpirun leaks are not looked for: Open MPI unloads the modules that made them, so
-      # that a suppression has no name to go by.
-    export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1 LSAN_OPTIONS=suppressions=$PWD/tests/lsan.supp:print_suppressions=0 ;;
-tsan) # HDF5 and Open MPI are not instrumented: what they do among themselves is not looked at. Archer tells the sanitizer what libomp orders.
+asan) # A leak of Open MPI is not ours; one of ours is an error. Under mpirun leaks are not looked for: Open MPI unloads
+      # the modules that made them, so that a suppression has no name to match.
+    export ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=1
+    export LSAN_OPTIONS="suppressions=$PWD/tests/lsan.supp:print_suppressions=0" ;;
+tsan) # HDF5 and Open MPI are not instrumented, so that what happens within them is ignored. Archer tells the sanitizer
+      # in which order libomp runs things.
     archer=$(find /usr/lib/llvm-14/lib /usr/lib/x86_64-linux-gnu -name libarcher.so 2>/dev/null | head -1)
     [ -n "$archer" ] || { echo "libarcher.so is missing; run: make deps-dev"; exit 77; }
     [ -x $bin ] || { echo "$bin is missing (clang-14 makes it); run: make deps-dev"; exit 77; }
-    export OMP_TOOL_LIBRARIES="$archer" TSAN_OPTIONS="ignore_noninstrumented_modules=1:halt_on_error=1:exitcode=66" OMP_NUM_THREADS=4 ;;
+    export OMP_TOOL_LIBRARIES="$archer" OMP_NUM_THREADS=4
+    export TSAN_OPTIONS="ignore_noninstrumented_modules=1:halt_on_error=1:exitcode=66" ;;
 valgrind)
     command -v valgrind >/dev/null || { echo "valgrind is missing; run: make deps-dev"; exit 77; }
     bin=build/debug/bergtow
     [ -z "$short" ] || bin=build/release/bergtow
     export BERGTOW_STARTED=1
     watch="valgrind -q --error-exitcode=66 --suppressions=tests/valgrind.supp"
-    [ ! -f /usr/share/openmpi/openmpi-valgrind.supp ] || watch="$watch --suppressions=/usr/share/openmpi/openmpi-valgrind.supp" ;;
+    theirs=/usr/share/openmpi/openmpi-valgrind.supp
+    [ ! -f $theirs ] || watch="$watch --suppressions=$theirs" ;;
 *) echo "sanitize.sh asan|tsan|valgrind [short] PROGRAM..."; exit 2 ;;
 esac
 
@@ -69,7 +74,9 @@ run: {dt: 1, duration: 60}
 domain: {frame: geographic, length: 600, width: 300, ends: moving, sides: periodic}
 ice: {concentration: 0.5, size: 25, shape: rectangles, thickness: 1, thickness_law: lognormal}
 body: {length: 40, draft: 20}
-tow: {mode: thrust, speed: 1, ramp: 10, line_length: 40, line: {branches: 2, type: dyneema, diameter: 60 mm}, vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: 7}}
+tow:
+  {mode: thrust, speed: 1, ramp: 10, line_length: 40, line: {branches: 2, type: dyneema, diameter: 60 mm},
+   vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: 7}}
 water: {latitude: 75, tilt: dynamic, tide: {major: 0.2, minor: 0.1}}
 air: {wind_x: 5}
 CASE
@@ -106,7 +113,8 @@ for c in $cases; do
     for how in $teams; do
         ranks=${how%x*} threads=${how#*x}
         out=$dir/$c-$ranks-$threads start=
-        [ "$ranks" = 1 ] || start="env ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=0 mpirun --oversubscribe -n $ranks"
+        [ "$ranks" = 1 ] ||
+            start="env ASAN_OPTIONS=allocator_may_return_null=1:detect_leaks=0 mpirun --oversubscribe -n $ranks"
         want 0 $start $bin run "$dir/$c.yml" -o "$out" --threads "$threads" --steps $steps
         [ "$(hash_of "$out")" = "$first" ] || fail "$c: another state hash on $ranks ranks x $threads threads"
     done
@@ -123,7 +131,9 @@ fi
 echo "fields, estimates, a study, bad input"
 want 0 $watch $bin field "$dir/tow.yml" -o "$dir/f.h5" --set lead.mode=none
 want 0 $watch $bin field "$dir/tow.yml" -o "$dir/f.geojson" --set lead.mode=none
-for key in field=$dir/f.h5 outlines=$dir/f.geojson; do want 0 $watch $bin run "$dir/tow.yml" -o "$dir/back-${key%%=*}" --set "ice.$key" --set lead.mode=none --steps 2; done
+for key in field=$dir/f.h5 outlines=$dir/f.geojson; do
+    want 0 $watch $bin run "$dir/tow.yml" -o "$dir/back-${key%%=*}" --set "ice.$key" --set lead.mode=none --steps 2
+done
 want 0 $watch $bin estimate "$dir/tow.yml" --json
 want 0 $watch $bin check "$dir/window.yml" --scale 1/10
 want 0 $watch $bin run "$dir/tow.yml" -o "$dir/dump" --steps 2 --dump-contacts "1:$dir/c.h5"
@@ -134,8 +144,10 @@ want 3 $watch $bin run "$dir/study.yml" -o "$dir/none"
 want 4 $watch $bin run "$dir/tow.yml" -o "$dir/tow.yml/out"
 if [ -n "${BT_PYTEST:-}" ]; then
     echo "Python tests: $BT_PYTEST"
-    export BERGTOW="$PWD/$bin" BERGTOW_VALIDATE="$PWD/$bin" ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=0:log_path=$dir/found"
-    # What UBSan finds ends a run, and fails its test (gcc's has no log_path). One that holds time may fail by itself: try it again alone.
+    export BERGTOW="$PWD/$bin" BERGTOW_VALIDATE="$PWD/$bin"
+    export ASAN_OPTIONS="allocator_may_return_null=1:detect_leaks=0:log_path=$dir/found"
+    # What UBSan finds ends a run, and fails its test (gcc's has no log_path). A test that measures time may fail here
+    # without a finding: run it again by itself.
     "${PYTHON:-/usr/bin/python3}" -m pytest -q -p no:cacheprovider -rfE $BT_PYTEST || failed=1
     ! ls "$dir"/found* >/dev/null 2>&1 || { cat "$dir"/found*; exit 1; }
     [ -z "${failed:-}" ] || exit 1

@@ -14,7 +14,7 @@
 #include <cmocka.h>
 
 #include "contact/contacts.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "bergtow/forces.h"
 #include "bergtow/shape.h"
 #include "solve/solver.h"
@@ -32,7 +32,8 @@ static inline bt_body_def scene_prism(int n, double *v, double sheet)
 {
     bt_shape_centre(n, v);
     const bt_moments m = bt_shape_moments(n, v);
-    return (bt_body_def){.motion = BT_DYNAMIC, .n_vertices = n, .vertices = v, .mass = sheet * m.area, .inertia = sheet * m.polar};
+    return (bt_body_def){
+        .motion = BT_DYNAMIC, .n_vertices = n, .vertices = v, .mass = sheet * m.area, .inertia = sheet * m.polar};
 }
 
 /// Square of side l.

@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Short scenes that use every mode and option, and digests of all that a run of each leaves: what holds a refactoring.
 
-    tests/scenes.py --compare OTHER [NAME...]   run the scenes with $BERGTOW and with another binary; the first difference of
-                                                each item is printed, and the exit code is 1 if there is any
-    tests/scenes.py --record                    renew tests/parallel/scenes.json, after a change that is meant to move results
+    tests/scenes.py --compare OTHER [NAME...]   run the scenes with $BERGTOW and with another binary; print the first
+                                                difference of each item; exit code 1 if there is any
+    tests/scenes.py --record                    renew tests/parallel/scenes.json, after a change meant to move results
 
-Every scene has a layout of its own (ranks, threads, resumed or not), so that the set holds the layouts against each other,
-too. Digests depend on the elementary functions of libm and on the compiler: scenes.json names both, see fingerprint().
+Every scene has a layout of its own (ranks, threads, resumed or not), so that the set holds the layouts against each
+other, too. Digests depend on the elementary functions of libm and on the compiler: scenes.json names both, see
+fingerprint().
 """
 import argparse
 import hashlib
@@ -33,9 +34,11 @@ LAYOUTS = [(1, 1, 0), (1, 2, 0), (2, 1, 0), (1, 1, 13), (3, 1, 0), (2, 2, 9)]
 PATIENCE = 180
 
 #: summary keys that depend on the machine, the clock or the layout
-VOLATILE = {"version", "revision", "compiler", "flags", "ranks", "threads", "wall_time_s", "time_by_phase", "command_line",
-            "folder", "memory_bytes", "hostname", "date", "ns_per_floe_step", "phases_s", "dealt_imbalance", "divisions",
-            "edge_cut", "halo_share", "imbalance", "moved_floes", "worst_imbalance", "worst_dealt_imbalance"}
+VOLATILE = {
+    "version", "revision", "compiler", "flags", "ranks", "threads", "wall_time_s", "time_by_phase", "command_line",
+    "folder", "memory_bytes", "hostname", "date", "ns_per_floe_step", "phases_s", "dealt_imbalance", "divisions",
+    "edge_cut", "halo_share", "imbalance", "moved_floes", "worst_imbalance", "worst_dealt_imbalance"
+}
 
 SHORT = changed(TOW, run__duration=4)
 DENSE = changed(TOW, run__duration=4, ice__concentration=0.75, ice__size=0.9)
@@ -55,20 +58,43 @@ SQUARES = [{"shape": "square", "length": 0.8, "x": 6 + 0.95 * (k % 6), "y": -2 +
 SCENES = {
     "speed": SHORT,
     "speed_dense": DENSE,
-    "speed_direction": changed(SHORT, tow__direction=25, body__shape="ship", body__length=2, body__width=0.8, body__yaw=10),
-    "speed_programme": changed(SHORT, tow__ramp=None, tow__speed=None, tow__programme=[[0, 0], [1, 0.4], [3, 0.1], [4, 0.3]]),
-    "speed_waypoints": changed(SHORT, tow__speed=0.8, tow__waypoints=[[4, 1], [7, -1]], tow__turn_radius=0.8, tow__ramp=0.2),
+    "speed_direction": changed(SHORT,
+                               tow__direction=25,
+                               body__shape="ship",
+                               body__length=2,
+                               body__width=0.8,
+                               body__yaw=10),
+    "speed_programme": changed(SHORT,
+                               tow__ramp=None,
+                               tow__speed=None,
+                               tow__programme=[[0, 0], [1, 0.4], [3, 0.1], [4, 0.3]]),
+    "speed_waypoints": changed(SHORT,
+                               tow__speed=0.8,
+                               tow__waypoints=[[4, 1], [7, -1]],
+                               tow__turn_radius=0.8,
+                               tow__ramp=0.2),
     "free_drift": changed(SHORT, tow={"mode": "none"}, body__vx=0.2, body__vy=-0.1, body__yaw_rate=20),
-    "free_drift_start": changed(GEO, tow={"mode": "none"}, domain__ends="periodic", domain__ahead=None,
-                                air__wind_x=5, water__current_y=0.1, ice__start="drift"),
+    "free_drift_start": changed(GEO,
+                                tow={"mode": "none"},
+                                domain__ends="periodic",
+                                domain__ahead=None,
+                                air__wind_x=5,
+                                water__current_y=0.1,
+                                ice__start="drift"),
     "rest_start": changed(GEO, ice__start="rest", air__wind_x=5, water__current_y=0.1),
     "line": changed(LINE, tow__speed=0.6, tow__ramp=0.5),
-    "line_bridle_breaks": changed(LINE, tow__speed=0.9, tow__ramp=0.2, tow__line={"branches": 2, "breaking_load": 0},
+    "line_bridle_breaks": changed(LINE,
+                                  tow__speed=0.9,
+                                  tow__ramp=0.2,
+                                  tow__line={"branches": 2, "breaking_load": 0},
                                   tow__branch2={"breaking_load": 20}),
     "line_named": changed(LINE, tow__line_stiffness=None, tow__line={"type": "polypropylene", "diameter": "8 mm"}),
     "thrust": changed(LINE, tow__mode="thrust", tow__speed=0.5, tow__vessel=SHIP),
-    "thrust_waypoints": changed(GEO, tow={"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000,
-                                          "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3, "vessel": SHIP}),
+    "thrust_waypoints": changed(GEO,
+                                tow={
+                                    "mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000,
+                                    "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3, "vessel": SHIP
+                                }),
     "window": changed(GEO, run__duration=8, tow__speed=1.6),
     "window_along_y": changed(GEO, tow__direction=0, ice__size_law="lognormal", ice__thickness_law="lognormal"),
     "current_and_wind": changed(SHORT, water__current_x=0.1, water__current_y=-0.05, air__wind_x=-6, air__wind_y=3),
@@ -78,38 +104,75 @@ SCENES = {
     "tilt_dynamic": changed(GEO, water__tilt="dynamic", water__tide={"major": 0.2, "minor": 0.0, "period": 10}),
     "slope": changed(GEO, water__tilt="slope", water__slope_x=1e-5, water__slope_y=-2e-5),
     "walls_closing": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16),
-    "periodic_dense": changed(PRESS, run__duration=1.5, domain={"length": 20, "width": 16, "ends": "open", "sides": "periodic"},
+    "periodic_dense": changed(PRESS,
+                              run__duration=1.5,
+                              domain={"length": 20, "width": 16, "ends": "open", "sides": "periodic"},
                               water__current_x=0.1),
     "open_sides": changed(DENSE, domain__sides="open", domain__ends="open", water__current_y=0.1),
     "plain_sweeps": changed(DENSE, solver__plain=True, solver__max_sweeps=60),
     "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
     "few_sweeps": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16, solver__max_sweeps=3),
-    "restitution": changed(DENSE, ice__restitution=0.4, body__restitution=0.2, domain__wall_restitution=0.3, tow__speed=0.5),
+    "restitution": changed(DENSE,
+                           ice__restitution=0.4,
+                           body__restitution=0.2,
+                           domain__wall_restitution=0.3,
+                           tow__speed=0.5),
     "crushing": changed(DENSE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, tow__speed=0.5),
-    "crushing_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16,
+    "crushing_press": changed(PRESS,
+                              run__duration=1.5,
+                              domain__length=20,
+                              domain__width=16,
                               ice__crushing__pressure="20 kPa"),
     "rafting": changed(DENSE, ice__rafting__kappa=6, ice__concentration=0.85, tow__speed=0.5),
-    "rafting_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16, ice__rafting__kappa=5,
-                             ice__thickness_law="lognormal", ice__crushing__pressure="200 Pa"),
-    "impacts_sine": changed(SHORT, tow__speed=0.6, impact__conversion="duration", output__panels=True, impact__panels=12),
+    "rafting_press": changed(PRESS,
+                             run__duration=1.5,
+                             domain__length=20,
+                             domain__width=16,
+                             ice__rafting__kappa=5,
+                             ice__thickness_law="lognormal",
+                             ice__crushing__pressure="200 Pa"),
+    "impacts_sine": changed(SHORT,
+                            tow__speed=0.6,
+                            impact__conversion="duration",
+                            output__panels=True,
+                            impact__panels=12),
     "impacts_crushing": changed(SHORT, tow__speed=0.6, impact={"conversion": "crushing", "pressure": "20 kPa"}),
     "lead_channel": changed(SHORT, lead={"mode": "channel", "width": 2.5}, tow__speed=0.4),
-    "lead_managed": changed(SHORT, lead={"mode": "managed", "width": 3, "floe_size": 0.4}, run__dt=0.05, tow__speed=0.4),
+    "lead_managed": changed(SHORT, lead={"mode": "managed", "width": 3, "floe_size": 0.4}, run__dt=0.05,
+                            tow__speed=0.4),
     "rectangles": changed(SHORT, ice__shape="rectangles", ice__aspect=1.6, ice__concentration=0.7),
-    "hexagons_power_law": changed(SHORT, ice__shape="polygons", ice__sides=6, ice__size_law="power", ice__size_min=0.4,
-                                  ice__size_max=1.6, ice__concentration=0.4),
+    "hexagons_power_law": changed(SHORT,
+                                  ice__shape="polygons",
+                                  ice__sides=6,
+                                  ice__size_law="power",
+                                  ice__size_min=0.4,
+                                  ice__size_max=1.6,
+                                  ice__concentration=0.4),
     "floes_by_hand": changed(SHORT, ice__concentration=0, floes=SQUARES, tow__speed=0.5),
-    "one_fixed_floe": changed(SHORT, ice__concentration=0.3, floes=[{"shape": "disc", "length": 2, "x": 10, "y": 1,
-                                                                   "fixed": True, "thickness": 0.1}], tow__speed=1),
-    "heavy_body_against_wall": changed(LINE, body__x=10, body__mass=2e4, tow__speed=0.5, tow__ramp=0.2,
+    "one_fixed_floe": changed(SHORT,
+                              ice__concentration=0.3,
+                              floes=[{"shape": "disc", "length": 2, "x": 10, "y": 1, "fixed": True, "thickness": 0.1}],
+                              tow__speed=1),
+    "heavy_body_against_wall": changed(LINE,
+                                       body__x=10,
+                                       body__mass=2e4,
+                                       tow__speed=0.5,
+                                       tow__ramp=0.2,
                                        ice__concentration=0.6),
     "body_in_parts_outlines": changed(SHORT, ice={"friction": 0.3, "outlines": "bays.geojson", "nonconvex": "split"}),
-    "outlines_hull": changed(SHORT, ice={"friction": 0.2, "outlines": "bays.geojson", "nonconvex": "hull"},
+    "outlines_hull": changed(SHORT,
+                             ice={"friction": 0.2, "outlines": "bays.geojson", "nonconvex": "hull"},
                              tow__speed=0.4),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
-    "square_body": changed(SHORT, body__shape="square", body__yaw=20, impact={"conversion": "crushing", "corner": "real"}),
+    "square_body": changed(SHORT,
+                           body__shape="square",
+                           body__yaw=20,
+                           impact={"conversion": "crushing", "corner": "real"}),
     "rectangle_body": changed(SHORT, body__shape="rectangle", body__width=1.2, impact__conversion="none"),
-    "polygon_body": changed(SHORT, body__shape="polygon", body__length=None, tow__speed=0.3,
+    "polygon_body": changed(SHORT,
+                            body__shape="polygon",
+                            body__length=None,
+                            tow__speed=0.3,
                             body__vertices=[[1, -0.6], [1.2, 0.2], [0, 0.9], [-1, 0.4], [-0.8, -0.7]]),
     "steel_wire": changed(LINE, tow__line_stiffness=None, tow__line={"type": "steel-wire", "diameter": "4 mm"}),
     "dyneema": changed(LINE, tow__line_stiffness=None, tow__line={"type": "dyneema", "diameter": "4 mm"}),
@@ -159,7 +222,8 @@ def run_scene(folder, name, layout, binary=BERGTOW):
     folder.mkdir(parents=True, exist_ok=True)
     prepare(folder, SCENES[name], binary)
     extra = ["--steps", stop] if stop else []
-    code, said = started(command(binary, ranks, "run", "case.yml", "-o", "out", "--threads", threads, "--quiet", *extra), folder)
+    code, said = started(
+        command(binary, ranks, "run", "case.yml", "-o", "out", "--threads", threads, "--quiet", *extra), folder)
     assert code == 0, f"{name}: exit code {code}\n{said}"
     if stop:
         code, said = started(command(binary, ranks, "resume", "out", "--threads", threads, "--quiet"), folder)
@@ -189,7 +253,8 @@ def fingerprint(binary=BERGTOW):
     h = hashlib.sha256()
     for k in range(1, 2000):
         x = k * 0.7310585786300049
-        for v in (math.sin(x), math.cos(x), math.exp(-x / 99), math.log(x), math.pow(x, 0.37), math.atan2(x, 3.3), math.hypot(x, 1.7)):
+        for v in (math.sin(x), math.cos(x), math.exp(-x / 99), math.log(x), math.pow(x, 0.37), math.atan2(x, 3.3),
+                  math.hypot(x, 1.7)):
             h.update(np.float64(v).tobytes())
     said = subprocess.run([binary, "--version"], capture_output=True, text=True, check=True).stdout
     h.update(said.partition(", ")[2].encode())  # bergtow 0.1.0 (REVISION, COMPILER)
@@ -197,7 +262,8 @@ def fingerprint(binary=BERGTOW):
 
 
 def groups(names):
-    """Items by what they belong to: each series and each number of the summary by itself, all frames as one, and so on."""
+    """Items by what they belong to: each series and each number of the summary by itself, all frames as one, and so
+    on."""
     found = {}
     for name in sorted(names):
         first = name.strip("/").split("/")[0]
@@ -254,8 +320,9 @@ def record():
     common = sorted({g for s in scenes.values() for g in s})
     # One line a scene: the digests in the order of `items`, "-" for those that it has not.
     lines = [f'  "{n}": "{" ".join(s.get(g, "-") for g in common)}"' for n, s in scenes.items()]
-    STORED.write_text("{\n" + f'"fingerprint": "{fingerprint()}",\n"items": {json.dumps(common, indent=0)},\n"scenes": {{\n'
-                      + ",\n".join(lines) + "\n}\n}\n")
+    STORED.write_text("{\n" +
+                      f'"fingerprint": "{fingerprint()}",\n"items": {json.dumps(common, indent=0)},\n"scenes": {{\n' +
+                      ",\n".join(lines) + "\n}\n}\n")
 
 
 def main():

@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # clang-tidy over the program; .clang-tidy says what for. With file names: over those only.
-tidy=$(command -v clang-tidy-14 || command -v clang-tidy) || { echo "clang-tidy is missing; run: make deps-dev"; exit 1; }
+tidy=$(command -v clang-tidy-14 || command -v clang-tidy) ||
+    { echo "clang-tidy is missing; run: make deps-dev"; exit 1; }
 [ -f build/release/revision.h ] || { echo "tidy: build/release/revision.h is missing; run make first"; exit 1; }
 flags="-std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -Ibuild/release $(pkg-config --cflags ompi-c hdf5-openmpi)"
 [ $# -gt 0 ] || set -- src/*/*.c partition/*.c

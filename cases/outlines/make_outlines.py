@@ -3,8 +3,9 @@
 
     /usr/bin/python3 cases/outlines/make_outlines.py [-o FILE.geojson]
 
-No ice of this shape was ever seen: the floes are those of bergtow's own generator (grounds.yml), their shores drawn in at random towards
-the middle. A third of the rings run clockwise and every tenth has a double vertex, as happens in traces.
+No ice of this shape was ever seen: the floes are those of bergtow's own generator (grounds.yml), their shores drawn in
+at random towards the middle. A third of the rings run clockwise and every tenth has a double vertex, as happens in
+traces.
 """
 import argparse
 import json
@@ -21,7 +22,8 @@ A, E2 = 6378137.0, 6.69437999014e-3  # WGS84
 
 
 def place(north, east):
-    """Longitude and latitude in degrees of metres north and east of the origin, by the radii of curvature there: good to some cm at 1 km."""
+    """Longitude and latitude in degrees of metres north and east of the origin, by the radii of curvature there: good
+    to some cm at 1 km."""
     lat = math.radians(LAT0)
     for _ in range(3):  # the meridians' convergence: the latitude of the foot point
         w = 1 - E2 * math.sin(lat) ** 2
@@ -31,7 +33,8 @@ def place(north, east):
 
 
 def bays(polygon, rng):
-    """Shores of a convex floe drawn in towards the middle; every ray from the middle still meets the shore once, so that it stays simple."""
+    """Shores of a convex floe drawn in towards the middle; every ray from the middle still meets the shore once, so
+    that it stays simple."""
     middle, out = polygon.mean(axis=0), []
     for p, q in zip(polygon, np.roll(polygon, -1, axis=0)):
         out.append(p)
@@ -51,7 +54,8 @@ def main():
         features = json.loads(convex.read_text())["features"]
     rng = np.random.default_rng(1)
     for k, feature in enumerate(features):
-        ring = bays(np.array(feature["geometry"]["coordinates"][0][:-1])[::-1, ::-1], rng)  # metres north, east; the file has east, north
+        # metres north, east; the file has east, north
+        ring = bays(np.array(feature["geometry"]["coordinates"][0][:-1])[::-1, ::-1], rng)
         lonlat = [[round(c, 8) for c in place(x, y)] for x, y in ring]
         if k % 10 == 0:
             lonlat.insert(1, lonlat[0])
@@ -61,8 +65,10 @@ def main():
         feature["properties"] = {"thickness": round(float(rng.normal(1.0, 0.15)), 2)}
         feature["geometry"]["coordinates"] = [lonlat + lonlat[:1]]
     text = ",\n".join(json.dumps(f, separators=(",", ":")) for f in features)
-    args.output.write_text('{"type":"FeatureCollection",\n"description":"MADE UP by cases/outlines/make_outlines.py; no observation",\n"features":[\n'
-                           + text + "\n]}\n")
+    args.output.write_text(
+        '{"type":"FeatureCollection",\n"description":"MADE UP by cases/outlines/make_outlines.py; no '
+        'observation",\n"features":[\n'
+        + text + "\n]}\n")
     print(f"{args.output}: {len(features)} floes")
 
 

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Scaling benchmark: the scenes of this folder over sizes, threads and ranks; writes bench.csv, bench.png and machine.txt.
+"""Scaling benchmark: the scenes of this folder over sizes, threads and ranks; writes bench.csv, bench.png and
+machine.txt.
 
-    make bench                 4 minutes on two quiet cores; BENCH=quick a minute, BENCH=full up to 300,000 floes, 14 minutes
+    make bench                 4 minutes on 2 quiet cores; BENCH=quick 1 minute; BENCH=full to 300,000 floes, 14 minutes
     bench.py --sizes 1000,2000 --scenes tow-80 --repeats 5 --out out/bench
 
-The runs of one scene and size are interleaved (every configuration once, then again), so that a slow change of the machine
-meets all of them alike, and medians are kept. What each column means: README.md.
+The runs of one scene and size are interleaved (every configuration once, then again), so that a slow change of the
+machine meets all of them alike, and medians are kept. What each column means: README.md.
 """
 import argparse
 import csv
@@ -29,7 +30,8 @@ ROOT = HERE.parent.parent
 FLOE_AREA = math.pi / 4 * 30**2 * (1 + 0.23**2)  # m², mean of the scenes' floes: diameter 30 m, spread 23 %
 BERG_AREA = 8 * 50**2 * math.sin(math.pi / 8)     # m², the 16-gon of the tow scenes
 WALL_DISTANCE = 1500.0                           # m, of the compression scenes, the same in every size
-#: steps of a run: long enough for the ice to be packed where it will be, short enough for the dense scenes, which cost 30 times as much
+#: steps of a run: long enough for the ice to be packed where it will be, short enough for the dense scenes, which cost
+#: 30 times as much
 STEPS = {"tow-80": 100, "tow-95": 20, "compression-80": 100, "compression-95": 30}
 #: a size and its double give a weak-scaling figure
 SIZES = {"quick": [1000, 2000, 4000], "default": [1000, 2000, 10000, 15000, 30000],
@@ -38,13 +40,19 @@ REPEATS = {"quick": 2, "default": 3, "full": 3}
 ONCE_ABOVE = 50000                               # floes: larger fields are run once
 
 PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output"]
-COLUMNS = (["scene", "asked", "floes", "ranks", "threads", "runs", "steps", "dt_s", "wall_s", "wall_min_s", "wall_max_s", "ns_per_floe_step"]
-           + [p + "_share" for p in PHASES]
-           + ["mean_sweeps", "contacts", "contact_sweeps_per_s", "speedup", "efficiency", "weak_efficiency", "weak_solve_efficiency",
-              "imbalance", "edge_cut", "halo_share", "bytes_per_floe", "sweep_gb_s", "triad_gb_s", "sweep_of_triad", "unconverged", "state_hash"])
+COLUMNS = ([
+    "scene", "asked", "floes", "ranks", "threads", "runs", "steps", "dt_s", "wall_s", "wall_min_s", "wall_max_s",
+    "ns_per_floe_step"
+] + [p + "_share" for p in PHASES] + [
+    "mean_sweeps", "contacts", "contact_sweeps_per_s", "speedup", "efficiency", "weak_efficiency",
+    "weak_solve_efficiency", "imbalance", "edge_cut", "halo_share", "bytes_per_floe", "sweep_gb_s", "triad_gb_s",
+    "sweep_of_triad", "unconverged", "state_hash"
+])
 #: passed on from summary.json where it has them
-FROM_SUMMARY = {"imbalance": "imbalance", "edge_cut": "edge_cut", "halo_share": "halo_share", "memory": "memory_per_floe_b",
-                "sweep_bytes": "sweep_bytes_per_contact"}
+FROM_SUMMARY = {
+    "imbalance": "imbalance", "edge_cut": "edge_cut", "halo_share": "halo_share", "memory": "memory_per_floe_b",
+    "sweep_bytes": "sweep_bytes_per_contact"
+}
 
 
 def fail(text):
@@ -64,7 +72,10 @@ def settings(scene, n):
     if scene.startswith("compression"):
         return {"domain.width": f"{area / WALL_DISTANCE:.3f}"}
     side = math.sqrt(area + BERG_AREA)
-    return {"domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}", "body.y": f"{side / 2:.3f}"}
+    return {
+        "domain.length": f"{side:.3f}", "domain.width": f"{side:.3f}", "body.x": f"{side / 4:.3f}",
+        "body.y": f"{side / 2:.3f}"
+    }
 
 
 def flags(values):
@@ -87,7 +98,10 @@ def field_of(scene, n, o):
 def command(scene, n, ranks, threads, steps, o):
     values = dict(settings(scene, n), **o.set_keys, **{"ice.field": field_of(scene, n, o).resolve()})
     folder = o.out / "runs" / f"{scene}-{n}-{ranks}x{threads}"
-    words = [o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads", threads, "--steps", steps]
+    words = [
+        o.bergtow, "run", HERE / f"{scene}.yml", *flags(values), "-o", folder, "--force", "--quiet", "--threads",
+        threads, "--steps", steps
+    ]
     if ranks > 1:
         words = ["mpirun", "-n", ranks, "--map-by", f"slot:PE={threads}", "--bind-to", "core", *words]
     return [str(w) for w in words], folder
@@ -106,7 +120,8 @@ def run_once(scene, n, ranks, threads, steps, o):
         log.seek(0)
         lines = log.read().strip().splitlines()
     if child.returncode or not (folder / "summary.json").exists():
-        said = [line for line in lines if line.startswith("bergtow")] or lines or ["without a word"]  # mpirun talks a lot
+        # mpirun talks a lot
+        said = [line for line in lines if line.startswith("bergtow")] or lines or ["without a word"]
         return f"{' '.join(words)} ended with {child.returncode}: " + "; ".join(said)
     summary = json.loads((folder / "summary.json").read_text())
     with h5py.File(folder / "result.h5") as h:
@@ -116,10 +131,13 @@ def run_once(scene, n, ranks, threads, steps, o):
 
 def record(scene, n, s, contact_sweeps, peak_memory):
     """The numbers of one run that the tables are made of."""
-    r = {"scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"], "steps": s["n_steps"],
-         "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"], "phases": s["phases_s"], "sweeps": s["mean_sweeps"],
-         "contacts": s["contacts_mean"], "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
-         "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None}
+    r = {
+        "scene": scene, "asked": n, "floes": s["n_floes"], "ranks": s["ranks"], "threads": s["threads"],
+        "steps": s["n_steps"], "dt": s["dt_s"], "wall": s["wall_time_s"], "ns": s["ns_per_floe_step"],
+        "phases": s["phases_s"], "sweeps": s["mean_sweeps"], "contacts": s["contacts_mean"],
+        "unconverged": s["unconverged_steps"], "hash": s["state_hash"],
+        "rate": contact_sweeps / s["phases_s"]["solve"] if s["phases_s"]["solve"] > 0 else None
+    }
     r.update({name: s.get(key) for name, key in FROM_SUMMARY.items()})
     if r["memory"] is None and peak_memory:
         r["memory"] = peak_memory / s["n_floes"]
@@ -139,7 +157,9 @@ def ranks_work(o):
     r = run_once(o.scenes[0], o.sizes[0], 2, 1, 2, o)
     if isinstance(r, str):
         return "exit code " + r.split(" ended with ")[-1]
-    return None if r["ranks"] == 2 else f"started on 2 ranks, the program reports {r['ranks']}: it does not divide the field over ranks"
+    if r["ranks"] == 2:
+        return None
+    return f"started on 2 ranks, the program reports {r['ranks']}: it does not divide the field over ranks"
 
 
 # ---- the machine ----
@@ -176,15 +196,21 @@ def describe_machine(o, load_before, triads, ranks_reason):
         built = {k: h.attrs[k] for k in ("version", "revision", "compiler", "flags", "libraries")}
     built = {k: v.decode() if isinstance(v, bytes) else v for k, v in built.items()}
     lines = [f"date: {time.strftime('%Y-%m-%d %H:%M:%S %Z')}", f"host: {text_of('uname', '-srm')}"]
-    wanted = ("Model name", "CPU(s)", "Thread(s) per core", "CPU max MHz", "L1d cache", "L1i cache", "L2 cache", "L3 cache", "NUMA node(s)", "Hypervisor vendor")
+    wanted = ("Model name", "CPU(s)", "Thread(s) per core", "CPU max MHz", "L1d cache", "L1i cache", "L2 cache",
+              "L3 cache", "NUMA node(s)", "Hypervisor vendor")
     lines += [line for line in text_of("lscpu").splitlines() if line.split(":")[0].strip() in wanted]
     lines += [f"set: {key}={value}" for key, value in o.set_keys.items()]
-    lines += [f"cores used: {o.cores}", f"memory: {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"]
+    lines += [
+        f"cores used: {o.cores}", f"memory: {os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.1f} GiB"
+    ]
     lines += [f"bergtow {k}: {v}" for k, v in built.items()]
     lines += [f"mpirun: {text_of('mpirun', '--version').splitlines()[0]}", f"ranks: {ranks_reason or 'measured'}"]
     lines += [f"load average before: {load_before}", "load average after: %.2f %.2f %.2f" % os.getloadavg()]
-    lines += [f"triad, {c} thread{'s' * (c > 1)}: median {statistics.median(v):.2f}, least {min(v):.2f}, most {max(v):.2f} GB/s "
-              f"({len(v)} times, arrays of {o.triad_mib} MiB)" for c, v in sorted(triads.items())]
+    lines += [
+        f"triad, {c} thread{'s' * (c > 1)}: median {statistics.median(v):.2f}, least {min(v):.2f}, most {max(v):.2f} "
+        f"GB/s "
+        f"({len(v)} times, arrays of {o.triad_mib} MiB)" for c, v in sorted(triads.items())
+    ]
     (o.out / "machine.txt").write_text("\n".join(lines) + "\n")
 
 
@@ -211,10 +237,15 @@ def tables(records, triads):
         first, cores, mid = runs[0], ranks * threads, lambda name: median([r[name] for r in runs])  # noqa: B023
         own = ns[scene, n, ranks, threads]
         row = {name: first[name] for name in ("scene", "asked", "floes", "ranks", "threads", "steps")}
-        row.update({"runs": len(runs), "dt_s": first["dt"], "wall_s": mid("wall"), "wall_min_s": min(r["wall"] for r in runs),
-                    "wall_max_s": max(r["wall"] for r in runs), "ns_per_floe_step": own})
+        row.update({
+            "runs": len(runs), "dt_s": first["dt"], "wall_s": mid("wall"), "wall_min_s": min(r["wall"] for r in runs),
+            "wall_max_s": max(r["wall"] for r in runs), "ns_per_floe_step": own
+        })
         row.update({p + "_share": median([r["phases"][p] / r["wall"] for r in runs]) for p in PHASES})
-        row.update({"mean_sweeps": mid("sweeps"), "contacts": mid("contacts"), "contact_sweeps_per_s": rate[scene, n, ranks, threads]})
+        row.update({
+            "mean_sweeps": mid("sweeps"), "contacts": mid("contacts"), "contact_sweeps_per_s": rate[scene, n, ranks,
+                                                                                                    threads]
+        })
         row["speedup"] = ratio(ns.get((scene, n, 1, 1)), own)
         row["efficiency"] = ratio(row["speedup"], cores)
         part = (scene, n // cores, 1, 1) if cores > 1 and n % cores == 0 else None  # one core's share, alone
@@ -223,7 +254,8 @@ def tables(records, triads):
         row.update({name: mid(name) for name in ("imbalance", "edge_cut", "halo_share")})
         row["bytes_per_floe"] = mid("memory")
         sweep = mid("sweep_bytes")
-        row["sweep_gb_s"] = 1e-9 * sweep * row["contact_sweeps_per_s"] if sweep and row["contact_sweeps_per_s"] else None
+        row["sweep_gb_s"] = (1e-9 * sweep * row["contact_sweeps_per_s"]
+                             if sweep and row["contact_sweeps_per_s"] else None)
         row["triad_gb_s"] = median(triads.get(cores, []))
         row["sweep_of_triad"] = ratio(row["sweep_gb_s"], row["triad_gb_s"])
         row.update({"unconverged": first["unconverged"], "state_hash": first["hash"]})
@@ -260,7 +292,12 @@ def options():
     p.add_argument("--steps", type=int, help="steps of every run, instead of the scene's own number")
     p.add_argument("--repeats", type=int, help="runs of each configuration")
     p.add_argument("--cores", type=int, default=len(os.sched_getaffinity(0)), help="use at most so many (default: all)")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="set_keys", help="a case key for every run, not for its field; "
+    p.add_argument("--set",
+                   action="append",
+                   default=[],
+                   metavar="KEY=VALUE",
+                   dest="set_keys",
+                   help="a case key for every run, not for its field; "
                    "solver.max_sweeps=50 with solver.tolerance=1e-9 gives every size the same sweeps")
     p.add_argument("--out", type=Path, default=ROOT / "build/bench", help="folder of tables, plot and cached fields")
     p.add_argument("--bergtow", type=Path, default=Path(os.environ.get("BERGTOW", ROOT / "build/release/bergtow")))
@@ -305,11 +342,15 @@ def measure(o, with_ranks):
                     if isinstance(r, str):
                         fail(r)
                     if (r["ranks"], r["threads"]) != (ranks, threads):
-                        fail(f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × {r['threads']}")
+                        fail(
+                            f"asked for {ranks} ranks × {threads} threads, the program used {r['ranks']} × "
+                            f"{r['threads']}"
+                        )
                     group.append(r)
             records += group
             for row in tables(group, triads):
-                say(f"{scene:15s} {row['floes']:7d} floes {row['ranks']}x{row['threads']}  {row['ns_per_floe_step']:9.0f} ns a floe and step  "
+                say(f"{scene:15s} {row['floes']:7d} floes {row['ranks']}x{row['threads']}  "
+                    f"{row['ns_per_floe_step']:9.0f} ns a floe and step  "
                     f"speed-up {row['speedup']:.2f}  sweeps {row['mean_sweeps']:6.1f}  contacts {row['contacts']:.0f}")
             write_csv(o.out / "bench.csv", tables(records, triads))  # what there is, should the rest be interrupted
     return records, triads

@@ -9,7 +9,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent.parent / "postproc
 from matplotlib.ticker import LogLocator, NullLocator  # noqa: E402
 from style import FAINT, INK, plt  # noqa: E402
 
-COLOURS = {"tow-80": "#56b4e9", "tow-95": "#0072b2", "compression-80": "#e69f00", "compression-95": "#d55e00"}  # Okabe & Ito
+# Okabe & Ito
+COLOURS = {"tow-80": "#56b4e9", "tow-95": "#0072b2", "compression-80": "#e69f00", "compression-95": "#d55e00"}
 PHASES = ["detect", "colour", "forces", "solve", "advance", "exchange", "output"]
 PHASE_COLOURS = ["#009e73", "#f0e442", "#56b4e9", "#d55e00", "#0072b2", "#cc79a7", "#999999"]
 
@@ -46,7 +47,9 @@ def lines(ax, rows, column, wanted):
     drawn = False
     for scene in dict.fromkeys(r["scene"] for r in rows):
         for c in dict.fromkeys(config(r) for r in rows):
-            points = [(r["floes"], r[column]) for r in rows if r["scene"] == scene and config(r) == c and wanted(c) and r[column] is not None]
+            points = [(r["floes"], r[column])
+                      for r in rows
+                      if r["scene"] == scene and config(r) == c and wanted(c) and r[column] is not None]
             if points:
                 ax.plot(*zip(*sorted(points)), color=COLOURS[scene], **line_of(*c))
                 drawn = True

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// STREAM's triad a[i] = b[i] + s c[i]: the memory bandwidth that this machine gives to a loop (McCalpin 1995, IEEE TCCA).
+// STREAM's triad a[i] = b[i] + s c[i]: the memory bandwidth that this machine gives to a loop (McCalpin 1995, IEEE
+// TCCA).
 //
 //     triad THREADS MIB [REPEATS]      arrays of MIB mebibytes each; prints "threads mib best_gb_s median_gb_s"
 //
-// Counted as STREAM counts: 24 bytes an element, without the read that a store of a whole cache line may cost. Arrays four
-// times the last cache, as STREAM asks; each thread touches its own part first.
+// Counted as STREAM counts: 24 bytes an element, without the read that a store of a whole cache line may cost. Arrays
+// four times the last cache, as STREAM asks; each thread touches its own part first.
 #include <errno.h>
 #include <omp.h>
 #include <stdio.h>
@@ -38,7 +39,8 @@ int main(int argc, char **argv)
     const int threads = (int)number("THREADS", argv[1], 1, 1024);
     const long mib = number("MIB", argv[2], 1, 65536), repeats = argc > 3 ? number("REPEATS", argv[3], 1, 1000) : 15;
     const size_t n = (size_t)mib * (1 << 20) / sizeof(double);
-    double *restrict a = malloc(n * sizeof *a), *restrict b = malloc(n * sizeof *b), *restrict c = malloc(n * sizeof *c);
+    double *restrict a = malloc(n * sizeof *a), *restrict b = malloc(n * sizeof *b),
+                     *restrict c = malloc(n * sizeof *c);
     double *rate = malloc((size_t)repeats * sizeof *rate);
     if (!a || !b || !c || !rate) {
         fprintf(stderr, "triad: no memory for three arrays of %ld MiB; take smaller ones\n", mib);
@@ -57,7 +59,8 @@ int main(int argc, char **argv)
 #pragma omp parallel for schedule(static)
         for (size_t i = 0; i < n; i++) a[i] = b[i] + s * c[i];
         rate[r] = 24e-9 * (double)n / (omp_get_wtime() - t0);
-        b[(size_t)r % n] = a[n - 1 - (size_t)r % n] - 6; // keeps the loop from being done once for all; the value stays 1
+        // keeps the loop from being done once for all; the value stays 1
+        b[(size_t)r % n] = a[n - 1 - (size_t)r % n] - 6;
     }
     for (size_t i = 0; i < n; i++) {
         if (a[i] != 7) {

@@ -1,6 +1,7 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# A study as one MPI job: each rank a member at a time (or each group of `ranks`). Submit again to go on: sbatch cases/studies/slurm.sh
+# A study as one MPI job: each rank (or each group of `ranks`) takes one member at a time. Submit it again to go on:
+#     sbatch cases/studies/slurm.sh
 #SBATCH --job-name=bergtow
 #SBATCH --nodes=2
 #SBATCH --ntasks-per-node=32
@@ -8,4 +9,5 @@
 #SBATCH --time=12:00:00
 #SBATCH --signal=TERM@120
 set -eu
-srun --mpi=pmix build/release/bergtow ensemble "${STUDY:-cases/studies/fullscale.yml}" -o "${OUT:-out/fullscale}" --threads "$SLURM_CPUS_PER_TASK"
+srun --mpi=pmix build/release/bergtow ensemble "${STUDY:-cases/studies/fullscale.yml}" -o "${OUT:-out/fullscale}" \
+    --threads "$SLURM_CPUS_PER_TASK"

@@ -46,7 +46,8 @@ double bt_clock(void);
 static inline double bt_min(double a, double b) { return a < b ? a : b; }
 static inline double bt_max(double a, double b) { return a > b ? a : b; }
 
-/// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every parallel loop.
+/// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every
+/// parallel loop.
 #ifdef BT_VALIDATE
 #define BT_MANY(n, few) ((n) >= 0 && (few) >= 0)
 #else

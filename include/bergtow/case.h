@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A case: everything a run depends on, as read from the YAML file, in SI units and radians.
+// A case: everything a run depends on, as read from the YAML file, in SI contacts and radians.
 //
-// The schema table in src/case/schema.c is the one place that names each key with its unit, default, range and one
+// The schema table in src/case/schema.c is the one place that names each key with its contact, default, range and one
 // sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
 // holds the values. Choices are indices into the name lists of the schema.
 #ifndef BERGTOW_CASE_H
@@ -12,7 +12,8 @@
 #include "bergtow/base.h"
 
 typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // basin, geographic
-typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING } bt_bound; // wall, periodic, open, moving (ends only)
+// wall, periodic, open, moving (ends only)
+typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING } bt_bound;
 typedef enum { BT_ICE_VORONOI, BT_ICE_RECTANGLES, BT_ICE_POLYGONS } bt_ice_shape; // voronoi, rectangles, polygons
 typedef enum { BT_SIZE_SINGLE, BT_SIZE_LOGNORMAL, BT_SIZE_POWER } bt_size_law;    // single, lognormal, power
 /// Coordinates of outlines: file, lonlat, plane, frame, metres.
@@ -20,13 +21,23 @@ typedef enum { BT_CRS_FILE, BT_CRS_LONLAT, BT_CRS_PLANE, BT_CRS_FRAME, BT_CRS_ME
 typedef enum { BT_NONCONVEX_REFUSE, BT_NONCONVEX_HULL, BT_NONCONVEX_SPLIT } bt_nonconvex; // refuse, hull, split
 typedef enum { BT_START_DRIFT, BT_START_REST } bt_start;                           // drift, rest
 typedef enum { BT_THICK_CONSTANT, BT_THICK_LOGNORMAL } bt_thickness_law;          // constant, lognormal
-typedef enum { BT_BODY_DISC, BT_BODY_SQUARE, BT_BODY_RECTANGLE, BT_BODY_SHIP, BT_BODY_POLYGON, BT_BODY_ABSENT } bt_body_shape;
+typedef enum {
+    BT_BODY_DISC,
+    BT_BODY_SQUARE,
+    BT_BODY_RECTANGLE,
+    BT_BODY_SHIP,
+    BT_BODY_POLYGON,
+    BT_BODY_ABSENT
+} bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE, BT_TOW_THRUST } bt_tow_mode; // none, speed, line, thrust
-typedef enum { BT_ROPE_NUMBERS, BT_ROPE_STEEL, BT_ROPE_POLYPROPYLENE, BT_ROPE_DYNEEMA } bt_rope_type; // numbers, steel-wire, polypropylene, dyneema
-typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC, BT_TILT_DYNAMIC } bt_tilt; // none, slope, geostrophic, dynamic
+// numbers, steel-wire, polypropylene, dyneema
+typedef enum { BT_ROPE_NUMBERS, BT_ROPE_STEEL, BT_ROPE_POLYPROPYLENE, BT_ROPE_DYNEEMA } bt_rope_type;
+// none, slope, geostrophic, dynamic
+typedef enum { BT_TILT_NONE, BT_TILT_SLOPE, BT_TILT_GEOSTROPHIC, BT_TILT_DYNAMIC } bt_tilt;
 typedef enum { BT_LEAD_NONE, BT_LEAD_CHANNEL, BT_LEAD_MANAGED } bt_lead_mode;    // none, channel, managed
 
-typedef enum { BT_IMPACT_NONE, BT_IMPACT_DURATION, BT_IMPACT_CRUSHING } bt_impact_conversion; // none, duration, crushing
+// none, duration, crushing
+typedef enum { BT_IMPACT_NONE, BT_IMPACT_DURATION, BT_IMPACT_CRUSHING } bt_impact_conversion;
 typedef enum { BT_CORNER_GIVEN, BT_CORNER_REAL } bt_corner;                  // given, real
 
 /// Drag coefficients of a class of bodies (ice: floes; body: the towed body).
@@ -57,6 +68,8 @@ typedef struct bt_floe_def {
 } bt_floe_def;
 
 enum { BT_TURN_ROWS = 100000 }; ///< preset of solver.turn_rows, which has no effect any more
+
+enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
 
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
@@ -104,7 +117,8 @@ typedef struct bt_case {
         int64_t seed;
         double shake;                   ///< relaxation length of the generator, in mean free gaps (0 = none)
         char *field;                    ///< HDF5 field file instead of a generator, or NULL; relative to the case file
-        char *outlines;                 ///< GeoJSON file of outlines instead of a generator, or NULL; relative to the case file
+        /// GeoJSON file of outlines instead of a generator, or NULL; relative to the case file
+        char *outlines;
         bt_crs outlines_crs;            ///< what its coordinates are
         double origin_lon, origin_lat; ///< place of x = y = 0 on the earth, rad; NaN: the middle of outlines in degrees
         double origin_east, origin_north; ///< of x = y = 0 in the plane of the outlines, m; NaN: as the keys say
@@ -129,7 +143,8 @@ typedef struct bt_case {
     } body;
     struct {
         bt_tow_mode mode;
-        double speed;            ///< of the body (speed), of the end (line), the vessel's limit (thrust), m/s; the programme's largest
+        /// of the body (speed), of the end (line), the vessel's limit (thrust), m/s; the programme's largest
+        double speed;
         double direction;        ///< heading of the tow at the start from +x towards +y, rad
         double ramp;             ///< time over which the speed rises linearly from 0, s
         double *programme;       ///< [n_programme][2] time s, speed m/s; none = ramp and speed
@@ -190,9 +205,9 @@ typedef struct bt_case {
         double tolerance;        ///< natural-map residual / reference speed at which a step has converged
         double reference_speed;  ///< m/s; 0 = tow speed, or the largest speed prescribed in the case
         int64_t max_sweeps;
-        int64_t inner_sweeps;    ///< sweeps of a tile in its turn
+        int64_t inner_sweeps;    ///< sweeps of a cell in its turn
         int64_t turn_rows;       ///< without effect, of cases written for earlier versions
-        double tile;             ///< least side of a tile / mean floe size
+        double cell;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
         bool warm_start;
         double slop;             ///< overlap left alone by the position projection / mean floe size
@@ -234,17 +249,22 @@ typedef struct bt_case {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
         char *source;            ///< where it was published
     } reference;
+    double extra[BT_EXTRA_KEYS]; ///< values of keys that are added to the table, those of force laws (forces.h), SI
 } bt_case;
 
 /// Read and check a case file; every error of the file is appended to err with file, line, key and remedy.
 /// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
 
-/// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of "--set ".
-bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place, int n, bt_errors *err);
+/// The same, with the place at which each override stands: [n] texts "FILE:LINE: " that messages name in place of
+/// "--set ".
+bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place,
+                              int n, bt_errors *err);
 
-/// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file is read.
-bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err);
+/// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file
+/// is read.
+bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,
+                            const bt_table *wind, bt_errors *err);
 
 /// All defaults, for tests and programs that build a case in memory.
 void bt_case_defaults(bt_case *c);
@@ -252,20 +272,22 @@ void bt_case_defaults(bt_case *c);
 /// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
 bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
-/// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
+/// Every key with its value and contact as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
 
 /// The same below comment lines of one's own. Caller frees.
 char *bt_case_text(const bt_case *c, const char *head);
 
-/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/case/froude.c): the twin moves alike in
-/// times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for keys that name files of numbers with a dimension.
+/// Turn a case into its Froude-scaled twin, with all lengths times ratio and all else by dimension (src/case/froude.c):
+/// the twin moves alike in times sqrt(ratio) as long. Errors: BT_ERR_CASE for values that leave their range and for
+/// keys that name files of numbers with a dimension.
 bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err);
 
 /// The twin as a case file, below comments that say what was scaled how, and what is not similar. Caller frees.
 char *bt_case_scaled_text(const bt_case *twin, double ratio);
 
-/// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0 without body.
+/// The waterline polygon of the towed body, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count, 0
+/// without body.
 int bt_case_waterline(const bt_case *c, double *v);
 
 /// The outline of a floe given by hand, centroid at the origin. v: [BT_MAX_VERTICES][2]. Returns the count.
@@ -294,11 +316,11 @@ double bt_case_reference_speed(const bt_case *c);
 
 void bt_case_free(bt_case *c);
 
-/// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream.
+/// Table of keys for --list-keys: key, contact, default, range, one sentence. Printed to the stream.
 void bt_case_list_keys(void *stream);
 
-/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows), unit, range, choices and meaning; numbers of
-/// the range in the unit of a number written without one.
+/// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows),
+/// contact, range, choices and meaning; numbers of the range in the contact of a number written without one.
 void bt_case_list_keys_json(void *stream);
 
 #endif

@@ -1,44 +1,59 @@
 // SPDX-License-Identifier: MIT
 // Checkpoints: the whole state of a run in one file, from which it goes on to the same bits.
 //
-// The promise. A run that is stopped, or killed, at any moment and taken up again ends with the state, the series, the frames, the events, the
-// collisions and the summary of the run that was never stopped, on any number of ranks and threads. Only wall times, and the counts of
-// what the division among ranks has cost, are those of the pieces. A run that is killed before its first checkpoint starts again from
-// case.resolved.yml, which is then also its case as given.
+// The promise. A run that is stopped, or killed, at any moment and taken up again ends with the state, the series, the
+// frames, the events, the collisions and the summary of the run that was never stopped, on any number of ranks and
+// threads. Only wall times, and the counts of what the division among ranks has cost, are those of the pieces. A run
+// that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given.
 //
-// The file. DIR/checkpoint.h5 is a sealed HDF5 file (src/base/seal.h) of named arrays (src/base/snapshot.h); rank 0 gathers and writes it. It is written
-// as checkpoint.h5.tmp, brought to the disk, the one before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is
-// one that is whole. It holds the case as text with its tables of current and wind, and the ice field as made, with the lead in it: a
-// run that goes on reads no other file but DIR/result.h5, and makes no field. The number of format is part of the seal; another one is refused.
+// The file. DIR/checkpoint.h5 is a protected by a checksum HDF5 file (src/base/checksum.h) of named arrays
+// (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp, brought to the disk, the one
+// before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is one that is whole. It
+// holds the case as text with its tables of current and wind, and the ice field as made, with the lead in it: a run
+// that goes on reads no other file but DIR/result.h5, and makes no field. The number of format is part of the checksum;
+// another one is refused.
 //
-// What is state. Everything that steps carry on is in the tables of src/output/state.c, src/output/record_resume.c, src/output/impact_store.c and src/run/run_state.c; nothing
-// else writes or reads it. Member by member, S saved, D derived from case and field by the same functions as in a fresh run, - of one step alone:
+// What is state. Everything that steps carry on is in the tables of src/output/state.c, src/output/record_resume.c,
+// src/output/impact_store.c and src/run/run_state.c; nothing else writes or reads it. Member by member, S saved, D
+// derived from case and field by the same functions as in a fresh run, - of one step alone:
 //
 //   bt_params         S constants (compared), water, wind, balance, tilt of the last step        D the rest
-//   bt_bodies         S pose (x, y, yaw), vel, path, tile, stirred, home.copy, home.lap
-//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length, radius, area, mass, inertia, share,
+//   bt_bodies         S pose (x, y, yaw), vel, path, cell, disturbed, home.copy, home.lap
+//                     D pose.c, pose.s, outline (functions of the yaw alone), gid, offset, mark, vertices, per_length,
+//                       radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
-//                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no tile is known to rest
-//   bt_tiles          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels decide which tile owns a contact, and
-//                       so the order of the sweeps. They are older than the poses, and cannot be made from them
-//                     D tile array, at, n_tiled, labelled      - moved, moved_any, speed, bound, awake, order, run, calm, still
-//                     not needed: rest (a tile that rests is found to do so again), n_listings
+//                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no
+//                     cell is known to rest
+//   bt_cells          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels
+//                       decide which cell owns a contact, and so the order of the sweeps. They are older than the
+//                       poses, and cannot be made from them
+//                     D cell array, at, n_in_cells, labelled      - moved, moved_any, speed, bound, awake, order, run,
+//                     still not needed: rest (a cell that rests is found to do so again), n_listings
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
-//                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts (contacts.h)
-//   bt_trace          S all: what contact laws remember of pairs (contact/law.h)
-//                     bt_unit, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
-//   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way      D, - the rest
+//                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
+//                     (contacts.h)
+//   bt_memory          S all: what contact laws remember of pairs (contact/law.h)
+//                     bt_contact, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
+//   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way
+//       D, - the rest
+//   bt_forces         D own                                                                        - what is recorded
+//   of the towed body, its place
 //   bt_window         S start, rear, drift, vel, counters, dropped, brought                       D the rest
 //   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats
-//   bt_impacts        S open                       D rule, panels' places                         - touch, closed, collision, largest_push, panels' loads
-//   bt_record         S history, numbers of entries and frames, the entry under way               the entries and frames themselves: result.h5
-//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)      the rows: result.h5
-//   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field   D the rest
+//   bt_impacts        S open                       D rule, panels' places                         - touch, closed,
+//   collision, largest_push, panels' loads
+//   bt_record         S history, numbers of entries and frames, the entry under way               the entries and
+//   frames themselves: result.h5
+//   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
+//     the rows: result.h5
+//   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
+//   D the rest
 //   bt_domain         not state: which rank owns what steers no bit
-//   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: there is no counter
+//   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: there is no
+//   counter
 //
-// That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c). What no step can leave is refused, under a sound
-// seal too (src/output/state_check.c).
+// That nothing is missing is shown by a test that takes up a run after every step (tests/contact/test_checkpoint.c).
+// What no step can leave is refused, under a sound checksum too (src/output/state_check.c).
 #ifndef BERGTOW_CHECKPOINT_H
 #define BERGTOW_CHECKPOINT_H
 
@@ -48,14 +63,16 @@ struct bt_snapshot;
 
 #define BT_CHECKPOINT_FILE "checkpoint.h5"
 #define BT_CHECKPOINT_BEFORE "checkpoint.previous.h5"
-#define BT_CHECKPOINT_DAMAGED "checkpoint.damaged.h5" // a checkpoint.h5 that was refused, set aside when the next one was written
+#define BT_CHECKPOINT_DAMAGED                                                                                          \
+    "checkpoint.damaged.h5" // a checkpoint.h5 that was refused, set aside when the next one was written
 #define BT_FAILURE_FILE "failure.h5"
 
 /// Write dir/name, a complete file or none. The one before is kept for checkpoint.h5. Errors: BT_ERR_IO.
 bt_status bt_checkpoint_write(const struct bt_snapshot *s, const char *dir, const char *name, bt_errors *err);
 
-/// Read dir/checkpoint.h5, or, if that is not there or refused, the one before it. *said: why the first was not taken, for the user, or NULL; the
-/// caller frees it, and *path, which must live as long as the snapshot. Errors: BT_ERR_IO, BT_ERR_CASE for what is refused.
+/// Read dir/checkpoint.h5, or, if that is not there or refused, the one before it. *said: why the first was not taken,
+/// for the user, or NULL; the caller frees it, and *path, which must live as long as the snapshot. Errors: BT_ERR_IO,
+/// BT_ERR_CASE for what is refused.
 bt_status bt_checkpoint_read(struct bt_snapshot *s, const char *dir, char **path, char **said, bt_errors *err);
 
 /// Is there a checkpoint in dir?

@@ -23,26 +23,29 @@ const bt_comm *bt_comm_world(void);
 /// One rank, whatever else runs: for work of a rank by itself.
 extern const bt_comm bt_comm_alone;
 
-/// Collective. Start MPI if a launcher (mpirun, srun) started this process: a plain start must neither pay for MPI_Init nor
-/// need a network. From here on an MPI error, and an exit() of one rank alone, end all ranks; an exit(0) or
+/// Collective. Start MPI if a launcher (mpirun, srun) started this process: a plain start must neither pay for MPI_Init
+/// nor need a network. From here on an MPI error, and an exit() of one rank alone, end all ranks; an exit(0) or
 /// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line.
 void bt_comm_start(int *argc, char ***argv);
 
-/// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst code.
+/// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst
+/// code.
 int bt_comm_end(int code);
 
 /// Ends all ranks now, from any one, without waiting for the others. Flushes stdout and stderr first.
 _Noreturn void bt_comm_abort(int code);
 
-/// Collective. The ranks of c that name the same group, as ranks of their own. Release with bt_comm_split_end (collective over the group).
+/// Collective. The ranks of c that name the same group, as ranks of their own. Release with bt_comm_split_end
+/// (collective over the group).
 void bt_comm_split(const bt_comm *c, int group, bt_comm *part);
 void bt_comm_split_end(bt_comm *part);
 
-/// Collective. The worst status of all ranks. From bad to worse: done, signal, usage, case, numeric, input/output: a file that
-/// cannot be written decides how the run may end, and what the user has to do first.
+/// Collective. The worst status of all ranks. From bad to worse: done, signal, usage, case, numeric, input/output: a
+/// file that cannot be written decides how the run may end, and what the user has to do first.
 bt_status bt_comm_agree(const bt_comm *c, bt_status status);
 
-/// Collective. All ranks' messages to rank 0, each text once, in the order of the ranks; the others' lists become empty.
+/// Collective. All ranks' messages to rank 0, each text once, in the order of the ranks; the others' lists become
+/// empty.
 void bt_comm_errors(const bt_comm *c, bt_errors *err);
 
 /// Collective. Copy bytes from rank 0 to all; any size.
@@ -55,24 +58,30 @@ bool bt_comm_any(const bt_comm *c, bool value);
 void bt_comm_rest(const bt_comm *c);
 
 /// Collective. Sums, largest values and bitwise ors of all ranks in one message. Sums are exact and `bad` is handed on;
-/// a NaN is the largest value. The result is the same on all ranks, in any distribution of the terms. NULL where n is 0.
+/// a NaN is the largest value. The result is the same on all ranks, in any distribution of the terms. NULL where n is
+/// 0.
 void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, int n_max, uint64_t *ors, int n_ors);
 
 /// Collective. Sum over the ranks before this one; *total (may be NULL): over all.
 int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total);
 
-/// First of the n things that stand in the block of a rank when they are dealt in equal blocks; bt_comm_first(c, c->size, n) = n.
-static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n) { return (int64_t)((__extension__ (__int128)n) * rank / c->size); }
+/// First of the n things that stand in the block of a rank when they are dealt in equal blocks; bt_comm_first(c,
+/// c->size, n) = n.
+static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n)
+{
+    return (int64_t)((__extension__(__int128) n) * rank / c->size);
+}
 
 /// Collective. Rows of bodies from wherever they are to the order of their ids. This rank has n rows: gid [n] and
-/// rows [n][width]; rank k receives those of the ids first[k] up to first[k + 1] in block [first[k+1] − first[k]][width].
-/// first: [size + 1], ascending, the same on all ranks; first[0] = 0. Every id below first[size] must come exactly once. Errors (the same
-/// status on all ranks): BT_ERR_NUMERIC, naming ids that are missing, doubled, or outside.
-bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width, const double *rows,
-                              double *block, bt_errors *err);
+/// rows [n][width]; rank k receives those of the ids first[k] up to first[k + 1] in block [first[k+1] −
+/// first[k]][width].
+/// first: [size + 1], ascending, the same on all ranks; first[0] = 0. Every id below first[size] must come exactly
+/// once. Errors (the same status on all ranks): BT_ERR_NUMERIC, naming ids that are missing, doubled, or outside.
+bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
+                              const double *rows, double *block, bt_errors *err);
 
-/// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there, to be freed; NULL and
-/// *total = 0 elsewhere.
+/// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there,
+/// to be freed; NULL and *total = 0 elsewhere.
 double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total);
 
 #endif

@@ -1,25 +1,30 @@
 // SPDX-License-Identifier: MIT
 // An ensemble: the members of a study, run by groups of ranks and by any number of processes, and gathered in one file.
 //
-// Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a member is finished when it
-// holds a file `finished` (the last thing written: a run that was stopped has a summary too) that its other files fit, failed when it holds failed.txt (first line: exit
-// code; then the reasons; beside the folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line
-// for each start and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on
-// order, ranks, or how often the ensemble was stopped.
+// Folder. DIR/study.resolved.yml says what the members are. DIR/members/cCCC-rRRR is an ordinary result folder; a
+// member is finished when it holds a file `finished` (the last thing written: a run that was stopped has a summary too)
+// that its other files fit, failed when it holds failed.txt (first line: exit code; then the reasons; beside the
+// folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line for each start
+// and end, with wall times. DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it
+// depends on order, ranks, or how often the ensemble was stopped.
 //
-// Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest (src/run/ensemble_record.h). Each call
-// reads them all and compares them, shared among its ranks, before it begins (as fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each
-// maker of ensemble.h5 what others have finished since. What is missing or damaged is told, taken away and run again; what the system does not let us read is left as it is,
-// told, and a hole. A call ends with 0 only when every member is finished and sound.
+// Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest
+// (src/run/ensemble_record.h). Each call reads them all and compares them, shared among its ranks, before it begins (as
+// fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each maker of
+// ensemble.h5 what others have finished since. What is missing or damaged is told, taken away and run again; what the
+// system does not let us read is left as it is, told, and a hole. A call ends with 0 only when every member is finished
+// and sound.
 //
-// Dealing. Who works on a member holds a lock on members/NAME/lock, which the system takes back when the process ends, however it
-// ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word between them:
-// each takes the next member that is neither finished, failed nor locked, the longest first by an estimate. (Tried in thought and left: a
-// counter in shared MPI memory; it knows nothing of other jobs, and a rank that computes does not serve it on every network.)
-// A member that was stopped goes on from its checkpoint; when it is finished its checkpoints are removed. One whose process died is tried again after
-// all others, and given up after some attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies takes all others
-// with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members are run one at a time, so that only
-// the one at fault goes on to the limit. (Not from the first on: a job that ends with its time limit leaves as many such members as it had groups.)
+// Dealing. Who works on a member holds a lock on members/NAME/lock, which the system takes back when the process ends,
+// however it ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word
+// between them: each takes the next member that is neither finished, failed nor locked, the longest first by an
+// estimate. (Tried in thought and left: a counter in shared MPI memory; it knows nothing of other jobs, and a rank that
+// computes does not serve it on every network.) A member that was stopped goes on from its checkpoint; when it is
+// finished its checkpoints are removed. One whose process died is tried again after all others, and given up after some
+// attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies takes all
+// others with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members are run
+// one at a time, so that only the one at fault goes on to the limit. (Not from the first on: a job that ends with its
+// time limit leaves as many such members as it had groups.)
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 
@@ -36,18 +41,20 @@ typedef struct bt_ensemble_options {
     int threads;              ///< of each rank, 0 = the cores of the node shared by its ranks
     bool quiet;
     bool retry;               ///< failed members are tried again
-    bool leave;               ///< end when nothing is left to begin, even if other processes are still at work on members
+    /// end when nothing is left to begin, even if other processes are still at work on members
+    bool leave;
     const char *command_line;
 } bt_ensemble_options;
 
 typedef enum { BT_MEMBER_WAITING, BT_MEMBER_FINISHED, BT_MEMBER_FAILED } bt_member_state;
 
-/// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another study, the study
-/// asks for more ranks than there are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the call resumes, or others are at work on the rest); the worst
-/// status of a failed member when all others are done.
+/// Collective. Run what is left of a study. Errors, the same on all ranks: BT_ERR_CASE (the folder belongs to another
+/// study, the study asks for more ranks than there are), BT_ERR_IO (also: a member is not sound), BT_ERR_SIGNAL (the
+/// call resumes, or others are at work on the rest); the worst status of a failed member when all others are done.
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err);
 
-/// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
+/// State of a member by the files that mark it; whether a finished one is sound: ensemble_record.h. why: text of
+/// failed.txt without its first line, or that the process of a waiting one died, to be freed by the caller, may be
 /// NULL; *code: the first line.
 bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
 

@@ -1,33 +1,43 @@
 // SPDX-License-Identifier: MIT
 // Published and derived estimates of the resistance that broken ice adds to a tow, and the drag of open water.
 //
-// A concentration, h thickness m, W width of the body across the tow m, V speed of the body through the ice m/s, d the tow
-// direction, ρ_i and ρ_w densities of ice and water kg/m³, P = P* h exp(−20 (1 − A)) strength of the ice N/m [Hibler 1979's form].
+// A concentration, h thickness m, W width of the body across the tow m, V speed of the body through the ice m/s, d the
+// tow direction, ρ_i and ρ_w densities of ice and water kg/m³, P = P* h exp(−20 (1 − A)) strength of the ice N/m
+// [Hibler 1979's form].
 //
 //   Lichey–Hellmer   0 for A <= 0.15;  ½ ρ_i C_si h W |ΔV| ΔV·d for 0.15 < A < 0.9, and for A >= 0.9 while P < P_s;
 //                    for A >= 0.9 and P >= P_s the ice captures the body: what it then resists is limited by P W
 //                    [Lichey & Hellmer 2001, J. Glaciol. 47, with P* = 20 kN/m², P_s = 13 kN/m; FESOM2's iceberg code]
-//   Three closures of "F × 1 m = work spent on opening 1 m of channel" [Marchenko et al. 2010 as quoted by Yulmetov & Løset
-//   2017; their formula is not at hand, so each of these is ours and has a name]:
+//   Three closures of "F × 1 m = work spent on opening 1 m of channel" [Marchenko et al. 2010 as quoted by Yulmetov &
+//   Løset 2017; their formula is not at hand, so each of these is ours and has a name]:
 //     compaction     F = P W                                    the strip is pressed against ice of strength P
-//     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W          the ice of the strip is pushed onto or under other ice; κ: work
+//     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W          the ice of the strip is pushed onto or under other
+//     ice; κ: work
 //                                                               over potential energy, of which a range is given
-//     momentum       F = ρ_i h W V² A φ/(φ − A)                 the ice of the strip is swept together to φ, with the front at V φ/(φ − A)
-//   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²         resting disc-like floes of radius r, each met once by a heavy disc of
-//                                                               radius R = W/2, without friction and drag (derived; tests/physics/test_resistance.c)
-//   ships in pack    F = ½ k Fr_p^b ρ_i W h V² A^n,  Fr_p = V/√(g h A): a regression of ship resistance in pack ice over the pack-ice Froude number [Colbourne 2000:
-//                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in PolarRoute, the route planner of the British
-//                    Antarctic Survey (class SDA, ice_resistance; antarctica/PolarRoute, 2022). A berg is taken as blunt, the range goes to slender. The
-//                    source gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says extrapolated
-//   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no ice resistance
+//     momentum       F = ρ_i h W V² A φ/(φ − A)                 the ice of the strip is swept together to φ, with the
+//     front at V φ/(φ − A)
+//   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²         resting disc-like floes of radius r, each met once by
+//   a heavy disc of
+//                                                               radius R = W/2, without friction and drag (derived;
+//                                                               tests/physics/test_resistance.c)
+//   ships in pack    F = ½ k Fr_p^b ρ_i W h V² A^n,  Fr_p = V/√(g h A): a regression of ship resistance in pack ice
+//                    over the pack-ice Froude number [Colbourne 2000:
+//                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in
+//                    PolarRoute, the route planner of the British Antarctic Survey (class SDA, ice_resistance;
+//                    antarctica/PolarRoute, 2022). A berg is taken as blunt, the range goes to slender. The source
+//                    gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says
+//                    extrapolated
+//   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no
+//   ice resistance
 //
 // Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
 //
-// Left out. The other regression that is known here, R = a ρ_i W h V² A^1.5 / Fr^b [Huang et al. 2021], has constants of a ship and its floes that were found only
-// in the source of a third, without range. It stays out until the paper is at hand.
+// Left out. The other regression that is known here, R = a ρ_i W h V² A^1.5 / Fr^b [Huang et al. 2021], has constants
+// of a ship and its floes that were found only in the source of a third, without range. It stays out until the paper is
+// at hand.
 //
-// A run is held against estimates that know the concentration, within their range: a ratio to one that does not, or beyond its range, would tell of the
-// estimate and not of the run (bt_estimate.compares).
+// A run is held against estimates that know the concentration, within their range: a ratio to one that does not, or
+// beyond its range, would tell of the estimate and not of the run (bt_estimate.compares).
 #ifndef BERGTOW_ESTIMATE_H
 #define BERGTOW_ESTIMATE_H
 
@@ -35,14 +45,23 @@
 #include "bergtow/field.h"
 
 typedef enum {
-    BT_EST_LICHEY_HELLMER, BT_EST_COMPACTION, BT_EST_RAFTING, BT_EST_MOMENTUM, BT_EST_DILUTE, BT_EST_SHIPS, BT_EST_OPEN_WATER, BT_N_ESTIMATES
+    BT_EST_LICHEY_HELLMER,
+    BT_EST_COMPACTION,
+    BT_EST_RAFTING,
+    BT_EST_MOMENTUM,
+    BT_EST_DILUTE,
+    BT_EST_SHIPS,
+    BT_EST_OPEN_WATER,
+    BT_N_ESTIMATES
 } bt_estimate_kind;
 
 #define BT_EST_LOOSE 0.15      ///< A up to which Lichey & Hellmer have no force
 #define BT_EST_DENSE 0.9       ///< A from which ice may capture a berg
 #define BT_EST_STRENGTH 20.0   ///< exponent of the strength [Hibler 1979]
-#define BT_EST_COMPACT 0.65    ///< A below which ice has room to give way and is neither pressed together nor rafted, assumed
-#define BT_EST_SWEPT 1e-9      ///< φ − A up to which the ice counts as swept together: a field made for 0.9 may have 0.9 − 1e-16
+/// A below which ice has room to give way and is neither pressed together nor rafted, assumed
+#define BT_EST_COMPACT 0.65
+/// φ − A up to which the ice counts as swept together: a field made for 0.9 may have 0.9 − 1e-16
+#define BT_EST_SWEPT 1e-9
 #define BT_EST_DILUTE_MOST 0.25 ///< A above which floes hit each other before the body has passed, assumed
 
 /// What the estimates depend on, at the scale of the case.
@@ -84,8 +103,8 @@ double bt_estimate_strength(const bt_estimate_input *in);
 /// One estimate at the given conditions.
 bt_estimate bt_estimate_at(bt_estimate_kind kind, const bt_estimate_input *in);
 
-/// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body, or tow, speed and
-/// along are NaN. The case has been checked (bt_case_finish).
+/// The conditions of a case: ice as asked for by its keys, P* and P_s divided by the length scale. Without towed body,
+/// or tow, speed and along are NaN. The case has been checked (bt_case_finish).
 void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in);
 
 /// Area-weighted means of a field: thickness and radius of the circle of a floe's area, m. 0 without floes.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What happened when: a short list of single events of a run, the same on all ranks.
 //
-// For things that happen now and then (a line breaks, a way-point is passed), not in every step. The list grows only; it is part of the
-// output, not of the state: what an event changes is kept where it acts.
+// For things that happen now and then (a line breaks, a way-point is passed), not in every step. The list grows only;
+// it is part of the output, not of the state: what an event changes is kept where it acts.
 #ifndef BERGTOW_EVENT_H
 #define BERGTOW_EVENT_H
 

@@ -29,7 +29,8 @@ typedef struct bt_outline_counts {
 typedef struct bt_field {
     bt_idx n;              ///< floes
     int64_t *offsets;      ///< [n+1] first vertex of each floe
-    double *vertices;      ///< [offsets[n]][2] m, body frame: anticlockwise about the centroid; convex unless outlines.split
+    /// [offsets[n]][2] m, body frame: anticlockwise about the centroid; convex unless outlines.split
+    double *vertices;
     double *pose;          ///< [n][3] x m, y m, yaw rad
     double *thickness;     ///< [n] m
     double *area;          ///< [n] m²
@@ -47,16 +48,17 @@ void bt_field_free(bt_field *f);
 void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, double yaw, double thickness);
 
 /// Make the field of a case from its seed: tessellate, shrink to the asked concentration, shake to a random state,
-/// check. Reproducible from the case alone. f has been initialised; what it held is released. Errors: BT_ERR_CASE (impossible packing, named), BT_ERR_NUMERIC.
+/// check. Reproducible from the case alone. f has been initialised; what it held is released. Errors: BT_ERR_CASE
+/// (impossible packing, named), BT_ERR_NUMERIC.
 bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err);
 
 /// The field of a case, made or read as it says (ice.field, ice.outlines). Errors: those of the function it calls.
 bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err);
 
-/// Floes of the case's GeoJSON file ice.outlines, positions [east, north] in what its crs says (src/field/geojson.c). Refused
-/// with the number of the feature, from 0: what is no polygon, has holes, too few or too many vertices, no area, edges
-/// that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body (both are
-/// named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+/// Floes of the case's GeoJSON file ice.outlines, positions [east, north] in what its crs says (src/field/geojson.c).
+/// Refused with the number of the feature, from 0: what is no polygon, has holes, too few or too many vertices, no
+/// area, edges that cross; not convex, unless the case says otherwise; outside the domain; in another floe or body
+/// (both are named). f as for bt_field_read. Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
 
 /// Outlines where they lie, as GeoJSON that ice.outlines reads back: longitude and latitude where the place of x = y =
@@ -76,8 +78,8 @@ double bt_field_thickness(const bt_case *c, bt_idx i);
 void bt_field_share(const bt_comm *c, bt_field *f);
 
 /// Write to / read from an HDF5 file: /floes/{vertices,offsets,pose,thickness,area}, attributes on /floes.
-/// The writer leaves a complete file or none. The reader checks every value (finite, convex, sizes, offsets) and names file
-/// and floe in its errors; f has been initialised, what it held is released, and it is empty after an error.
+/// The writer leaves a complete file or none. The reader checks every value (finite, convex, sizes, offsets) and names
+/// file and floe in its errors; f has been initialised, what it held is released, and it is empty after an error.
 /// Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err);

@@ -1,13 +1,22 @@
 // SPDX-License-Identifier: MIT
-// External forces: free velocity U* and effective inertia of every body.
+// External forces: a table of laws, the free velocity U* and effective inertia of every body by them, and their record.
 //
-// Per body, in this order [model: Yulmetov & Løset 2017, section 1; coefficients: see the case schema]; m: its mass, M
-// = m (1 + C_m):
+// One law, one entry (bt_force_law), one function that says what the law does to a body: it adds to the load of the
+// body (bt_load). How a load is integrated stands in one place (src/force/load.h), and whatever needs the forces goes
+// through the same table: the prediction U*, the record of the towed body, the rest of floes, free drift, the
+// undisturbed ice of a moving window, the guards. A force can so not be in one of them and missing in another.
+// Rejected: a law as a function from velocity to force. An explicit drag reverses the relative velocity where Δt K > M,
+// and Newton's method of free drift and the exact circles of Coriolis need to know what is linear, quadratic or a
+// rotation.
+//
+// The laws of the program (src/force/laws.c), per body, in the order of integration [model: Yulmetov & Løset 2017,
+// section 1; coefficients: see the case schema]; m: its mass, M = m (1 + C_m):
 //   Coriolis   exact rotation of U − U_b by (m/M) f Δt (inertial circles keep their speed), U_b: the velocity
 //              in geostrophic balance with the sea-surface tilt, or 0
 //   tilt       U += −(m/M) g ∇η Δt; with tilt: dynamic U += dU_w/dt Δt beyond that balance
 //   skin drag  M dU/dt = ρ C_s A |v| v, v = U_ref − U;   I dω/dt = −(ρ_w C_ws + ρ_a C_as) ∫r³dA |ω| ω
-//   form drag  dF = ½ρ C d |v| v max(0, −v̂·n) dl = ½ρ C d v max(0, −v·n) dl along the convex hull of the outline, and its moment r×dF, with the
+//   form drag  dF = ½ρ C d |v| v max(0, −v̂·n) dl = ½ρ C d v max(0, −v·n) dl along the convex hull of the outline, and
+//              its moment r×dF, with the
 //              local velocity v = U_ref − U − ω×r: water over the draft, air over the sail
 //
 // Added mass. Water that goes along with a body moves relative to water that has Coriolis and slope in balance: neither
@@ -21,8 +30,8 @@
 // lie in the middle of its width has a moment in translation, too. On a straight side v is linear along l and n
 // constant: where water comes in, dF and r×dF are polynomials of second and third degree, and two points of Gauss on
 // that stretch exact; no square root is left. A bay of an outline that is not convex is passed by: water meets the hull
-// across it. Floes have the same law as the towed body: it costs 1 % of a step in 80 % ice and 4 % in 20 %, and what a floe resists to
-// being turned aside counts (docs/theory.md says how much).
+// across it. Floes have the same law as the towed body: it costs 1 % of a step in 80 % ice and 4 % in 20 %, and what a
+// floe resists to being turned aside counts (docs/theory.md says how much).
 //
 // In time, drag is linearised about the velocities at the start of the step, g = ½ρ C d max(0, −v1·n) dl and ρ C_s A
 // |v1|, and taken at U2:
@@ -37,44 +46,182 @@
 #ifndef BERGTOW_FORCES_H
 #define BERGTOW_FORCES_H
 
+#include <math.h>
+
+#include "bergtow/case.h"
 #include "bergtow/world.h"
+
+enum {
+    BT_MAX_FORCE_LAWS = 24,
+    BT_MAX_FORCE_SERIES = 2 * BT_MAX_FORCE_LAWS,
+    BT_MAX_FORCE_OWN = 8,      ///< numbers of a law's own in a world
+    BT_MAX_STREAMS = 8,        ///< in one load
+};
+
+/// A fluid that flows past the body, with drag ρ C A |v| v over its area and ½ ρ C d v max(0, −v·n) dl along its
+/// outline.
+typedef struct bt_stream {
+    double u, v;               ///< velocity of the fluid, m/s
+    double skin;               ///< ρ C A, kg/m
+    double form;               ///< ½ ρ C d, kg/m²
+} bt_stream;
+
+/// What the laws do to one body in a step. In this order: the rotation about (about_x, about_y), gain, explicit force,
+/// and all that is implicit together.
+typedef struct bt_load {
+    double turn;               ///< rate at which the velocity of the body without added mass turns, rad/s: exact
+    double about_x, about_y;   ///< velocity about which it turns, m/s
+    double gain_x, gain_y;     ///< velocity that the body gains in the step, m/s: forces in proportion to the mass
+    double fx, fy, moment;     ///< explicit force, N, N, N m
+    // Linear force j − K (U, ω), taken at the end of the step: K over (x, y, ω) is {{g, 0, −gy}, {0, g, gx}, {−gy, gx,
+    // gw}}, symmetric and not negative, as of dampers g at the points r: g = Σ g, gx, gy = Σ g r, gw = Σ g r².
+    double g, gx, gy, gw;      ///< kg/s, kg m/s, kg m/s, kg m²/s
+    double jx, jy, jw;         ///< N, N, N m; of dampers: Σ g U_ref, Σ g r×U_ref
+    double yaw;                ///< moment −yaw |ω| ω, kg m²; implicit as the streams
+    int n_streams;
+    bt_stream stream[BT_MAX_STREAMS];
+} bt_load;
+
+/// Drag in a stream. Without room for it the load is no number, and the run ends in this step.
+static inline void bt_load_stream(bt_load *l, double u, double v, double skin, double form)
+{
+    if (l->n_streams < BT_MAX_STREAMS) l->stream[l->n_streams++] = (bt_stream){u, v, skin, form};
+    else l->fx = NAN;
+}
+
+/// A damper g at the centroid that draws the body towards the velocity (u, v).
+static inline void bt_load_damper(bt_load *l, double g, double u, double v)
+{
+    l->g += g;
+    l->jx += g * u;
+    l->jy += g * v;
+}
+
+/// A body as a law sees it: one of the world, or the undisturbed ice of a moving window (step/window.h), a mean floe
+/// that stands nowhere: its place is NaN, so that a law which depends on the place and forgets it is found at once.
+typedef struct bt_force_body {
+    const bt_params *par;      ///< Δt, current, wind of the step
+    const double *own;         ///< numbers of the law
+    const bt_drag *drag;
+    bt_vel vel;                ///< U1, m/s, rad/s
+    double time;               ///< of the middle of the step, s
+    double mass, inertia;      ///< M kg, I kg m²
+    double share;              ///< m/M
+    bool towed;
+    // what few laws need is read from here by the functions below
+    const bt_bodies *all;
+    bt_idx i;
+    const double *towed_at;
+} bt_force_body;
+
+/// of the circle about the outline, m
+static inline double bt_force_radius(const bt_force_body *b) { return b->all->radius[b->i]; }
+static inline double bt_force_area(const bt_force_body *b) { return b->all->area[b->i]; }     ///< m²
+/// of ice, m; 0 = no ice
+static inline double bt_force_thickness(const bt_force_body *b) { return b->all->thickness[b->i]; }
+
+/// Place at the start of the step, m, m, rad; of the towed body x and y are not wrapped.
+static inline bt_pose bt_force_pose(const bt_force_body *b)
+{
+    bt_pose p = b->all->pose[b->i];
+    if (b->towed && !isnan(b->towed_at[0])) p.x = b->towed_at[0], p.y = b->towed_at[1];
+    return p;
+}
+
+/// A key of a law's own: always a real number.
+typedef struct bt_force_key {
+    const char *name;          ///< after the name of the law: the key is NAME.name
+    /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m"; "" = a plain number
+    const char *unit;
+    /// "0 N", "[0, 1e9]" (least and most of a bare number): the law should do nothing by its presets
+    const char *preset, *range;
+    const char *doc;           ///< one sentence
+} bt_force_key;
+
+/// A force law. It has no state: what it does follows from its numbers, the time and the body.
+typedef struct bt_force_law {
+    const char *name;          ///< lower_snake; its series is NAME_force
+    /// one line, "drag of water": the description of the series goes on "on the towed body against the tow direction"
+    const char *doc;
+    const char *part_of;       ///< the law is counted in the series PART_OF_force, too; NULL = in its own alone
+    bool turns_only;           ///< it has a moment and no force: no series of its own
+    bool towed_only;           ///< it acts on the towed body alone: add is not called for others
+    /// [n_keys] own[k] is the value of the k-th; they are read, checked, listed and written as all others
+    const bt_force_key *keys;
+    int n_keys;
+    /// own[] from other keys of the case; own[0..n_keys) are there. NULL = that is all
+    void (*setup)(const bt_case *c, double own[BT_MAX_FORCE_OWN]);
+    /// May a floe rest that drifts with the water: does the law neither move it nor change from step to step? Asked
+    /// once a step. NULL = never, which is right for every law, and costs the time that floes at rest save. Not asked
+    /// of towed_only.
+    bool (*rests)(const bt_params *p, const double *own);
+    void (*add)(const bt_force_body *b, bt_load *l);
+} bt_force_law;
+
+/// in the order in which they add; written by bt_force_register alone
+extern const bt_force_law *bt_force_laws[BT_MAX_FORCE_LAWS];
+extern int bt_n_force_laws;
+
+/// Add a law to the table, for a program that uses the library: before it reads a case or makes a world (a world has
+/// the laws that were there when it was made), and from one thread. On all ranks alike. The law and its texts remain
+/// the caller's and must stay where they are to the end of the program. Not 0 = refused: reason and remedy in err.
+bt_status bt_force_register(const bt_force_law *law, bt_errors *err);
+
+/// A series of forces: of one law, or the sum of those that are part_of it.
+typedef struct bt_force_series {
+    const char *name;          ///< without _force
+    const bt_force_law *law;   ///< NULL = a sum
+    bool part;                 ///< it is counted in a sum, too: what sums up the forces on the body leaves it out
+} bt_force_series;
+
+/// those that are no part first, in the order of the table
+extern bt_force_series bt_force_series_of[BT_MAX_FORCE_SERIES];
+extern int bt_n_force_series, bt_n_force_wholes;                ///< all; those that are no part
+
+/// Index into bt_force_series_of, −1 = none.
+int bt_force_series_find(const char *name);
+
+/// Linear and angular impulse of a step.
+typedef struct bt_impulse { double x, y, turn; } bt_impulse; ///< N s, N s, N m s
+
+/// The laws of a world: their numbers, and what they did to the towed body in the step just solved.
+typedef struct bt_forces {
+    int n;                     ///< laws
+    int n_series;
+    double towed_at[2];        ///< where the towed body stands, not wrapped, m; NaN until the first step
+    double own[BT_MAX_FORCE_LAWS][BT_MAX_FORCE_OWN];
+    /// as really used by the step: what is implicit with U2; their sum with those of contacts and line is M (U2 − U1),
+    /// I (ω2 − ω1)
+    bt_impulse law[BT_MAX_FORCE_LAWS];
+    bt_impulse series[BT_MAX_FORCE_SERIES];
+} bt_forces;
+
+bt_forces *bt_forces_create(void);
+void bt_forces_free(bt_forces *f);
+
+/// The numbers of all laws from a case. Without a case a program sets w->forces->own itself; they are 0 before.
+void bt_forces_setup(bt_world *w, const bt_case *c);
 
 /// Fill vel_start (U1), vel and vel_free (U*) and inv (effective) of every dynamic body. Kinematic and static bodies
 /// keep vel.
 void bt_forces_predict(bt_world *w);
 
-/// External impulses of a step on one body by what they come from.
-typedef struct bt_external {
-    double drag[2], turn;   ///< water and air, N s; their moment, N m s
-    double coriolis[2];     ///< N s: M (R − I) U1, R the rotation by (m/M) f Δt
-    double tilt[2];         ///< N s: −m g ∇η Δt, or in balance with U_b: −M (R − I) U_b; with M dU_w/dt Δt
-} bt_external;
+/// After the solve, before bodies move: w->forces->law and ->series of the towed body.
+void bt_forces_record(bt_world *w);
 
-/// External impulses on body i in the step just solved; of a dynamic body from U1, U* and U2 by the scheme above
-/// (contact impulses do not enter), so that their sum is what the step has used, to rounding; of a kinematic body the
-/// same forces at its prescribed velocity.
-bt_external bt_forces_external(const bt_world *w, bt_idx i);
+/// The impulses on body i in the step just solved, before it has moved, as in bt_forces; of a kinematic body the forces
+/// at its prescribed velocity. law: [BT_MAX_FORCE_LAWS]; series: [BT_MAX_FORCE_SERIES].
+void bt_forces_impulses(const bt_world *w, bt_idx i, bt_impulse *law, bt_impulse *series);
 
-/// What Coriolis and the slope of the sea do in a step to bodies of one share m/M of their own mass.
-typedef struct bt_turning {
-    double share;  ///< m/M
-    double c, s;   ///< of the angle m/M f Δt
-    double vx, vy; ///< velocity that the slope adds, m/s
-} bt_turning;
-bt_turning bt_forces_turning(const bt_params *p, double share);
+/// May floes that drift with the water rest: bt_force_law.rests of all laws.
+bool bt_forces_rest(const bt_world *w);
 
-/// U' = U_b + R (U − U_b) + Δt (−g ∇η): the one place where the law stands, for bodies, the undisturbed ice of a window
-/// and free drift.
-static inline void bt_forces_turn(const bt_params *p, const bt_turning *r, bt_vel *u)
-{
-    if (r->s != 0) {
-        const double x = u->x - p->balance_u, y = u->y - p->balance_v;
-        u->x = p->balance_u + r->c * x - r->s * y;
-        u->y = p->balance_v + r->s * x + r->c * y;
-    }
-    u->x += r->vx;
-    u->y += r->vy;
-}
+/// All that acts on body i at velocity u.
+void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
+
+/// Velocity after a step of the free drift of a body without outline, whose form drag is part of its skin drag.
+/// b: par, time and towed_at are set here.
+bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
 
 /// Drag of one body from its outline, draft and coefficients: multiplied out.
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,

@@ -11,28 +11,32 @@
 
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
-    int threads;              ///< OpenMP threads of each rank, 0 = run.threads of the case, or all cores shared by the ranks
+    /// OpenMP threads of each rank, 0 = run.threads of the case, or all cores shared by the ranks
+    int threads;
     int64_t max_steps;        ///< stop after so many steps of this call, 0 = run the whole duration
     double max_wall;          ///< stop with a checkpoint after this wall time, s; 0 = never
     bool quiet;               ///< no progress, no table (on ranks other than 0: set)
     int64_t dump_step;        ///< write the contact problem of this step, −1 = none
     const char *dump_path;    ///< to this FCLIB file
     const char *command_line; ///< for the provenance
-    volatile sig_atomic_t *told; ///< a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for; or NULL
+    /// a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for;
+    /// or NULL
+    volatile sig_atomic_t *told;
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 
-/// Collective. Run a case. Errors, the same status on all ranks: BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL (a signal at any
-/// rank, the stop file, max_wall, see src/run/halt.h: what was computed is on disk, complete, marked as stopped, and can be taken up
-/// again). The case is the same on all ranks.
+/// Collective. Run a case. Errors, the same status on all ranks: BT_ERR_CASE, BT_ERR_IO, BT_ERR_NUMERIC, BT_ERR_SIGNAL
+/// (a signal at any rank, the stop file, max_wall, see src/run/halt.h: what was computed is on disk, complete, marked
+/// as stopped, and can be taken up again). The case is the same on all ranks.
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err);
 
-/// Collective. Go on with the run in o->dir from its last checkpoint (bergtow/checkpoint.h), or from its case if it was killed before the first. A finished
-/// run is told to be so. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is refused.
+/// Collective. Go on with the run in o->dir from its last checkpoint (bergtow/checkpoint.h), or from its case if it was
+/// killed before the first. A finished run is told to be so. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is
+/// refused.
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
 
-/// OpenMP threads of each rank of comm: as asked (0 = not), else run.threads of the case, else OMP_NUM_THREADS, else the cores of the node, or those that mpirun
-/// has bound this rank to, for the ranks there.
+/// OpenMP threads of each rank of comm: as asked (0 = not), else run.threads of the case, else OMP_NUM_THREADS, else
+/// the cores of the node, or those that mpirun has bound this rank to, for the ranks there.
 int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked);
 
 #endif

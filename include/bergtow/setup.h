@@ -21,8 +21,8 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_r
 
 void bt_roster_free(bt_roster *r);
 
-/// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed body into body, m/s; NaN where
-/// ice.start, the tow or a velocity that is given has it otherwise.
+/// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed
+/// body into body, m/s; NaN where ice.start, the tow or a velocity that is given has it otherwise.
 void bt_setup_drift(const bt_case *c, double size, double thickness, double floe[2], double body[2]);
 
 /// Constants of the step from the case. size: mean floe size, m.

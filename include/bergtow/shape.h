@@ -30,7 +30,8 @@ bt_moments bt_shape_extent(int n, const double *v);
 /// repeated vertices. The text is a static string that completes "... is refused: ".
 const char *bt_shape_fault(int n, const double *v);
 
-/// The same with more patience: true only for what rounding cannot have made of a sound outline that was centred, shrunk or cut.
+/// The same with more patience: true only for what rounding cannot have made of a sound outline that was centred,
+/// shrunk or cut.
 bool bt_shape_broken(int n, const double *v);
 
 /// Move the centroid to the origin, in place; returns what bt_shape_extent found before the move.

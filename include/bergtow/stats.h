@@ -16,7 +16,8 @@ typedef struct bt_mean {
 
 /// A straight line through a series.
 typedef struct bt_trend {
-    double change;      ///< of the line from the first sample to the last, in the unit of the series; NaN when n < BT_TREND_LEAST
+    /// of the line from the first sample to the last, in the contact of the series; NaN when n < BT_TREND_LEAST
+    double change;
     double se;          ///< its standard error with correlation
     double low, high;   ///< the interval that a series without drift leaves in 5 % of all cases
     bool significant;   ///< it does not contain 0
@@ -24,22 +25,26 @@ typedef struct bt_trend {
 
 enum { BT_TREND_LEAST = 12 }; ///< samples below which no trend is looked for
 
-/// Mean, standard error and interval of x[n], spaced evenly. The method and its measured coverage: src/base/stats.c. Linear in n.
+/// Mean, standard error and interval of x[n], spaced evenly. The method and its measured coverage: src/base/stats.c.
+/// Linear in n.
 bt_mean bt_stats_mean(const double *x, int64_t n);
 
-/// Does the mean of x[n] drift? Least squares on batch means, with the correlation of what the line leaves. Linear in n.
+/// Does the mean of x[n] drift? Least squares on batch means, with the correlation of what the line leaves. Linear in
+/// n.
 bt_trend bt_stats_trend(const double *x, int64_t n);
 
 /// Means of the four quarters of x[n]; NaN where a quarter has no sample.
 void bt_stats_quarters(const double *x, int64_t n, double quarter[4]);
 
-/// Steps between the starts of a window that are looked at in n samples: 5, twice that as often as it takes to have at most BT_STATS_STARTS of
-/// them. What needs a sum between any two starts so takes bounded memory, and a start of a long series is put off by n / BT_STATS_STARTS at most.
+/// Steps between the starts of a window that are looked at in n samples: 5, twice that as often as it takes to have at
+/// most BT_STATS_STARTS of them. What needs a sum between any two starts so takes bounded memory, and a start of a long
+/// series is put off by n / BT_STATS_STARTS at most.
 enum { BT_STATS_STARTS = 4096 };
 int64_t bt_stats_start_step(int64_t n);
 
-/// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the variance of the mean of
-/// batches of 5, searched over the first half in steps of bt_stats_start_step(n - first). Returns an index in [first, n/2 or first].
+/// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the
+/// variance of the mean of batches of 5, searched over the first half in steps of bt_stats_start_step(n - first).
+/// Returns an index in [first, n/2 or first].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first);
 
 #endif

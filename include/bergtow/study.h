@@ -16,11 +16,13 @@
 //     samples: 100                         # conditions of the Latin hypercube
 //     repeats: 20                          # fields of each condition
 //     seed: 1
-//     fields: own                          # of each condition; common: the same seeds in all, to compare conditions on the same ice
+//     fields: own                          # of each condition; common: the same seeds in all, to compare conditions on
+//     the same ice
 //     ranks: 1                             # MPI ranks that work on one member
 //
-// A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows from
-// (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later without changing a member.
+// A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
+// from (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later
+// without changing a member.
 #ifndef BERGTOW_STUDY_H
 #define BERGTOW_STUDY_H
 
@@ -81,7 +83,8 @@ typedef struct bt_member {
     char *value[BT_MAX_PARAMETERS]; ///< text of each parameter
 } bt_member;
 
-/// Read and check a study file; every error of the file is appended with file, line, key and remedy. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// Read and check a study file; every error of the file is appended with file, line, key and remedy. Errors:
+/// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
 void bt_study_free(bt_study *s);
 
@@ -91,14 +94,16 @@ static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_condit
 void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
 void bt_member_free(bt_member *m);
 
-/// The case of a member: the base with its overrides; messages name where in the study these stand. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// The case of a member: the base with its overrides; messages name where in the study these stand. Errors:
+/// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err);
 
 /// The base with `set` alone.
 bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
 
-/// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base case resolved. Two
-/// studies with the same text have the same members. Caller frees. NULL with a message when the base cannot be read.
+/// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base
+/// case resolved. Two studies with the same text have the same members. Caller frees. NULL with a message when the base
+/// cannot be read.
 char *bt_study_resolved(const bt_study *s, bt_errors *err);
 
 #endif

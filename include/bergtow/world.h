@@ -4,10 +4,11 @@
 // Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
 // 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
 // path), and a cold part (mass, drag, polygon in its own frame). Each part is an array of its own over the
-// bodies in storage order, which is the order of the tiles (tiles.h): neighbours in space are neighbours in memory. Every
-// reference between bodies is a bt_idx into that order and changes when bodies change their tile; the name of a body
-// that stays is its global id (gid), and every order that the result depends on follows from gids and tiles, never from
-// storage or rank. A rank holds the bodies of its tiles, those of tiles beside them (ghosts), and all large or fixed bodies.
+// bodies in storage order, which is the order of the cells (cells.h): neighbours in space are neighbours in memory.
+// Every reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a
+// body that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never
+// from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large or
+// fixed bodies.
 //
 // Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
 // gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
@@ -27,14 +28,16 @@ typedef enum {
 } bt_motion;
 
 typedef struct bt_vel { double x, y, w, unused; } bt_vel;      ///< m/s, m/s, rad/s
-typedef struct bt_inv { double m, i; } bt_inv;                 ///< 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
+/// 1/(M + Δt K), 1/(I + Δt K_ω), see forces.h; 0 for infinite
+typedef struct bt_inv { double m, i; } bt_inv;
 typedef struct bt_pose { double x, y, yaw, c, s; } bt_pose;    ///< m, m, rad, cos yaw, sin yaw
 
 /// Where a floe of a moving window belongs (window.h).
 typedef struct bt_home {
     double x, y, yaw; ///< pose in the field as made, m, m, rad
     int32_t copy;     ///< which repetition of that place, in lengths of the period along x
-    int32_t lap;      ///< periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    /// periods along x that the body lies above its pose, which is wrapped; counted in every periodic world
+    int32_t lap;
 } bt_home;
 
 /// Drag of one body, coefficients multiplied out (model: quadratic in the relative velocity).
@@ -46,9 +49,10 @@ typedef struct bt_drag {
     double yaw;         ///< (ρ_w C_ws + ρ_a C_as) ∫r³dA, kg m²
 } bt_drag;
 
-/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its own: contacts are found between
-/// parts, and act on the body. Rejected: parts as bodies that follow a parent. Everything that counts, sorts, moves, hashes or writes bodies would
-/// have to tell the two apart; this way only the pair search and the narrow phase know.
+/// A body's vertices are its outline and, when that is not convex, its convex parts after it, each a polygon of its
+/// own: contacts are found between parts, and act on the body. Rejected: parts as bodies that follow a parent.
+/// Everything that counts, sorts, moves, hashes or writes bodies would have to tell the two apart; this way only the
+/// pair search and the narrow phase know.
 typedef struct bt_mark {
     uint8_t count;  ///< at the first vertex of the outline or a part: its number of vertices; 0 elsewhere
     uint8_t corner; ///< vertex of the outline that stands here
@@ -58,7 +62,7 @@ typedef struct bt_mark {
 /// What bt_world_add needs of a body.
 typedef struct bt_body_def {
     bt_motion motion;
-    bool large;             ///< in no tile, on every rank, tested against all floes near its outline
+    bool large;             ///< in no cell, on every rank, tested against all floes near its outline
     int n_vertices;
     const double *vertices; ///< [n_vertices][2] m, anticlockwise, centroid at the origin; convex without parts
     const bt_parts *parts;  ///< of an outline that is not convex (bt_outline_split), or NULL
@@ -79,7 +83,8 @@ typedef struct bt_bodies {
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
     double *outline;      ///< [offset[n]][2] vertices, also those of parts, turned by yaw, relative to the centroid, m
-    double *path;         ///< [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
+    /// [n] length of path travelled through the water's frame by the fastest point of the outline, m (grows only)
+    double *path;
     bt_vel *vel_start;    ///< [n] U1
     bt_vel *vel_free;     ///< [n] U*
     // cold
@@ -96,10 +101,11 @@ typedef struct bt_bodies {
     double *thickness;    ///< [n] of ice, m; 0 = no ice
     bt_drag *drag;        ///< [n]
     uint8_t *motion;      ///< [n] bt_motion
-    uint8_t *large;       ///< [n] 1 = in no tile
-    uint8_t *stirred;     ///< [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set by whoever
-                          ///< changes a pose or velocity by hand
-    int32_t (*tile)[2];   ///< [n] coordinates of its tile, see tiles.h
+    uint8_t *large;       ///< [n] 1 = in no cell
+    /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set
+    /// by whoever changes a pose or velocity by hand
+    uint8_t *disturbed;
+    int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
     bt_home *home;        ///< [n]
     int64_t cap_vertices;
     bt_idx *index_of;     ///< [n_global] position in storage of each gid, −1 = not held on this rank
@@ -112,15 +118,16 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    int64_t max_sweeps;    ///< limit of the work of a step: 3 updates of every unit for each; with plain_sweeps, of sweeps
+    /// limit of the work of a step: 3 updates of every contact for each; with plain_sweeps, of sweeps
+    int64_t max_sweeps;
     bool warm_start;
     bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
-    int64_t inner_sweeps;  ///< times a tile is swept before the next one has its turn
-    double tile;           ///< least side of a tile in mean floe diameters, 0 = the default
+    int64_t inner_sweeps;  ///< times a cell is swept before the next one has its turn
+    double cell;           ///< least side of a cell in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m
-    int64_t position_sweeps; ///< limit of the position projection: updates of every unit; with plain_sweeps, sweeps
+    int64_t position_sweeps; ///< limit of the position projection: updates of every contact; with plain_sweeps, sweeps
     double rest_speed;     ///< approach below this has no restitution, m/s
-    double size;           ///< mean floe diameter, sets tiles and skin, m
+    double size;           ///< mean floe diameter, sets cells and skin, m
     double crush_pressure; ///< pressure at which ice is crushed, Pa; 0 = contacts are rigid (crush.h)
     double crush_least;    ///< least length of a contact / ice thickness
     double raft_line;      ///< line load under which floes raft / thickness², Pa/m; 0 = they do not (raft.h)
@@ -134,7 +141,7 @@ typedef struct bt_params {
     bool tilt_moves_water;       ///< that is dU_w/dt (tilt: dynamic), which acts on the added mass, too
 } bt_params;
 
-struct bt_tiles;
+struct bt_cells;
 struct bt_solver;
 struct bt_tow;
 struct bt_domain;
@@ -142,11 +149,12 @@ struct bt_exchange;
 struct bt_window;
 struct bt_impacts;
 struct bt_environment;
+struct bt_forces;
 
 /// Numbers of the last step.
 typedef struct bt_step_stats {
     int64_t n_points;        ///< contact points handed to the solver
-    int64_t n_active;        ///< floes in tiles that were looked at (the others rest)
+    int64_t n_active;        ///< floes in cells that were looked at (the others rest)
     int64_t sweeps, position_sweeps;
     bool projected;          ///< the position projection came to its end, or there was nothing to do
     int64_t unit_updates;    ///< of contacts by the sweeps
@@ -175,11 +183,12 @@ typedef struct bt_step_stats {
 typedef struct bt_world {
     bt_params par;
     bt_bodies bodies;
-    struct bt_tiles *tiles;
+    struct bt_cells *cells;
     struct bt_solver *solver;
     struct bt_tow *tow;      ///< NULL without towed body
     struct bt_window *window;///< NULL = the domain stands still
     struct bt_environment *environment; ///< current and wind in time (environment.h), NULL = as par says
+    struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
     struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
@@ -194,13 +203,15 @@ typedef struct bt_world {
 bt_world *bt_world_create(const bt_params *p);
 void bt_world_free(bt_world *w);
 
-/// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition is copied.
+/// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
+/// is copied.
 bt_gid bt_world_add(bt_world *w, const bt_body_def *d);
 
 /// Number of vertices of the outline of body i.
 static inline int bt_body_corners(const bt_bodies *b, bt_idx i) { return b->mark[b->offset[i]].count; }
 
-/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline itself, if that is convex.
+/// First of the convex polygons that touch for body i, as its first vertex from the body's first: 0, the outline
+/// itself, if that is convex.
 static inline int bt_part_first(const bt_bodies *b, bt_idx i)
 {
     const int n = bt_body_corners(b, i);

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: MIT
-// How well the tiles of a large field can be cut: a table (CSV on stdout) over tile size, number of parts and floes.
+// How well the cells of a large field can be cut: a table (CSV on stdout) over cell size, number of parts and floes.
 //
-// The field is not packed: floe centres are a square lattice with jitter at the asked concentration, which has the counts
-// and their scatter. Floes of diameter d, spacing s = d √(π / 4 / 0.8), jitter ± 0.3 s in x and y. Contacts are pairs with centres
-// nearer than 1.05 d. Work of a tile = its floes + 2 contact points × its contacts × (wake: 4). A berg of 100 m in the
-// middle takes the floes under it away and joins the tiles that it touches; its wake is 10 berg lengths long and 2 wide.
+// The field is not packed: floe centres are a square lattice with jitter at the asked concentration, which has the
+// counts and their scatter. Floes of diameter d, spacing s = d √(π / 4 / 0.8), jitter ± 0.3 s in x and y. Contacts are
+// pairs with centres nearer than 1.05 d. Work of a cell = its floes + 2 contact points × its contacts × (wake: 4). A
+// berg of 100 m in the middle takes the floes under it away and joins the cells that it touches; its wake is 10 berg
+// lengths long and 2 wide.
 //
-// Tile T = (i, j) solves the contacts within its 2 × 2 block {T, T+x, T+y, T+x+y}; so its owner holds the floes of the
-// other three as ghosts, and the floes of a tile B are held by the owners of {B, B−x, B−y, B−x−y}. Columns:
+// Cell T = (i, j) solves the contacts within its 2 × 2 block {T, T+x, T+y, T+x+y}; so its owner holds the floes of the
+// other three as ghosts, and the floes of a cell B are held by the owners of {B, B−x, B−y, B−x−y}. Columns:
 //   imbalance        heaviest part / mean − 1; metis_imbalance: the same of METIS alone (−1: METIS failed)
-//   phase_imbalance  Σ over the four colours (parity of i, j) of the heaviest part's work in it / mean work of a part − 1:
-//                    if every rank waited for all others after each colour
+//   phase_imbalance  Σ over the four colours (parity of i, j) of the heaviest part's work in it / mean work of a part −
+//                    1: if every rank waited for all others after each colour
 //   halo             ghost floes / own floes of a part, mean over parts and largest
 //   neighbours       parts that hold floes which this part holds too
 //   sent             floe velocities a part sends in one sweep if every floe is touched in each colour it can be:
-//                    own or ghost floes of each tile, times the other parts that hold them
-//   moved            share of the work that changes its part when the berg has moved on by one tile
+//                    own or ghost floes of each cell, times the other parts that hold them
+//   moved            share of the work that changes its part when the berg has moved on by one cell
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +30,7 @@ static const double DIAMETER = 30, CONCENTRATION = 0.8, JITTER = 0.3, REACH = 1.
 static const double POINTS = 2, WAKE = 4;
 
 typedef struct field {
-    int n;           // tiles along one side; tile (i, j) is j n + i
+    int n;           // cells along one side; cell (i, j) is j n + i
     double side;     // m
     int64_t *floes, *contacts; // [n²]
     int64_t *weight, *edge;
@@ -47,7 +48,7 @@ static double uniform(uint64_t i)
     return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
 }
 
-static int tile_of(const field *f, const double x[2])
+static int cell_of(const field *f, const double x[2])
 {
     int c[2];
     for (int k = 0; k < 2; k++) {
@@ -65,7 +66,7 @@ static void count(field *f, int row, double spacing, bool berg)
             x[v][0] = (i + 0.5 + JITTER * (2 * uniform(2 * (uint64_t)v) - 1)) * spacing;
             x[v][1] = (j + 0.5 + JITTER * (2 * uniform(2 * (uint64_t)v + 1) - 1)) * spacing;
             if (berg && hypot(x[v][0] - middle, x[v][1] - middle) < BERG / 2) x[v][0] = -1e9;
-            else f->floes[tile_of(f, x[v])]++;
+            else f->floes[cell_of(f, x[v])]++;
         }
     static const int next[4][2] = {{1, 0}, {-1, 1}, {0, 1}, {1, 1}};
     for (int j = 0, v = 0; j < row; j++)
@@ -75,14 +76,14 @@ static void count(field *f, int row, double spacing, bool berg)
                 if (a < 0 || a >= row || b >= row) continue;
                 int u = b * row + a;
                 if (!(hypot(x[v][0] - x[u][0], x[v][1] - x[u][1]) < REACH * DIAMETER)) continue;
-                int s = tile_of(f, x[v]), t = tile_of(f, x[u]); // the contact belongs to (min i, min j)
+                int s = cell_of(f, x[v]), t = cell_of(f, x[u]); // the contact belongs to (min i, min j)
                 int ti = s % f->n < t % f->n ? s % f->n : t % f->n, tj = s / f->n < t / f->n ? s / f->n : t / f->n;
                 f->contacts[tj * f->n + ti]++;
             }
     free(x);
 }
 
-// Work of the tiles and the group under the berg, which has moved by `steps` tiles in x.
+// Work of the cells and the group under the berg, which has moved by `steps` cells in x.
 static void weigh(field *f, bool berg, int steps)
 {
     double middle[2] = {f->n * f->side / 2 + steps * f->side, f->n * f->side / 2};
@@ -120,7 +121,7 @@ static field field_of(int n_floes, double diameters, bool berg)
                 int a = i + step[k][0], b = j + step[k][1];
                 if (a < 0 || a >= f.n || b < 0 || b >= f.n) continue;
                 f.to[m] = b * f.n + a;
-                f.edge[m++] = f.floes[k < 3 ? t : b * f.n + a]; // the floes of the tile on the plus side become ghosts
+                f.edge[m++] = f.floes[k < 3 ? t : b * f.n + a]; // the floes of the cell on the plus side become ghosts
             }
         }
     f.start[n] = m;
@@ -170,7 +171,8 @@ static halo halo_of(const field *f, int n_parts, const int *part)
     int64_t *pair = bt_alloc(12 * (size_t)n * (size_t)n, sizeof *pair), n_pairs = 0, sum = 0;
     for (int j = 0, b = 0; j < n; j++)
         for (int i = 0; i < n; i++, b++) {
-            int user[4], n_users = 0, holder[4], n_holders = 0; // owners of the blocks that b lies in; the same, each once
+            // owners of the blocks that b lies in; the same, each once
+            int user[4], n_users = 0, holder[4], n_holders = 0;
             for (int k = 0; k < 4; k++)
                 if (i >= (k & 1) && j >= (k >> 1)) user[n_users++] = part[b - (k & 1) - (k >> 1) * n];
             for (int k = 0; k < n_users; k++) {
@@ -219,7 +221,8 @@ static void row(field *f, const char *series, int n_floes, double diameters, boo
     size_t n = (size_t)f->g.n;
     int *part = bt_alloc(n, sizeof *part);
     double metis = -1, start = bt_clock();
-    if (n_parts > 1 && bt_cut_by_metis(&f->g, n_parts, TOLERANCE, part)) metis = bt_cut_measure(&f->g, n_parts, part, NULL).imbalance;
+    if (n_parts > 1 && bt_cut_by_metis(&f->g, n_parts, TOLERANCE, part))
+        metis = bt_cut_measure(&f->g, n_parts, part, NULL).imbalance;
     double metis_time = bt_clock() - start;
     if (n_parts == 1) metis = 0;
     for (size_t v = 0; v < n; v++) part[v] = -1;
@@ -236,17 +239,18 @@ static void row(field *f, const char *series, int n_floes, double diameters, boo
         bt_cut(&f->g, n_parts, TOLERANCE, part, &later);
         weigh(f, berg, 0);
     }
-    printf("%s,%d,%g,%d,%d,%s,%.4f,%.4f,%.4f,%lld,%.4f,%.4f,%.2f,%d,%.1f,%lld,%.4f,%.3f,%.3f\n", series, n_floes, diameters,
-           n_parts, f->g.n, method[q.method], q.imbalance, metis, h.phase_imbalance, (long long)q.cut, h.share_mean, h.share_max,
-           h.neighbours_mean, h.neighbours_max, h.sent_mean, (long long)h.sent_max, (double)later.moved / (double)sum, metis_time,
-           time);
+    printf("%s,%d,%g,%d,%d,%s,%.4f,%.4f,%.4f,%lld,%.4f,%.4f,%.2f,%d,%.1f,%lld,%.4f,%.3f,%.3f\n", series, n_floes,
+           diameters, n_parts, f->g.n, method[q.method], q.imbalance, metis, h.phase_imbalance, (long long)q.cut,
+           h.share_mean, h.share_max, h.neighbours_mean, h.neighbours_max, h.sent_mean, (long long)h.sent_max,
+           (double)later.moved / (double)sum, metis_time, time);
     fflush(stdout);
     free(part);
 }
 
 int main(void)
 {
-    puts("series,floes,tile_diameters,parts,tiles,method,imbalance,metis_imbalance,phase_imbalance,cut,halo_mean,halo_max,"
+    puts("series,floes,tile_diameters,parts,tiles,method,imbalance,metis_imbalance,phase_imbalance,cut,halo_mean,halo_"
+         "max,"
          "neighbours_mean,neighbours_max,sent_mean,sent_max,moved,metis_s,cut_s");
     for (int berg = 0; berg <= 1; berg++)
         for (int diameters = 4; diameters <= 8; diameters += 2) {

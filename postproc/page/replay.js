@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 // The replay of a run within its report: ice field and force curve, from the data that postproc/replay.py embedded.
 //
-// Coordinates. Positions are in metres of the case's frame. On the screen the basin frame has x to the right and y upwards; the geographic
-// frame is a map, y (east) to the right and x (north) upwards. In a periodic domain a floe is drawn at the image nearest to a centre C: the
-// middle of the domain, the towed body when the view follows it, or the middle of the moving window.
+// Coordinates. Positions are in metres of the case's frame. On the screen the basin frame has x to the right and y
+// upwards; the geographic frame is a map, y (east) to the right and x (north) upwards. In a periodic domain a floe is
+// drawn at the image nearest to a centre C: the middle of the domain, the towed body when the view follows it, or the
+// middle of the moving window.
 //
-// Time. The playhead p is a frame number with a fraction. Between two frames positions are interpolated (if asked for); values that are
-// shown, speed and force, are those of the nearest frame. A floe that goes farther between two frames than its speed allows was put
-// elsewhere by a moving window: it is not interpolated.
+// Time. The playhead p is a frame number with a fraction. Between two frames positions are interpolated (if asked for);
+// the values shown, speed and force, are those of the nearest frame. A floe that goes farther between two frames than
+// its speed allows was put elsewhere by a moving window: it is not interpolated.
 //
 // The page puts this file and replay_controls.js into one function, in this order.
 const $ = (id) => document.getElementById(id);
@@ -16,7 +17,10 @@ const head = JSON.parse($("replay-head").textContent);
 const T = head.times.length, N = head.n;
 const canvas = $("replay-field"), chart = $("replay-curve"), slider = $("replay-time"), tip = $("replay-tip");
 const LEVELS = head.colouring[0].table.length;
-const state = {p: 0, playing: false, colour: 0, rate: 1, smooth: true, follow: head.follow, cx: 0, cy: 0, scale: 1, hover: null, last: 0};
+const state = {
+    p: 0, playing: false, rate: 1, last: 0, smooth: true, colour: 0, hover: null,
+    follow: head.follow, cx: 0, cy: 0, scale: 1,
+};
 let data = null;      // decoded arrays
 let scheduled = false;
 
@@ -46,12 +50,18 @@ async function frames(id) {
 
 async function load() {
     if (head.deflate && typeof DecompressionStream === "undefined")
-        throw new Error("this browser cannot unpack the replay (it needs Chromium 80, Firefox 113, Safari 16.4 or later); make the page again with " +
-                        "postproc/report.py RUN --no-compression, which any browser shows");
+        throw new Error("this browser cannot unpack the replay (it needs Chromium 80, Firefox 113, Safari 16.4 or " +
+                        "later); make the page again with postproc/report.py RUN --no-compression, which any browser " +
+                        "shows");
     const [x, y, yaw, speed, force] = await Promise.all(["x", "y", "yaw", "speed", "force"].map(frames));
-    const [vertices, counts, thickness, area, body] = await Promise.all(["vertices", "counts", "thickness", "area", "body_pose"].map(blob));
-    data = {x, y, yaw, speed, force, vertices: new Float32Array(vertices), counts: new Uint16Array(counts), thickness: new Float32Array(thickness),
-            area: new Float32Array(area), body: new Float64Array(body), offset: new Uint32Array(N + 1), radius: new Float32Array(N)};
+    const [vertices, counts, thickness, area, body] =
+        await Promise.all(["vertices", "counts", "thickness", "area", "body_pose"].map(blob));
+    data = {
+        x, y, yaw, speed, force,
+        vertices: new Float32Array(vertices), counts: new Uint16Array(counts), thickness: new Float32Array(thickness),
+        area: new Float32Array(area), body: new Float64Array(body),
+        offset: new Uint32Array(N + 1), radius: new Float32Array(N),
+    };
     for (let i = 0; i < N; i++) {
         data.offset[i + 1] = data.offset[i] + data.counts[i];
         for (let v = data.offset[i]; v < data.offset[i + 1]; v++)
@@ -61,7 +71,11 @@ async function load() {
 
 const clampFrame = (k) => Math.max(0, Math.min(T - 1, k));
 const nearest = () => clampFrame(Math.round(state.p));
-const timeAt = (p) => { const k = Math.min(Math.floor(p), T - 1), w = p - k; return k + 1 < T ? head.times[k] * (1 - w) + head.times[k + 1] * w : head.times[T - 1]; };
+
+function timeAt(p) {
+    const k = Math.min(Math.floor(p), T - 1), w = p - k;
+    return k + 1 < T ? head.times[k] * (1 - w) + head.times[k + 1] * w : head.times[T - 1];
+}
 
 function frameAt(time) {  // playhead of a time
     let low = 0, high = T - 1;
@@ -86,16 +100,19 @@ function floePose(i, p) {
     const k = Math.min(Math.floor(p), T - 1), a = k * N + i, w = p - k;
     const pose = [x0 + dx * data.x[a], y0 + dy * data.y[a], dyaw * data.yaw[a]];
     if (!w || k + 1 >= T) return pose;
-    const b = a + N, ux = image(x0 + dx * data.x[b] - pose[0], head.period[0]), uy = image(y0 + dy * data.y[b] - pose[1], head.period[1]);
-    const reach = 2 * (value("speed", k, i) + value("speed", k + 1, i)) * (head.times[k + 1] - head.times[k]) + 2 * data.radius[i];
-    if (Math.hypot(ux, uy) > reach) return w < 0.5 ? pose : [x0 + dx * data.x[b], y0 + dy * data.y[b], dyaw * data.yaw[b]];
+    const b = a + N, x = x0 + dx * data.x[b], y = y0 + dy * data.y[b];
+    const ux = image(x - pose[0], head.period[0]), uy = image(y - pose[1], head.period[1]);
+    const between = head.times[k + 1] - head.times[k];
+    const reach = 2 * (value("speed", k, i) + value("speed", k + 1, i)) * between + 2 * data.radius[i];
+    if (Math.hypot(ux, uy) > reach) return w < 0.5 ? pose : [x, y, dyaw * data.yaw[b]];
     let turn = (data.yaw[b] - data.yaw[a]) & 65535;
     if (turn > 32767) turn -= 65536;
     return [pose[0] + w * ux, pose[1] + w * uy, pose[2] + w * dyaw * turn];
 }
 
 function bodyPose(b, p) {
-    const k = Math.min(Math.floor(p), T - 1), w = p - k, B = head.bodies.length, a = 3 * (k * B + b), c = k + 1 < T ? a + 3 * B : a;
+    const k = Math.min(Math.floor(p), T - 1), w = p - k, B = head.bodies.length;
+    const a = 3 * (k * B + b), c = k + 1 < T ? a + 3 * B : a;
     return [0, 1, 2].map((j) => data.body[a + j] * (1 - w) + data.body[c + j] * w);
 }
 
@@ -149,7 +166,8 @@ function look(x0, x1, y0, y1, margin) {
 // The whole domain, or the neighbourhood of the body that the view follows, as far as a moving window reaches.
 function fit() {
     const C = centre(state.p), [x0, x1, y0, y1] = head.box, half = (x1 - x0) / 2;
-    if (!state.follow || !head.view) return look(C[0] - half, C[0] + half, C[1] - (y1 - y0) / 2, C[1] + (y1 - y0) / 2, 0.96);
+    if (!state.follow || !head.view)
+        return look(C[0] - half, C[0] + half, C[1] - (y1 - y0) / 2, C[1] + (y1 - y0) / 2, 0.96);
     const view = head.view.slice(), ahead = C[0] - bodyPose(head.towed, state.p)[0];
     if (moving) {
         view[0] = Math.max(view[0], ahead - half);
@@ -204,7 +222,8 @@ function path(g, outline, pose, o) {
 
 // Floes that are in view, as [floe, x, y, yaw] one after the other, sorted into levels of colour.
 function visible(p, C, o) {
-    const bins = Array.from({length: LEVELS}, () => []), colouring = head.colouring[state.colour], frame = nearest(), [Px, Py] = head.period;
+    const bins = Array.from({length: LEVELS}, () => []), colouring = head.colouring[state.colour];
+    const frame = nearest(), [Px, Py] = head.period;
     const low = toWorld(0, canvas.height, o), high = toWorld(canvas.width, 0, o);
     const see = (x, y, r) => x + r > low[0] && x - r < high[0] && y + r > low[1] && y - r < high[1];
     for (let i = 0; i < N; i++) {
@@ -212,7 +231,8 @@ function visible(p, C, o) {
         const x = C[0] + image(pose[0] - C[0], Px), y = C[1] + image(pose[1] - C[1], Py);
         const bin = bins[level(colouring, value(colouring.kind, frame, i))];
         // Images of floes that reach over the edge.
-        const kx = Px > 0 && Math.abs(x - C[0]) + r > Px / 2 ? [0, x > C[0] ? -Px : Px] : [0], ky = Py > 0 && Math.abs(y - C[1]) + r > Py / 2 ? [0, y > C[1] ? -Py : Py] : [0];
+        const kx = Px > 0 && Math.abs(x - C[0]) + r > Px / 2 ? [0, x > C[0] ? -Px : Px] : [0];
+        const ky = Py > 0 && Math.abs(y - C[1]) + r > Py / 2 ? [0, y > C[1] ? -Py : Py] : [0];
         for (const ax of kx) for (const ay of ky) if (see(x + ax, y + ay, r)) bin.push(i, x + ax, y + ay, pose[2]);
     }
     return bins;
@@ -220,7 +240,8 @@ function visible(p, C, o) {
 
 function drawFloes(g, p, C, o) {
     const table = head.colouring[state.colour].table, bins = visible(p, C, o), turn = head.geographic, s = state.scale;
-    const halfW = canvas.width / 2 - state.cx * s, halfH = canvas.height / 2 + state.cy * s, size = N ? Math.sqrt(data.area[0]) * s : 0;
+    const halfW = canvas.width / 2 - state.cx * s, halfH = canvas.height / 2 + state.cy * s;
+    const size = N ? Math.sqrt(data.area[0]) * s : 0;
     g.strokeStyle = head.style.water;
     g.lineWidth = Math.max(0.3, Math.min(1.2, 0.035 * size));
     bins.forEach((bin, k) => {
@@ -236,7 +257,8 @@ function drawFloes(g, p, C, o) {
             }
             const c = Math.cos(bin[j + 3]), d = Math.sin(bin[j + 3]), first = data.offset[i], end = data.offset[i + 1];
             for (let v = first; v < end; v++) {
-                const vx = data.vertices[2 * v], vy = data.vertices[2 * v + 1], wx = x + c * vx - d * vy, wy = y + d * vx + c * vy;
+                const vx = data.vertices[2 * v], vy = data.vertices[2 * v + 1];
+                const wx = x + c * vx - d * vy, wy = y + d * vx + c * vy;
                 const sx = halfW + (turn ? wy : wx) * s, sy = halfH - (turn ? wx : wy) * s;
                 if (v === first) g.moveTo(sx, sy); else g.lineTo(sx, sy);
             }
@@ -260,16 +282,19 @@ function drawFloes(g, p, C, o) {
 
 function outlineOf(i) {
     const out = [];
-    for (let v = data.offset[i]; v < data.offset[i + 1]; v++) out.push([data.vertices[2 * v], data.vertices[2 * v + 1]]);
+    for (let v = data.offset[i]; v < data.offset[i + 1]; v++)
+        out.push([data.vertices[2 * v], data.vertices[2 * v + 1]]);
     return out;
 }
 
 // The domain's water; edges that are open or periodic are dashed.
 function drawWater(g, C, o) {
     const [x0, x1, y0, y1] = head.box, [Px, Py] = head.period;
-    const shiftX = moving || (Px > 0 && state.follow) ? C[0] - (x0 + x1) / 2 : 0, shiftY = Py > 0 && state.follow ? C[1] - (y0 + y1) / 2 : 0;
+    const shiftX = moving || (Px > 0 && state.follow) ? C[0] - (x0 + x1) / 2 : 0;
+    const shiftY = Py > 0 && state.follow ? C[1] - (y0 + y1) / 2 : 0;
     const a = toScreen(x0 + shiftX, y0 + shiftY, o), b = toScreen(x1 + shiftX, y1 + shiftY, o);
-    const left = Math.min(a[0], b[0]), top = Math.min(a[1], b[1]), w = Math.abs(b[0] - a[0]), h = Math.abs(b[1] - a[1]);
+    const left = Math.min(a[0], b[0]), top = Math.min(a[1], b[1]);
+    const w = Math.abs(b[0] - a[0]), h = Math.abs(b[1] - a[1]);
     g.fillStyle = head.style.water;
     g.fillRect(left, top, w, h);
     return [left, top, w, h];
@@ -277,7 +302,8 @@ function drawWater(g, C, o) {
 
 function drawEdges(g, rect) {
     const soft = (kind) => kind === "open" || kind === "periodic" || kind === "moving", [left, top, w, h] = rect;
-    const ends = soft(head.edges[0]), sides = soft(head.edges[1]), vertical = head.geographic ? sides : ends, horizontal = head.geographic ? ends : sides;
+    const ends = soft(head.edges[0]), sides = soft(head.edges[1]);
+    const vertical = head.geographic ? sides : ends, horizontal = head.geographic ? ends : sides;
     g.strokeStyle = "#8a949e";
     g.lineWidth = 1;
     g.setLineDash([5, 4]);
@@ -297,8 +323,10 @@ function drawTrack(g, p, C, o) {
     g.beginPath();
     let before = null;
     for (let k = 0; k < time.length && time[k] <= now; k++) {
-        const at = free ? [x[k], y[k]] : [C[0] + image(x[k] - C[0], head.period[0]), C[1] + image(y[k] - C[1], head.period[1])];
-        const jump = before && (Math.abs(at[0] - before[0]) > (head.box[1] - head.box[0]) / 2 || Math.abs(at[1] - before[1]) > (head.box[3] - head.box[2]) / 2);
+        const at = free ? [x[k], y[k]]
+            : [C[0] + image(x[k] - C[0], head.period[0]), C[1] + image(y[k] - C[1], head.period[1])];
+        const jump = before && (Math.abs(at[0] - before[0]) > (head.box[1] - head.box[0]) / 2 ||
+                                Math.abs(at[1] - before[1]) > (head.box[3] - head.box[2]) / 2);
         g[before && !jump ? "lineTo" : "moveTo"](...toScreen(...at, o));
         before = at;
     }
@@ -307,15 +335,17 @@ function drawTrack(g, p, C, o) {
 }
 
 function drawBodies(g, p, C, o) {
-    const shifts = (period, c, at) => period > 0 && (state.follow || moving) ? [-1, 0, 1].map((k) => period * (Math.round((c - at) / period) + k)) : [0];
+    const shifts = (period, c, at) => period > 0 && (state.follow || moving)
+        ? [-1, 0, 1].map((k) => period * (Math.round((c - at) / period) + k)) : [0];
     head.bodies.forEach((body, b) => {
         if (body.towed) return;
         const pose = bodyPose(b, p);
         g.fillStyle = body.wall ? head.style.wall : head.style.fixed;
-        for (const ax of shifts(head.period[0], C[0], pose[0])) for (const ay of shifts(head.period[1], C[1], pose[1])) {
-            path(g, body.vertices, [pose[0] + ax, pose[1] + ay, pose[2]], o);
-            g.fill();
-        }
+        for (const ax of shifts(head.period[0], C[0], pose[0]))
+            for (const ay of shifts(head.period[1], C[1], pose[1])) {
+                path(g, body.vertices, [pose[0] + ax, pose[1] + ay, pose[2]], o);
+                g.fill();
+            }
     });
     if (head.towed === null) return;
     const pose = towedPose(p, C);
@@ -333,7 +363,9 @@ function drawBodies(g, p, C, o) {
 function drawLine(g, p, pose, o) {
     if (!head.line) return;
     const k = Math.min(Math.floor(p), T - 1), a = head.line[k], b = head.line[Math.min(k + 1, T - 1)], w = p - k;
-    const same = a.length === b.length, at = a.map((q, j) => toScreen(pose[0] + (same ? q[0] * (1 - w) + b[j][0] * w : q[0]), pose[1] + (same ? q[1] * (1 - w) + b[j][1] * w : q[1]), o));
+    const same = a.length === b.length;
+    const offset = (q, j, axis) => same ? q[axis] * (1 - w) + b[j][axis] * w : q[axis];
+    const at = a.map((q, j) => toScreen(pose[0] + offset(q, j, 0), pose[1] + offset(q, j, 1), o));
     const end = at.length === 1 ? at[0] : at[1];
     for (const [width, colour] of [[4, "#ffffff"], [1.8, head.style.body_edge]]) {
         g.strokeStyle = colour;
@@ -347,7 +379,8 @@ function drawLine(g, p, pose, o) {
     g.beginPath();
     if (head.vessel && at.length > 1) {
         const d = Math.atan2(end[1] - at[0][1], end[0] - at[0][0]), c = Math.cos(d), s = Math.sin(d);
-        for (const [x, y] of [[-2, -5], [12, -5], [20, 0], [12, 5], [-2, 5]]) g.lineTo(end[0] + c * x - s * y, end[1] + s * x + c * y);
+        for (const [x, y] of [[-2, -5], [12, -5], [20, 0], [12, 5], [-2, 5]])
+            g.lineTo(end[0] + c * x - s * y, end[1] + s * x + c * y);
     } else g.rect(end[0] - 4, end[1] - 4, 8, 8);
     g.closePath();
     g.fill();
@@ -355,8 +388,10 @@ function drawLine(g, p, pose, o) {
 }
 
 function drawArrow(g, pose, o) {
-    const [hx, hy] = head.heading, from = toScreen(pose[0] + 0.6 * head.size * hx, pose[1] + 0.6 * head.size * hy, o), to = toScreen(pose[0] + 1.2 * head.size * hx, pose[1] + 1.2 * head.size * hy, o);
-    const d = Math.atan2(to[1] - from[1], to[0] - from[0]), length = Math.max(16, Math.hypot(to[0] - from[0], to[1] - from[1])), c = Math.cos(d), s = Math.sin(d);
+    const [hx, hy] = head.heading;
+    const ahead = (sizes) => toScreen(pose[0] + sizes * head.size * hx, pose[1] + sizes * head.size * hy, o);
+    const from = ahead(0.6), to = ahead(1.2), length = Math.max(16, Math.hypot(to[0] - from[0], to[1] - from[1]));
+    const d = Math.atan2(to[1] - from[1], to[0] - from[0]), c = Math.cos(d), s = Math.sin(d);
     g.beginPath();
     for (const [x, y] of [[0, -0.08], [0.58, -0.08], [0.52, -0.26], [1, 0], [0.52, 0.26], [0.58, 0.08], [0, 0.08]])
         g.lineTo(from[0] + length * (c * x - s * y), from[1] + length * (s * x + c * y));
@@ -370,8 +405,10 @@ function drawArrow(g, pose, o) {
 
 // A bar of a round length; on a map, where north is.
 function drawScale(g) {
-    const ratio = window.devicePixelRatio || 1, wish = 110 * ratio / state.scale, power = Math.pow(10, Math.floor(Math.log10(wish)));
-    const length = [5, 2, 1].map((k) => k * power).find((v) => v <= wish), px = length * state.scale, x = 14 * ratio, y = canvas.height - 14 * ratio;
+    const ratio = window.devicePixelRatio || 1, wish = 110 * ratio / state.scale;
+    const power = Math.pow(10, Math.floor(Math.log10(wish)));
+    const length = [5, 2, 1].map((k) => k * power).find((v) => v <= wish), px = length * state.scale;
+    const x = 14 * ratio, y = canvas.height - 14 * ratio;
     g.fillStyle = "rgba(255,255,255,0.85)";
     g.fillRect(x - 6 * ratio, y - 20 * ratio, px + 12 * ratio, 26 * ratio);
     g.fillStyle = g.strokeStyle = "#1d2733";

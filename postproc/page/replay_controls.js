@@ -8,16 +8,22 @@ const margin = {left: 64, right: 14, top: 18, bottom: 34};
 
 // Round numbers that cut [low, high] into about n pieces.
 function ticks(low, high, n) {
-    const raw = (high - low) / n, power = Math.pow(10, Math.floor(Math.log10(raw))), step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw), out = [];
+    const raw = (high - low) / n, power = Math.pow(10, Math.floor(Math.log10(raw)));
+    const step = [1, 2, 5, 10].map((k) => k * power).find((s) => s >= raw), out = [];
     for (let k = Math.ceil(low / step); k * step <= high * (1 + 1e-9); k++) out.push(+(k * step).toPrecision(12));
     return out;
 }
 
-// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named, not drawn.
+// Limits of the force axis: the running mean of the ice, the other forces of the steady window; what is above is named,
+// not drawn.
 function forceRange() {
-    const largest = (values, from) => values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0), steady = curve.window ? curve.window[0] : curve.start;
-    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start))), lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
-    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0), ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
+    const largest = (values, from) =>
+        values.reduce((top, v, k) => v !== null && curve.time[k] >= from ? Math.max(top, v) : top, 0);
+    const steady = curve.window ? curve.window[0] : curve.start;
+    const highest = Math.max(...curve.lines.map((l) => largest(l.high, curve.start)));
+    const lowest = Math.min(0, ...curve.lines.flatMap((l) => l.low));
+    const wish = Math.max(2.5 * largest(curve.lines[0].smooth, curve.start), 1.5 * (curve.mean || 0),
+                          ...curve.lines.slice(1).map((l) => 1.25 * largest(l.smooth, steady)));
     const top = Math.min(wish, highest) || highest || 1;
     const single = largest(curve.lines[0].high, curve.start);
     return {low: Math.max(lowest, -0.3 * top), high: 1.04 * top, beyond: single > 1.05 * top ? single : null};
@@ -27,9 +33,13 @@ const range = curve ? forceRange() : null;
 const prefix = range && range.high >= 2e6 ? [1e6, "M"] : range && range.high >= 2e3 ? [1e3, "k"] : [1, ""];
 
 const chartScale = (ratio) => {
-    const left = margin.left * ratio, right = chart.width - margin.right * ratio, top = margin.top * ratio, bottom = chart.height - margin.bottom * ratio;
-    return {left, right, top, bottom, x: (t) => left + (right - left) * (t - curve.start) / (curve.end - curve.start),
-            y: (f) => bottom - (bottom - top) * (f - range.low) / (range.high - range.low)};
+    const left = margin.left * ratio, right = chart.width - margin.right * ratio;
+    const top = margin.top * ratio, bottom = chart.height - margin.bottom * ratio;
+    return {
+        left, right, top, bottom,
+        x: (t) => left + (right - left) * (t - curve.start) / (curve.end - curve.start),
+        y: (f) => bottom - (bottom - top) * (f - range.low) / (range.high - range.low),
+    };
 };
 
 function axes(g, s, ink, faint, ratio) {
@@ -48,7 +58,8 @@ function axes(g, s, ink, faint, ratio) {
     }
     g.textAlign = "center";
     g.textBaseline = "top";
-    for (const t of ticks(curve.start, curve.end, Math.max(3, (s.right - s.left) / ratio / 110))) g.fillText(t, s.x(t), s.bottom + 5 * ratio);
+    for (const t of ticks(curve.start, curve.end, Math.max(3, (s.right - s.left) / ratio / 110)))
+        g.fillText(t, s.x(t), s.bottom + 5 * ratio);
     g.fillText("time (s)", (s.left + s.right) / 2, s.bottom + 19 * ratio);
     g.save();
     g.translate(11 * ratio, (s.top + s.bottom) / 2);
@@ -88,7 +99,8 @@ function mean(g, s, line, ratio) {
 
 function drawChart() {
     if (!curve) return;
-    const g = chart.getContext("2d"), look = getComputedStyle(root), colour = (name) => look.getPropertyValue(name).trim(), ratio = window.devicePixelRatio || 1, s = chartScale(ratio);
+    const g = chart.getContext("2d"), ratio = window.devicePixelRatio || 1, s = chartScale(ratio);
+    const look = getComputedStyle(root), colour = (name) => look.getPropertyValue(name).trim();
     g.clearRect(0, 0, chart.width, chart.height);
     if (curve.window) {
         g.fillStyle = colour("--shade");
@@ -116,7 +128,8 @@ function drawChart() {
         g.fillStyle = colour("--faint");
         g.textAlign = "right";
         g.textBaseline = "top";
-        g.fillText(`${curve.lines[0].label}: single samples up to ${quantity(range.beyond, curve.lines[0].unit)}`, s.right, s.top - 11 * ratio);
+        const {label, unit} = curve.lines[0];
+        g.fillText(`${label}: single samples up to ${quantity(range.beyond, unit)}`, s.right, s.top - 11 * ratio);
     }
     for (const e of curve.events) {
         g.fillStyle = colour("--warn");
@@ -141,13 +154,15 @@ function reading(time) {
     if (!curve) return "";
     let k = curve.time.findIndex((t) => t >= time);
     if (k < 0) k = curve.time.length - 1;
-    return `at ${+time.toPrecision(5)} s, running means: ` + curve.lines.map((l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`).join(", ");
+    const said = (l) => `${l.label} ${l.smooth[k] === null ? "–" : quantity(l.smooth[k], l.unit)}`;
+    return `at ${+time.toPrecision(5)} s, running means: ` + curve.lines.map(said).join(", ");
 }
 
 // ---- words
 
 function quantity(v, unit) {
-    const a = Math.abs(v), [f, p] = unit === "N" || unit === "J" ? (a >= 2e9 ? [1e9, "G"] : a >= 2e6 ? [1e6, "M"] : a >= 2e3 ? [1e3, "k"] : [1, ""]) : [1, ""];
+    const a = unit === "N" || unit === "J" ? Math.abs(v) : 0;
+    const [f, p] = a >= 2e9 ? [1e9, "G"] : a >= 2e6 ? [1e6, "M"] : a >= 2e3 ? [1e3, "k"] : [1, ""];
     return `${+(v / f).toPrecision(3)} ${p}${unit}`;
 }
 
@@ -206,9 +221,12 @@ function tick(now) {
 
 // Rates, simulated seconds a second: the whole run in some 20 s, and round multiples of that.
 function rates() {
-    const whole = (head.times[T - 1] - head.times[0]) / 20 || 1, power = Math.pow(10, Math.floor(Math.log10(whole))), base = [1, 2, 5, 10].map((k) => k * power).reduce((a, b) => Math.abs(a - whole) < Math.abs(b - whole) ? a : b);
+    const whole = (head.times[T - 1] - head.times[0]) / 20 || 1, power = Math.pow(10, Math.floor(Math.log10(whole)));
+    const nearer = (a, b) => Math.abs(a - whole) < Math.abs(b - whole) ? a : b;
+    const base = [1, 2, 5, 10].map((k) => k * power).reduce(nearer);
     const select = $("replay-rate");
-    for (const k of [0.1, 0.2, 0.5, 1, 2, 5]) select.append(new Option(`${+(base * k).toPrecision(2)} × real time`, base * k, k === 1, k === 1));
+    for (const k of [0.1, 0.2, 0.5, 1, 2, 5])
+        select.append(new Option(`${+(base * k).toPrecision(2)} × real time`, base * k, k === 1, k === 1));
     state.rate = base;
     select.onchange = () => { state.rate = +select.value; };
 }
@@ -216,17 +234,21 @@ function rates() {
 // ---- pointer
 
 function inside(i, x, y, pose) {
-    const c = Math.cos(pose[2]), s = Math.sin(pose[2]), dx = x - pose[0], dy = y - pose[1], lx = c * dx + s * dy, ly = c * dy - s * dx, o = outlineOf(i);
+    const c = Math.cos(pose[2]), s = Math.sin(pose[2]), dx = x - pose[0], dy = y - pose[1];
+    const lx = c * dx + s * dy, ly = c * dy - s * dx, o = outlineOf(i);
     let odd = false;
-    for (let a = 0, b = o.length - 1; a < o.length; b = a++)
-        if ((o[a][1] > ly) !== (o[b][1] > ly) && lx < (o[b][0] - o[a][0]) * (ly - o[a][1]) / (o[b][1] - o[a][1]) + o[a][0]) odd = !odd;
+    for (let a = 0, b = o.length - 1; a < o.length; b = a++) {
+        if ((o[a][1] > ly) === (o[b][1] > ly)) continue;
+        if (lx < (o[b][0] - o[a][0]) * (ly - o[a][1]) / (o[b][1] - o[a][1]) + o[a][0]) odd = !odd;
+    }
     return odd;
 }
 
 function floeAt(sx, sy) {
     const p = playhead(), C = centre(p), [x, y] = toWorld(sx, sy, origin(p));
     for (let i = 0; i < N; i++) {
-        const pose = floePose(i, p), dx = image(x - pose[0], head.period[0]), dy = image(y - pose[1], head.period[1]);
+        const pose = floePose(i, p);
+        const dx = image(x - pose[0], head.period[0]), dy = image(y - pose[1], head.period[1]);
         if (Math.hypot(dx, dy) <= data.radius[i] && inside(i, pose[0] + dx, pose[1] + dy, pose)) return i;
     }
     return -1;
@@ -235,10 +257,12 @@ function floeAt(sx, sy) {
 const idOf = (i) => head.ids ? head.ids[i] : i;
 
 function describe(i) {
-    const k = nearest(), pose = floePose(i, k);
-    return [`floe ${idOf(i)}`, `speed ${quantity(value("speed", k, i), "m/s")}`, `largest contact force ${quantity(value("force", k, i), "N")}`,
+    const k = nearest(), pose = floePose(i, k), where = head.period[0] || head.period[1] ? " (within the domain)" : "";
+    return [`floe ${idOf(i)}`,
+            `speed ${quantity(value("speed", k, i), "m/s")}`,
+            `largest contact force ${quantity(value("force", k, i), "N")}`,
             `thickness ${quantity(data.thickness[i], "m")}, area ${quantity(data.area[i], "m²")}`,
-            `x ${pose[0].toFixed(1)} m, y ${pose[1].toFixed(1)} m${head.period[0] || head.period[1] ? " (within the domain)" : ""}`,
+            `x ${pose[0].toFixed(1)} m, y ${pose[1].toFixed(1)} m${where}`,
             `values of the frame at ${+head.times[k].toPrecision(6)} s`];
 }
 
@@ -253,19 +277,31 @@ function hover(event) {
     tip.textContent = describe(i).join("\n");
     const x = event.clientX - box.left, y = event.clientY - box.top;
     tip.style.left = `${Math.min(x + 14, Math.max(0, canvas.clientWidth - tip.offsetWidth - 4))}px`;
-    tip.style.top = `${y + tip.offsetHeight + 24 > canvas.clientHeight ? Math.max(0, y - tip.offsetHeight - 12) : y + 16}px`;
+    const high = tip.offsetHeight, above = y + high + 24 > canvas.clientHeight;
+    tip.style.top = `${above ? Math.max(0, y - high - 12) : y + 16}px`;
 }
 
 function pointers() {
     const held = new Map();
-    const at = (event) => { const box = canvas.getBoundingClientRect(), ratio = canvas.width / canvas.clientWidth; return [(event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio]; };
+    const at = (event) => {
+        const box = canvas.getBoundingClientRect(), ratio = canvas.width / canvas.clientWidth;
+        return [(event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio];
+    };
     const spread = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]); };
-    canvas.onpointerdown = (event) => { held.set(event.pointerId, at(event)); canvas.setPointerCapture(event.pointerId); hideTip(); };
+    canvas.onpointerdown = (event) => {
+        held.set(event.pointerId, at(event));
+        canvas.setPointerCapture(event.pointerId);
+        hideTip();
+    };
     canvas.onpointermove = (event) => {
         if (!held.has(event.pointerId)) { if (!state.playing) hover(event); return; }
         const before = held.get(event.pointerId), now = at(event), old = held.size === 2 ? spread() : 0;
         held.set(event.pointerId, now);
-        if (held.size === 2) { const [a, b] = [...held.values()]; zoom(spread() / (old || 1), (a[0] + b[0]) / 2, (a[1] + b[1]) / 2); return; }
+        if (held.size === 2) {
+            const [a, b] = [...held.values()];
+            zoom(spread() / (old || 1), (a[0] + b[0]) / 2, (a[1] + b[1]) / 2);
+            return;
+        }
         state.cx -= (now[0] - before[0]) / state.scale;
         state.cy += (now[1] - before[1]) / state.scale;
         draw();
@@ -280,8 +316,9 @@ function pointers() {
     }, {passive: false});
     if (!curve) return;
     const jump = (event) => {
-        const box = chart.getBoundingClientRect(), ratio = chart.width / chart.clientWidth, s = chartScale(window.devicePixelRatio || 1);
-        seek(frameAt(curve.start + (curve.end - curve.start) * ((event.clientX - box.left) * ratio - s.left) / (s.right - s.left)));
+        const box = chart.getBoundingClientRect(), ratio = chart.width / chart.clientWidth;
+        const s = chartScale(window.devicePixelRatio || 1), across = (event.clientX - box.left) * ratio - s.left;
+        seek(frameAt(curve.start + (curve.end - curve.start) * across / (s.right - s.left)));
     };
     chart.onpointerdown = (event) => { chart.setPointerCapture(event.pointerId); jump(event); };
     chart.onpointermove = (event) => { if (event.buttons) jump(event); };
@@ -298,8 +335,19 @@ function colourBy(k) {
 
 const middle = (factor) => zoom(factor, canvas.width / 2, canvas.height / 2);
 const step = (n) => { play(false); seek((n > 0 ? Math.floor(state.p + 1e-9) : Math.ceil(state.p - 1e-9)) + n); };
-const keys = {" ": () => play(!state.playing), ArrowRight: (e) => step(e.shiftKey ? 10 : 1), ArrowLeft: (e) => step(e.shiftKey ? -10 : -1), Home: () => seek(0), End: () => seek(T - 1),
-              "+": () => middle(1.3), "=": () => middle(1.3), "-": () => middle(1 / 1.3), f: () => { fit(); draw(); }, b: () => setFollow(!state.follow), c: () => colourBy(state.colour + 1)};
+const keys = {
+    " ": () => play(!state.playing),
+    ArrowRight: (e) => step(e.shiftKey ? 10 : 1),
+    ArrowLeft: (e) => step(e.shiftKey ? -10 : -1),
+    Home: () => seek(0),
+    End: () => seek(T - 1),
+    "+": () => middle(1.3),
+    "=": () => middle(1.3),
+    "-": () => middle(1 / 1.3),
+    f: () => { fit(); draw(); },
+    b: () => setFollow(!state.follow),
+    c: () => colourBy(state.colour + 1),
+};
 
 function controls() {
     slider.max = T - 1;
@@ -317,8 +365,9 @@ function controls() {
     follow.disabled = head.towed === null;
     follow.onchange = () => setFollow(follow.checked);
     root.addEventListener("keydown", (event) => {
-        const own = ["INPUT", "SELECT", "BUTTON"].includes(event.target.tagName);
-        if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key] || (own && (event.target.tagName === "SELECT" || event.target.type === "range" || event.key === " "))) return;
+        const {tagName, type} = event.target, own = ["INPUT", "SELECT", "BUTTON"].includes(tagName);
+        if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
+        if (own && (tagName === "SELECT" || type === "range" || event.key === " ")) return;
         event.preventDefault();
         keys[event.key](event);
     });
@@ -339,15 +388,31 @@ const css = (at) => at.map((v) => v * canvas.clientWidth / canvas.width);
 
 // What the page's own controls do, for scripts (and the tests): frame numbers from 0, SI units.
 window.bergtow = {
-    get ready() { return data !== null; }, get frames() { return T; }, get floes() { return N; }, get playhead() { return state.p; }, get time() { return timeAt(state.p); },
-    get playing() { return state.playing; }, get colour() { return head.colouring[state.colour].kind; }, get follow() { return state.follow; },
-    seek, play: () => play(true), pause: () => play(false), fit: () => { fit(); draw(); }, id: idOf,
-    pose: (i) => floePose(i, playhead()), value: (kind, i) => value(kind, nearest(), i), body: (b) => bodyPose(b, playhead()),
+    get ready() { return data !== null; },
+    get frames() { return T; },
+    get floes() { return N; },
+    get playhead() { return state.p; },
+    get time() { return timeAt(state.p); },
+    get playing() { return state.playing; },
+    get colour() { return head.colouring[state.colour].kind; },
+    get follow() { return state.follow; },
+    seek,
+    play: () => play(true),
+    pause: () => play(false),
+    fit: () => { fit(); draw(); },
+    id: idOf,
+    pose: (i) => floePose(i, playhead()),
+    value: (kind, i) => value(kind, nearest(), i),
+    body: (b) => bodyPose(b, playhead()),
     screen: (i) => {  // where floe i is drawn, CSS pixels from the canvas's corner
         const p = playhead(), C = centre(p), pose = floePose(i, p);
-        return css(toScreen(C[0] + image(pose[0] - C[0], head.period[0]), C[1] + image(pose[1] - C[1], head.period[1]), origin(p)));
+        const x = C[0] + image(pose[0] - C[0], head.period[0]), y = C[1] + image(pose[1] - C[1], head.period[1]);
+        return css(toScreen(x, y, origin(p)));
     },
-    towed: () => { const p = playhead(); return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p))); },  // the same of the towed body
+    towed: () => {  // the same of the towed body
+        const p = playhead();
+        return css(toScreen(...towedPose(p, centre(p)).slice(0, 2), origin(p)));
+    },
     get metre() { return css([state.scale, 0])[0]; },  // CSS pixels
 };
 

@@ -14,10 +14,14 @@
 
 static bt_check_ice ice_of_case(const bt_case *c)
 {
-    bt_check_ice n = {.count = bt_case_expected_floes(c) + c->n_floes, .size = c->ice.size, .thickness = c->ice.thickness, .concentration = c->ice.concentration};
+    bt_check_ice n = {.count = bt_case_expected_floes(c) + c->n_floes,
+                      .size = c->ice.size,
+                      .thickness = c->ice.thickness,
+                      .concentration = c->ice.concentration};
     if (c->ice.size_law == BT_SIZE_POWER) {
         double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
-        n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) / ((pow(lo, -a) - pow(hi, -a)) / a);
+        n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) /
+                 ((pow(lo, -a) - pow(hi, -a)) / a);
     }
     return n;
 }
@@ -41,7 +45,8 @@ bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f)
 
 bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
 {
-    bt_check_step s = {.longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5, .pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size};
+    bt_check_step s = {.longest = c->domain.frame == BT_FRAME_BASIN ? 0.1 : 5,
+                       .pieces = c->lead.mode == BT_LEAD_MANAGED && c->lead.floe_size < n->size};
     s.size = s.pieces ? c->lead.floe_size : n->size;
     s.passed = n->count < 1 ? 0 : c->run.dt * bt_case_reference_speed(c) / s.size;
     s.contact = c->run.dt <= s.longest;
@@ -49,7 +54,10 @@ bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n)
     return s;
 }
 
-double bt_check_seconds(const bt_case *c, const bt_check_ice *n) { return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration); }
+double bt_check_seconds(const bt_case *c, const bt_check_ice *n)
+{
+    return n->count * (double)bt_case_steps(c) * bt_cost_floe_step(n->concentration);
+}
 
 // --- refusals and warnings -------------------------------------------------------------------------------------------
 
@@ -66,7 +74,8 @@ static bt_status try_setup(const bt_case *c, const bt_field *f, bt_errors *err)
     return status;
 }
 
-bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run, bt_lead_stats *lead, bt_errors *err)
+bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run,
+                         bt_lead_stats *lead, bt_errors *err)
 {
     const double machine = bt_cost_machine();
     bt_status status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, machine, err);
@@ -85,10 +94,12 @@ static void warn_of_step(const bt_case *c, const bt_check_ice *n, bt_errors *war
 {
     const bt_check_step s = bt_check_step_of(c, n);
     if (!s.contact)
-        bt_errors_add(warnings, "run.dt: %g s is longer than a collision lasts %s; take at most %g s", c->run.dt, c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", s.longest);
+        bt_errors_add(warnings, "run.dt: %g s is longer than a collision lasts %s; take at most %g s", c->run.dt,
+                      c->domain.frame == BT_FRAME_BASIN ? "in a basin" : "at full scale", s.longest);
     if (!s.floes)
-        bt_errors_add(warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s", c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed,
-                      0.1 * s.size / bt_case_reference_speed(c));
+        bt_errors_add(
+            warnings, "run.dt: in %g s %s move %.3g of their size, and at most 0.1 is sound; take at most %.3g s",
+            c->run.dt, s.pieces ? "pieces of the lead" : "floes", s.passed, 0.1 * s.size / bt_case_reference_speed(c));
 }
 
 void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings)

@@ -39,7 +39,8 @@ double bt_cmd_duration(const struct argp_state *state, const char *option, const
 /// out/NAME for path/NAME.yml; the caller frees it.
 char *bt_cmd_default_folder(const char *path);
 
-/// The command as it could be typed again, for the provenance of the result. argv[0] is the command. The caller frees it.
+/// The command as it could be typed again, for the provenance of the result. argv[0] is the command. The caller frees
+/// it.
 char *bt_cmd_join(int argc, char **argv);
 
 /// Collective over c. Print all ranks' messages once, release them, and return the worst status as exit code.

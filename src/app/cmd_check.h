@@ -20,11 +20,13 @@ typedef struct bt_check_step {
     bool contact, floes; ///< is the step short enough for a collision; for the floes
 } bt_check_step;
 
-/// Everything for which `run` would refuse the case before its first step, in the same words, as far as it shows without making a field: size against memory and
-/// disk, the field that is read, its lead, bodies that meet or have no room. f: the field that was read, or none; n: of the ice before the lead is opened, and
-/// how it is for the run: *run. lead: of a field that was read. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// Everything for which `run` would refuse the case before its first step, in the same words, as far as it shows
+/// without making a field: size against memory and disk, the field that is read, its lead, bodies that meet or have no
+/// room. f: the field that was read, or none; n: of the ice before the lead is opened, and how it is for the run: *run.
+/// lead: of a field that was read. Errors: BT_ERR_CASE, BT_ERR_IO.
 struct bt_comm;
-bt_status bt_check_ready(const bt_case *c, const struct bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run, bt_lead_stats *lead, bt_errors *err);
+bt_status bt_check_ready(const bt_case *c, const struct bt_comm *comm, bt_field *f, bt_check_ice *n, bt_check_ice *run,
+                         bt_lead_stats *lead, bt_errors *err);
 /// What a run would go through and a user should know before: appended to the list, a sentence each.
 void bt_check_warn(const bt_case *c, const bt_check_ice *n, bt_errors *warnings);
 /// Of the field that was read, or expected of the one that will be made.
@@ -33,9 +35,11 @@ bt_check_step bt_check_step_of(const bt_case *c, const bt_check_ice *n);
 /// Rough estimate of a run, s of one core.
 double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
 
-/// Has the file a key `base` at its top, as no case has? False where it cannot be read. Pipes, which can be read only once, are cases.
+/// Has the file a key `base` at its top, as no case has? False where it cannot be read. Pipes, which can be read only
+/// once, are cases.
 bool bt_check_is_study(const char *path);
-/// Check a study and the case of the first member of each condition; print what follows when all are valid. Errors: BT_ERR_CASE, BT_ERR_IO.
+/// Check a study and the case of the first member of each condition; print what follows when all are valid. Errors:
+/// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_check_study(const char *path, bt_errors *err);
 
 #endif

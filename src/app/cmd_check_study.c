@@ -46,7 +46,8 @@ bool bt_check_is_study(const char *path)
     size_t size;
     bt_errors unheard = {0};
     bool found = false;
-    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) && bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
+    if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
+        bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
         bt_node *root = bt_tree_parse(text, size, path, &unheard);
         found = bt_tree_has(root, "base");
         bt_tree_free(root);
@@ -82,7 +83,8 @@ static void tell_faults(faults *f, const bt_study *s, bt_errors *err)
         bt_member m;
         bt_study_member(s, f->list[k].first * s->repeats, &m);
         fprintf(out, "condition %" PRId64, f->list[k].first + 1);
-        for (int p = 0; p < s->n_parameters; p++) fprintf(out, "%s %.40s %.40s", p ? "," : ":", s->parameter[p].name, m.value[p]);
+        for (int p = 0; p < s->n_parameters; p++)
+            fprintf(out, "%s %.40s %.40s", p ? "," : ":", s->parameter[p].name, m.value[p]);
         if (f->list[k].count > 1) fprintf(out, "; and %" PRId64 " more", f->list[k].count - 1);
         fclose(out);
         bt_errors_add(err, "%s (%s)", f->list[k].text, where);
@@ -113,8 +115,13 @@ static bt_status check_condition(const bt_study *s, int64_t condition, numbers *
         const bt_cost_disk disk = bt_cost_disk_of(&c, run.count, run.corners, ranks.size);
         bt_errors warnings = {0};
         bt_check_warn(&c, &n, &warnings);
-        *x = (numbers){n.count, (double)bt_case_steps(&c), bt_check_seconds(&c, &n), bt_cost_memory(&c, n.count, ranks.size, ranks.size), bt_cost_member(&c, &disk),
-                       step.contact && step.floes, (int)warnings.n};
+        *x = (numbers){n.count,
+                       (double)bt_case_steps(&c),
+                       bt_check_seconds(&c, &n),
+                       bt_cost_memory(&c, n.count, ranks.size, ranks.size),
+                       bt_cost_member(&c, &disk),
+                       step.contact && step.floes,
+                       (int)warnings.n};
         bt_errors_free(&warnings);
     }
     bt_field_free(&f);
@@ -130,7 +137,8 @@ static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *err)
     bt_status status = bt_study_base_case(s, &c, err); // what is wrong without any condition
     bt_case_free(&c);
     if (status != BT_OK) {
-        bt_errors_add(err, "%s: base: %s with `set` is no valid case, as any condition needs it; mend that first", s->path, s->base_name);
+        bt_errors_add(err, "%s: base: %s with `set` is no valid case, as any condition needs it; mend that first",
+                      s->path, s->base_name);
         return status;
     }
     faults f = {0};
@@ -142,7 +150,8 @@ static bt_status check_conditions(const bt_study *s, numbers *x, bt_errors *err)
     }
     tell_faults(&f, s, err);
     if (status != BT_OK && k < s->n_conditions)
-        bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first", s->path, k + 1, BT_MOST_COMPLAINTS);
+        bt_errors_add(err, "%s: conditions from %" PRId64 " on are not looked at after %d errors; mend those first",
+                      s->path, k + 1, BT_MOST_COMPLAINTS);
     return status;
 }
 
@@ -215,7 +224,8 @@ static int row_of(const bt_study *s, const numbers *x, int64_t condition, char c
     }
     snprintf(cell[n++], CELL, "condition");
     for (int p = 0; p < s->n_parameters; p++) snprintf(cell[n++], CELL, "%.40s", s->parameter[p].name);
-    for (int k = 0; k < 4; k++) snprintf(cell[n++], CELL, "%s", (const char *const[]){"floes", "steps", "one run", "time step"}[k]);
+    for (int k = 0; k < 4; k++)
+        snprintf(cell[n++], CELL, "%s", (const char *const[]){"floes", "steps", "one run", "time step"}[k]);
     return n;
 }
 
@@ -244,8 +254,12 @@ static void print_range(const bt_study *s, const numbers *x)
     char a[CELL], b[CELL];
     printf("floes                %.0f to %.0f\n", lo.floes, hi.floes);
     printf("steps                %.0f to %.0f\n", lo.steps, hi.steps);
-    printf("one run              rough estimate %s to %s on one core\n", duration(lo.seconds, a), duration(hi.seconds, b));
-    if (large) printf("time step            TOO LARGE in %" PRId64 " conditions; `bergtow check` of the base with --set says why\n", large);
+    printf("one run              rough estimate %s to %s on one core\n", duration(lo.seconds, a),
+           duration(hi.seconds, b));
+    if (large)
+        printf("time step            TOO LARGE in %" PRId64
+               " conditions; `bergtow check` of the base with --set says why\n",
+               large);
     else printf("time step            ok\n");
 }
 
@@ -260,21 +274,25 @@ static void print_study(const bt_study *s, const numbers *x)
         memory = bt_max(memory, x[k].memory);
     }
     char verdict_of_all[96] = "valid";
-    if (warned) snprintf(verdict_of_all, sizeof verdict_of_all, "valid, with warnings in %" PRId64 " of %" PRId64 " conditions", warned, s->n_conditions);
+    if (warned)
+        snprintf(verdict_of_all, sizeof verdict_of_all, "valid, with warnings in %" PRId64 " of %" PRId64 " conditions",
+                 warned, s->n_conditions);
     printf("%s: %s\n", s->path, verdict_of_all);
     if (s->title) printf("title                %s\n", s->title);
     printf("base                 %s\n", s->base);
     print_sets("set", s->set, s->n_set);
     print_varied(s);
-    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", s->n_conditions, s->repeats, bt_study_n_members(s),
-           s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? ", a Latin hypercube" : "", s->common_fields ? ", the same fields in all conditions" : "");
+    printf("members              %" PRId64 " conditions x %" PRId64 " fields = %" PRId64 "%s%s", s->n_conditions,
+           s->repeats, bt_study_n_members(s), s->sampling == BT_SAMPLING_LATIN_HYPERCUBE ? ", a Latin hypercube" : "",
+           s->common_fields ? ", the same fields in all conditions" : "");
     if (s->ranks > 1) printf(", %" PRId64 " ranks each", s->ranks);
     printf("\n");
     if (s->n_conditions <= MOST_ROWS) print_table(s, x);
     else print_range(s, x);
     char text[CELL];
     printf("memory               about %.3g MB for one member\n", memory / 1e6);
-    printf("disk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9), disk < 1e9 ? "MB" : "GB");
+    printf("disk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9),
+           disk < 1e9 ? "MB" : "GB");
     printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
     if (warned) printf("%s: %s; `bergtow check` of the base with --set says which\n", s->path, verdict_of_all);
 }

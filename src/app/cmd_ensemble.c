@@ -39,15 +39,25 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option ensemble_options[] = {
     {"output", 'o', "DIR", 0, "folder of the ensemble, default out/ and the name of the study without .yml", 0},
-    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node shared by its ranks; results do not depend on it", 0},
+    {"threads", 't', "N", 0,
+     "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node "
+     "shared by its ranks; results do not depend on it",
+     0},
     {"quiet", 'q', NULL, 0, "no line for each member", 0},
     {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
-    {"no-wait", KEY_LEAVE, NULL, 0, "end when nothing is left to begin, with code 6 if other calls are still at work on members of the folder", 0},
+    {"no-wait", KEY_LEAVE, NULL, 0,
+     "end when nothing is left to begin, with code 6 if other calls are still at work on members of the folder", 0},
     {0},
 };
-static const struct argp ensemble_argp = {.options = ensemble_options, .parser = parse, .args_doc = "STUDY.yml",
-                                          .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one ended, however it "
-                                                 "ended. Results that are missing or damaged are run again; the exit code is 0 only when every member is finished and sound. Under mpirun the members are dealt to groups of ranks (`ranks` of the study); several calls may work on one folder."};
+static const struct argp ensemble_argp = {
+    .options = ensemble_options,
+    .parser = parse,
+    .args_doc = "STUDY.yml",
+    .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one "
+           "ended, however it "
+           "ended. Results that are missing or damaged are run again; the exit code is 0 only when every member is "
+           "finished and sound. Under mpirun the members are dealt to groups of ranks (`ranks` of the study); several "
+           "calls may work on one folder."};
 
 int bt_cmd_ensemble(int argc, char **argv)
 {

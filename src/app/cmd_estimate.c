@@ -29,20 +29,26 @@ static const struct argp_option estimate_options[] = {
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp estimate_argp = {
-    .options = estimate_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
-    .doc = "Print the resistance of broken ice by Lichey & Hellmer 2001, by three closures of Marchenko et al. 2010, in the dilute "
-           "limit and by a regression of ships in pack ice, and the drag of open water, for the body, ice and speed of a case. Nothing is simulated."};
+static const struct argp estimate_argp = {.options = estimate_options,
+                                          .parser = parse,
+                                          .args_doc = "CASE.yml",
+                                          .children = children,
+                                          .doc = "Print the resistance of broken ice by Lichey & Hellmer 2001, by "
+                                                 "three closures of Marchenko et al. 2010, in the dilute "
+                                                 "limit and by a regression of ships in pack ice, and the drag of open "
+                                                 "water, for the body, ice and speed of a case. Nothing is simulated."};
 
 static void print_table(const options *o, const bt_case *c, const bt_estimate_input *in)
 {
     printf("%s: estimates, nothing simulated\n", o->file.path);
-    printf("ice                  concentration %.4g, thickness %.4g m, floe radius %.4g m (means weighted with area), density %.4g kg/m3\n",
+    printf("ice                  concentration %.4g, thickness %.4g m, floe radius %.4g m (means weighted with area), "
+           "density %.4g kg/m3\n",
            in->concentration, in->thickness, in->floe_radius, in->ice_density);
     printf("body                 %.4g m across the tow, %.4g m/s through the ice\n", in->width, in->along);
-    printf("ice strength         P = %.4g N/m, captures a berg from P_s = %.4g N/m (length scale %g)\n", bt_estimate_strength(in),
-           in->p_s, in->length_scale);
-    printf("kappa, phi           %g (%g to %g), %g\n\n", c->estimate.kappa, c->estimate.kappa_low, c->estimate.kappa_high, c->estimate.phi_j);
+    printf("ice strength         P = %.4g N/m, captures a berg from P_s = %.4g N/m (length scale %g)\n",
+           bt_estimate_strength(in), in->p_s, in->length_scale);
+    printf("kappa, phi           %g (%g to %g), %g\n\n", c->estimate.kappa, c->estimate.kappa_low,
+           c->estimate.kappa_high, c->estimate.phi_j);
     bt_estimates_print(in, NAN, "", true);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with ice.outlines.
+// bergtow field: the ice field of a case to a file that a case can read back: HDF5 with ice.field, GeoJSON with
+// ice.outlines.
 #include "bergtow/field.h"
 #include "case/case_check.h"
 #include "app/cmd.h"
@@ -22,7 +23,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
     case 'o': o->output = arg; return 0;
     case ARGP_KEY_END:
-        if (!o->output || !*o->output) argp_error(state, "no output file given; name one with -o FIELD.h5 or FIELD.geojson");
+        if (!o->output || !*o->output)
+            argp_error(state, "no output file given; name one with -o FIELD.h5 or FIELD.geojson");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
@@ -36,8 +38,12 @@ static const struct argp_option field_options[] = {
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp field_argp = {.options = field_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
-                                       .doc = "Make the ice field of a case, or read it from its ice.outlines, and write it; another case reads it with ice.field or ice.outlines."};
+static const struct argp field_argp = {.options = field_options,
+                                       .parser = parse,
+                                       .args_doc = "CASE.yml",
+                                       .children = children,
+                                       .doc = "Make the ice field of a case, or read it from its ice.outlines, and "
+                                              "write it; another case reads it with ice.field or ice.outlines."};
 
 static bool is_geojson(const char *path)
 {
@@ -57,16 +63,20 @@ int bt_cmd_field(int argc, char **argv)
     // A field that is read and written in the same form is the file there is.
     const bool outlines = is_geojson(o.output);
     if (status == BT_OK && c.ice.field && !outlines) {
-        bt_errors_add(&err, "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines with -o FIELD.geojson", o.file.path, c.ice.field);
+        bt_errors_add(&err,
+                      "%s: ice.field: the case reads its field from %s; remove the key to make one, or write outlines "
+                      "with -o FIELD.geojson",
+                      o.file.path, c.ice.field);
         status = BT_ERR_CASE;
     }
     double start = bt_clock();
     if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);
-    if (status == BT_OK) status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
     if (status == BT_OK)
-        printf("%s: %d floes, concentration %.4f of %.6g m2, %s in %.2f s\n", o.output, f.n, f.concentration, f.ice_area, c.ice.outlines || c.ice.field ? "read" : "made",
-               bt_clock() - start);
+        status = outlines ? bt_field_write_outlines(&f, &c, o.output, &err) : bt_field_write(&f, &c, o.output, &err);
+    if (status == BT_OK)
+        printf("%s: %d floes, concentration %.4f of %.6g m2, %s in %.2f s\n", o.output, f.n, f.concentration,
+               f.ice_area, c.ice.outlines || c.ice.field ? "read" : "made", bt_clock() - start);
     bt_errors warnings = {0};
     if (status == BT_OK) bt_outline_warn(&f.outlines, &c, &warnings);
     for (size_t i = 0; i < warnings.n; i++) printf("  warning: %s\n", warnings.text[i]);

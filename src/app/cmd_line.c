@@ -16,7 +16,8 @@ static int collect(const struct argp *argp, const char **names, int n, int cap)
 {
     for (const struct argp_option *o = argp->options; o && (o->name || o->key || o->doc); o++)
         if (o->name && n < cap) names[n++] = o->name;
-    for (const struct argp_child *child = argp->children; child && child->argp; child++) n = collect(child->argp, names, n, cap);
+    for (const struct argp_child *child = argp->children; child && child->argp; child++)
+        n = collect(child->argp, names, n, cap);
     return n;
 }
 
@@ -91,7 +92,8 @@ static error_t parse_case(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option case_options[] = {
-    {"set", 's', "KEY=VALUE", 0, "replace a value of the case; may be given several times (see bergtow --list-keys)", 0},
+    {"set", 's', "KEY=VALUE", 0, "replace a value of the case; may be given several times (see bergtow --list-keys)",
+     0},
     {0},
 };
 const struct argp bt_cmd_case_argp = {.options = case_options, .parser = parse_case};
@@ -134,7 +136,9 @@ char *bt_cmd_join(int argc, char **argv)
     if (!out) abort();
     fputs("bergtow", out);
     for (int i = 0; i < argc; i++) {
-        bool safe = *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") == strlen(argv[i]);
+        bool safe =
+            *argv[i] && strspn(argv[i], "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=./,:%@") ==
+                            strlen(argv[i]);
         fputs(safe ? " " : " '", out);
         for (const char *s = argv[i]; *s; s++) {
             if (*s == '\'') fputs("'\\''", out);
@@ -149,7 +153,9 @@ char *bt_cmd_join(int argc, char **argv)
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)
 {
     const bool lost = fflush(stdout) != 0 || ferror(stdout);
-    if (lost) bt_errors_add(err, "standard output: cannot be written; give it a place with space, or use the files of the result");
+    if (lost)
+        bt_errors_add(err,
+                      "standard output: cannot be written; give it a place with space, or use the files of the result");
     if (lost && status == BT_OK) status = BT_ERR_IO;
     status = bt_comm_agree(c, status);
     bt_comm_errors(c, err);

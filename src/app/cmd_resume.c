@@ -57,15 +57,20 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 }
 
 static const struct argp_option resume_options[] = {
-    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or all cores; the result does not depend on it", 0},
+    {"threads", 't', "N", 0,
+     "OpenMP threads of each rank, default run.threads of the case, or all cores; the result does not depend on it", 0},
     {"steps", KEY_STEPS, "N", 0, "stop after N more steps", 0},
     {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
     {0},
 };
-static const struct argp resume_argp = {.options = resume_options, .parser = parse, .args_doc = "DIR",
-                                        .doc = "Go on with the run in the result folder DIR from its last checkpoint, on any number of ranks and threads: the result is that of a run that was "
-                                               "never stopped. In place of DIR a checkpoint file in it may be given."};
+static const struct argp resume_argp = {.options = resume_options,
+                                        .parser = parse,
+                                        .args_doc = "DIR",
+                                        .doc =
+                                            "Go on with the run in the result folder DIR from its last checkpoint, on "
+                                            "any number of ranks and threads: the result is that of a run that was "
+                                            "never stopped. In place of DIR a checkpoint file in it may be given."};
 
 int bt_cmd_resume(int argc, char **argv)
 {
@@ -106,9 +111,12 @@ static error_t parse_two(int key, char *arg, struct argp_state *state)
     }
 }
 
-static const struct argp diff_argp = {.parser = parse_two, .args_doc = "A [B]",
-                                      .doc = "Name the first difference between the states of two checkpoints (files, or the folders they are in); of one, print what it holds. Exit code 0: the same, "
-                                             "1: different."};
+static const struct argp diff_argp = {
+    .parser = parse_two,
+    .args_doc = "A [B]",
+    .doc = "Name the first difference between the states of two checkpoints (files, or the folders they are in); of "
+           "one, print what it holds. Exit code 0: the same, "
+           "1: different."};
 
 int bt_cmd_diff(int argc, char **argv)
 {
@@ -116,7 +124,8 @@ int bt_cmd_diff(int argc, char **argv)
     bt_cmd_parse(&diff_argp, argc, argv, &f);
     bt_errors err = {0};
     char *difference = NULL;
-    const bt_status status = f.n == 1 ? bt_checkpoint_print(f.path[0], &err) : bt_checkpoint_compare(f.path[0], f.path[1], &difference, &err);
+    const bt_status status = f.n == 1 ? bt_checkpoint_print(f.path[0], &err)
+                                      : bt_checkpoint_compare(f.path[0], f.path[1], &difference, &err);
     if (difference) printf("%s\n", difference);
     else if (f.n == 2 && status == BT_OK) puts("the states are the same");
     const bool differs = difference != NULL;

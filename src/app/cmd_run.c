@@ -51,25 +51,38 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 
 static const struct argp_option run_options[] = {
     {"output", 'o', "DIR", 0, "result folder, default out/ and the name of the case without .yml", 0},
-    {"threads", 't', "N", 0, "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does not depend on it", 0},
+    {"threads", 't', "N", 0,
+     "OpenMP threads of each rank, default run.threads of the case, or OMP_NUM_THREADS, or all cores; the result does "
+     "not depend on it",
+     0},
     {"steps", KEY_STEPS, "N", 0, "stop after N steps", 0},
-    {"max-wall", KEY_WALL, "TIME", 0, "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
+    {"max-wall", KEY_WALL, "TIME", 0,
+     "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
     {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
     {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
-static const struct argp run_argp = {.options = run_options, .parser = parse, .args_doc = "CASE.yml", .children = children,
+static const struct argp run_argp = {.options = run_options,
+                                     .parser = parse,
+                                     .args_doc = "CASE.yml",
+                                     .children = children,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
 // A long run must not take the place of another by a slip of the hand.
 static bt_status check_folder(const char *dir, bool force, bt_errors *err)
 {
-    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_file_there(dir, "result.part.h5") || bt_checkpoint_there(dir);
+    const bool finished = bt_file_there(dir, "summary.json"),
+               begun = bt_file_there(dir, "result.part.h5") || bt_checkpoint_there(dir);
     if (force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return BT_OK;
-    if (finished || !begun) bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
-    else bt_errors_add(err, "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, or --force to replace it", dir, dir);
+    if (finished || !begun)
+        bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+    else
+        bt_errors_add(err,
+                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, "
+                      "or --force to replace it",
+                      dir, dir);
     return BT_ERR_IO;
 }
 

@@ -21,7 +21,8 @@ static const struct {
     {"run", "tow the body through the ice and write a result folder", bt_cmd_run, true},
     {"check", "validate a case or a study and print the numbers that follow from it", bt_cmd_check, false},
     {"field", "make the ice field of a case only", bt_cmd_field, false},
-    {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble, true},
+    {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
+     true},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
@@ -54,8 +55,8 @@ static int refuse_word(const char *kind, const char *word, const char *const *kn
     return BT_ERR_USAGE;
 }
 
-// With OMP_PROC_BIND libgomp has bound this thread to one place by now, and a program started from here would have that one core for all its
-// threads. Back to all the places it was given.
+// With OMP_PROC_BIND libgomp has bound this thread to one place by now, and a program started from here would have that
+// one core for all its threads. Back to all the places it was given.
 static void unbind(void)
 {
     const int n_places = omp_get_num_places();
@@ -74,9 +75,9 @@ static void unbind(void)
 
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
-// microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where the system gives them,
-// and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C library read their settings
-// before main, hence the second start; the user's own win.
+// microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where
+// the system gives them, and the fetching ahead that they allow, 300,000 floes took 20 % less. libgomp and the C
+// library read their settings before main, hence the second start; the user's own win.
 static void start_with_settings(char **argv)
 {
     if (getenv("BERGTOW_STARTED")) return;
@@ -97,10 +98,12 @@ static int bergtow(int argc, char **argv)
     }
     const char *word = argv[1];
     for (int i = 0; i < N_COMMANDS; i++)
-        if (!strcmp(word, commands[i].name)) return first || commands[i].parallel ? commands[i].run(argc - 1, argv + 1) : BT_OK;
+        if (!strcmp(word, commands[i].name))
+            return first || commands[i].parallel ? commands[i].run(argc - 1, argv + 1) : BT_OK;
     if (!first) return BT_OK; // what follows concerns the console
 
-    bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"), version = !strcmp(word, "--version") || !strcmp(word, "-V");
+    bool help = !strcmp(word, "--help") || !strcmp(word, "-h") || !strcmp(word, "-?"),
+         version = !strcmp(word, "--version") || !strcmp(word, "-V");
     if (help) print_help(stdout);
     else if (version) print_version(stdout, NULL);
     else if (!strcmp(word, "--list-keys")) {
@@ -110,7 +113,8 @@ static int bergtow(int argc, char **argv)
     }
     if (help || version || !strcmp(word, "--list-keys")) return fflush(stdout) ? BT_ERR_IO : BT_OK;
 
-    if (word[0] == '-') return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
+    if (word[0] == '-')
+        return refuse_word("option", word, (const char *const[]){"--help", "--version", "--list-keys", NULL});
     const char *names[N_COMMANDS + 1] = {NULL};
     for (int i = 0; i < N_COMMANDS; i++) names[i] = commands[i].name;
     return refuse_word("command", word, names);
@@ -119,8 +123,10 @@ static int bergtow(int argc, char **argv)
 int main(int argc, char **argv)
 {
     start_with_settings(argv);
-    signal(SIGUSR1, SIG_IGN); // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
-    signal(SIGXFSZ, SIG_IGN); // a file at its size limit is an error of the write, with a message, not the end of the program
+    // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
+    signal(SIGUSR1, SIG_IGN);
+    // a file at its size limit is an error of the write, with a message, not the end of the program
+    signal(SIGXFSZ, SIG_IGN);
     bt_comm_start(&argc, &argv);
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;

@@ -54,7 +54,8 @@ void bt_errors_add(bt_errors *e, const char *fmt, ...)
     char *text = NULL;
     if (vasprintf(&text, fmt, ap) < 0) out_of_memory(1, strlen(fmt));
     va_end(ap);
-    // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a question mark.
+    // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a
+    // question mark.
     for (char *s = text; *s; s++)
         if ((unsigned char)*s < 0x20 || *s == 0x7F) *s = '?';
     e->text[e->n++] = text;

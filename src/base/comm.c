@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The ranks of the program: start, end, agreement, and rows in the order of global ids.
 //
-// Reduction. MPI's own sums of doubles depend on how the ranks are combined, and MPI knows no 128-bit integers. So every
-// number travels as an item of 32 bytes {kind, two words, bad} with one operation for all kinds: items are combined one by one, so
-// that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one message.
+// Reduction. MPI's own sums of doubles depend on how the ranks are combined, and MPI knows no 128-bit integers. So
+// every number travels as an item of 32 bytes {kind, two words, bad} with one operation for all kinds: items are
+// combined one by one, so that MPI may cut the message anywhere, and sums, maxima and ors of one moment share one
+// message.
 #include "bergtow/comm.h"
 
 #include <signal.h>
@@ -111,7 +112,8 @@ void bt_comm_split_end(bt_comm *part)
 void bt_comm_start(int *argc, char ***argv)
 {
     if (running || (!getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK"))) return;
-    // Threads that MPI starts leave signals to the main thread: METIS must be able to hold SIGTERM back (partition/cut.h).
+    // Threads that MPI starts leave signals to the main thread: METIS must be able to hold SIGTERM back
+    // (partition/cut.h).
     sigset_t block, before;
     sigemptyset(&block);
     sigaddset(&block, SIGTERM);
@@ -226,11 +228,13 @@ bool bt_comm_any(const bt_comm *c, bool value)
 void bt_comm_rest(const bt_comm *c)
 {
     if (c->size == 1) return;
-    // Blocking MPI calls poll, with the whole core. Looked for every 10 ms at last, and often at first: most waits are short.
+    // Blocking MPI calls poll, with the whole core. Looked for every 10 ms at last, and often at first: most waits are
+    // short.
     MPI_Request all;
     int there = 0;
     MPI_Ibarrier(c->mpi, &all);
-    for (long pause = 20000; MPI_Test(&all, &there, MPI_STATUS_IGNORE), !there; pause = pause < 5000000 ? 2 * pause : 10000000)
+    for (long pause = 20000; MPI_Test(&all, &there, MPI_STATUS_IGNORE), !there;
+         pause = pause < 5000000 ? 2 * pause : 10000000)
         nanosleep(&(struct timespec){.tv_nsec = pause}, NULL);
 }
 
@@ -249,7 +253,8 @@ void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, 
     MPI_Allreduce(MPI_IN_PLACE, items, n, item_type, item_op, c->mpi);
     p = items;
     for (int i = 0; i < n_sums; i++, p++)
-        sums[i] = (bt_sum){.v = (bt_int128)((__extension__ (unsigned __int128)p->high) << 64 | p->low), .bad = p->bad != 0};
+        sums[i] =
+            (bt_sum){.v = (bt_int128)((__extension__(unsigned __int128) p->high) << 64 | p->low), .bad = p->bad != 0};
     for (int i = 0; i < n_max; i++) maxima[i] = as_double(p++->low);
     for (int i = 0; i < n_ors; i++) ors[i] = p++->low;
     if (items != few) free(items);
@@ -290,21 +295,24 @@ static void name_ids(const unsigned char *count, int64_t from, int64_t n, bool m
     for (int64_t i = 0; i < n; i++) {
         if (missing ? count[i] != 0 : count[i] < 2) continue;
         const size_t used = strlen(text);
-        if (found++ < SHOWN) snprintf(text + used, sizeof text - used, "%s%lld", used ? ", " : "", (long long)(from + i));
+        if (found++ < SHOWN)
+            snprintf(text + used, sizeof text - used, "%s%lld", used ? ", " : "", (long long)(from + i));
     }
     if (found)
         bt_errors_add(err, "%lld bodies are %s: id %s%s; please report this case", (long long)found,
                       missing ? "held by no rank" : "held by several ranks", text, found > SHOWN ? ", ..." : "");
 }
 
-static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_gid *gid, int width, const double *rows, double *block, bt_errors *err)
+static bt_status put_in_order(int64_t from, int64_t count, int64_t n, const bt_gid *gid, int width, const double *rows,
+                              double *block, bt_errors *err)
 {
     unsigned char *seen = bt_alloc((size_t)count, 1);
     bool wrong = n != count;
     for (int64_t i = 0; i < n; i++) {
         const int64_t at = gid[i] - from;
         if (at < 0 || at >= count) {
-            bt_errors_add(err, "a body has the id %lld, which does not exist; please report this case", (long long)gid[i]);
+            bt_errors_add(err, "a body has the id %lld, which does not exist; please report this case",
+                          (long long)gid[i]);
             wrong = true;
             continue;
         }
@@ -330,15 +338,16 @@ static int running_sum(int size, const int *counts, int *starts)
     return all;
 }
 
-bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width, const double *rows,
-                              double *block, bt_errors *err)
+bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, const bt_gid *gid, int width,
+                              const double *rows, double *block, bt_errors *err)
 {
     const int size = c->size;
     const int64_t from = first[c->rank], count = first[c->rank + 1] - from;
     if (size == 1) return put_in_order(from, count, n, gid, width, rows, block, err);
 
     int *numbers = bt_alloc(5 * (size_t)size, sizeof *numbers);
-    int *send = numbers, *send_at = numbers + size, *take = numbers + 2 * size, *take_at = numbers + 3 * size, *next = numbers + 4 * size;
+    int *send = numbers, *send_at = numbers + size, *take = numbers + 2 * size, *take_at = numbers + 3 * size,
+        *next = numbers + 4 * size;
     for (bt_idx i = 0; i < n; i++) send[holder(first, size, gid[i])]++;
     running_sum(size, send, send_at);
     MPI_Alltoall(send, 1, MPI_INT, take, 1, MPI_INT, c->mpi);

@@ -30,9 +30,16 @@ void bt_events_free(bt_events *e)
 void bt_event_describe(const bt_event *e, char out[160])
 {
     switch (e->kind) {
-    case BT_EVENT_LINE_BROKEN: snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", e->subject, e->value); break;
-    case BT_EVENT_ADRIFT: snprintf(out, 160, "no branch of the tow line is left: the body drifts, at first at %.3g m/s", e->value); break;
-    case BT_EVENT_WAYPOINT: snprintf(out, 160, "way-point %" PRId64 " passed after %.5g m", e->subject, e->value); break;
-    default: snprintf(out, 160, "event of kind %" PRId64 ", subject %" PRId64 ", value %.6g", e->kind, e->subject, e->value);
+    case BT_EVENT_LINE_BROKEN:
+        snprintf(out, 160, "branch %" PRId64 " of the tow line broke under %.4g N", e->subject, e->value);
+        break;
+    case BT_EVENT_ADRIFT:
+        snprintf(out, 160, "no branch of the tow line is left: the body drifts, at first at %.3g m/s", e->value);
+        break;
+    case BT_EVENT_WAYPOINT:
+        snprintf(out, 160, "way-point %" PRId64 " passed after %.5g m", e->subject, e->value);
+        break;
+    default:
+        snprintf(out, 160, "event of kind %" PRId64 ", subject %" PRId64 ", value %.6g", e->kind, e->subject, e->value);
     }
 }

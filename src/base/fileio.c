@@ -130,7 +130,10 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
         return BT_ERR_IO;
     }
     if (n > most) {
-        bt_errors_add(err, "%s: larger than %zu MiB, which %s never is; check the name (large fields belong into an HDF5 file that ice.field names)", path, most >> 20, what);
+        bt_errors_add(err,
+                      "%s: larger than %zu MiB, which %s never is; check the name (large fields belong into an HDF5 "
+                      "file that ice.field names)",
+                      path, most >> 20, what);
         return BT_ERR_CASE;
     }
     return BT_OK;
@@ -153,7 +156,8 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     snprintf(temporary, size, "%s.tmp", path);
 
     int reason = 0;
-    // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name, which the rename replaces.
+    // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name,
+    // which the rename replaces.
     unlink(temporary);
     FILE *f = fopen(temporary, "wx");
     if (!f) {
@@ -243,8 +247,10 @@ bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
     char *folder = !slash ? strdup(".") : slash == to ? strdup("/") : strndup(to, (size_t)(slash - to));
     const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     free(folder);
-    if (fd < 0) return BT_OK; // a folder that may be written to but not read: the system will bring the name to the disk in its own time
-    const int reason = fsync(fd) != 0 && errno != EINVAL && errno != EROFS ? errno : 0; // some file systems have no such call
+    // a folder that may be written to but not read: the system will bring the name to the disk in its own time
+    if (fd < 0) return BT_OK;
+    // some file systems have no such call
+    const int reason = fsync(fd) != 0 && errno != EINVAL && errno != EROFS ? errno : 0;
     close(fd);
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
 }

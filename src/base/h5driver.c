@@ -2,21 +2,22 @@
 // An HDF5 file driver that keeps the system's first error, never fails a write, and leaves the file whole after each.
 //
 // When a write fails (full disk, quota, file size limit) HDF5 1.10 cannot close the file any more: H5Fclose frees what
-// the file's identifier still points to, and the library's exit handler then crashes, in MPI_Finalize too. So this driver
-// tells HDF5 that the write was done, keeps errno for the caller, and from then on writes nothing: the library stays
-// sound, the reason is a number instead of a text in an error stack, and the file on disk stays as the last complete
-// flush left it.
+// the file's identifier still points to, and the library's exit handler then crashes, in MPI_Finalize too. So this
+// driver tells HDF5 that the write was done, keeps errno for the caller, and from then on writes nothing: the library
+// stays sound, the reason is a number instead of a text in an error stack, and the file on disk stays as the last
+// complete flush left it.
 //
-// Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes them in any order, and
-// what a file under way announces may then not be there yet: a reader at that moment, or a kill, found rows of zeros. At the end of a flush
-// come, each run of bytes in one call: the superblock, which must know the length of the file; what is new; old nodes of indices from the
-// lowest address to the highest (a root stays where it was made, and must know the new half of a node before that node gives it up); at last the
-// rest from the highest to the lowest (headers lead to all others). So after each write a dataset has the length of this flush or of
-// the last, and all of its rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those here
-// are of one row (h5util.h).
+// Metadata (headers, indices) wait in memory until HDF5 ends a flush; data go to the file at once. HDF5 writes them in
+// any order, and what a file under way announces may then not be there yet: a reader at that moment, or a kill, found
+// rows of zeros. At the end of a flush come, each run of bytes in one call: the superblock, which must know the length
+// of the file; what is new; old nodes of indices from the lowest address to the highest (a root stays where it was
+// made, and must know the new half of a node before that node gives it up); at last the rest from the highest to the
+// lowest (headers lead to all others). So after each write a dataset has the length of this flush or of the last, and
+// all of its rows. What may not be there in one piece is a packed chunk to which rows are added, for it moves: those
+// here are of one row (h5util.h).
 //
-// It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX driver does, and that one reads
-// the files.
+// It takes no lock, so that a file can be read while it is being written. Otherwise it does what HDF5's own POSIX
+// driver does, and that one reads the files.
 #include "base/h5driver.h"
 
 #include <errno.h>
@@ -161,7 +162,8 @@ static void forget(driver_file *f, haddr_t address, haddr_t end)
 {
     for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < end; k++) {
         page *g = f->pages[k];
-        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < end; i++) g->waits[i / WORD] &= ~((uint64_t)1 << i % WORD);
+        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < end; i++)
+            g->waits[i / WORD] &= ~((uint64_t)1 << i % WORD);
     }
 }
 
@@ -189,19 +191,26 @@ static void put_run(driver_file *f, haddr_t address, haddr_t end)
     free(whole);
 }
 
-/// The superblock says how long the file is: it comes when the file has that length, and before what leads beyond the old one.
+/// The superblock says how long the file is: it comes when the file has that length, and before what leads beyond the
+/// old one.
 static void put_superblock(driver_file *f)
 {
     const size_t k = page_from(f, f->super);
-    if (k == f->n_pages || f->pages[k]->at > f->super || !waits(f->pages[k], (size_t)(f->super - f->pages[k]->at))) return;
+    if (k == f->n_pages || f->pages[k]->at > f->super || !waits(f->pages[k], (size_t)(f->super - f->pages[k]->at)))
+        return;
     struct stat st;
-    if (!*f->errnum && (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && ftruncate(f->fd, (off_t)f->eoa) != 0))) *f->errnum = errno;
+    if (!*f->errnum &&
+        (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && ftruncate(f->fd, (off_t)f->eoa) != 0)))
+        *f->errnum = errno;
     put_run(f, f->super, f->super_end);
     forget(f, f->super, f->super_end);
 }
 
 /// Is byte i of a page of an index that was there at the last flush?
-static bool old_index(const driver_file *f, const page *g, size_t i) { return g->at + i < f->flushed && (g->index[i / WORD] >> i % WORD & 1); }
+static bool old_index(const driver_file *f, const page *g, size_t i)
+{
+    return g->at + i < f->flushed && (g->index[i / WORD] >> i % WORD & 1);
+}
 
 /// Bytes without a gap, all of an old index or none, all old or all new.
 typedef struct run {
@@ -282,7 +291,8 @@ static herr_t driver_query(const H5FD_t *file, unsigned long *flags)
 {
     (void)file;
     if (flags)
-        *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA | H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
+        *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_DATA_SIEVE | H5FD_FEAT_AGGREGATE_SMALLDATA |
+                 H5FD_FEAT_DEFAULT_VFD_COMPATIBLE;
     return 0;
 }
 
@@ -326,7 +336,8 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t
     return 0;
 }
 
-static herr_t driver_write(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size, const void *buffer)
+static herr_t driver_write(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t address, size_t size,
+                           const void *buffer)
 {
     (void)transfer;
     driver_file *f = (driver_file *)file;

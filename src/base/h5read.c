@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a sealed file, with one way to fail.
+// Reading back what this program wrote: a protected by a checksum file, with one way to fail.
 #include "base/h5read.h"
 
-#include "base/seal.h"
+#include "base/checksum.h"
 
 typedef struct { const char *path; bt_errors *err; } whole;
 
@@ -51,13 +51,15 @@ static void fail(bt_h5_reader *r, const char *name)
 {
     if (r->status != BT_OK) return;
     r->status = BT_ERR_CASE;
-    bt_errors_add(r->err, "%s: %s cannot be read or has another shape than expected; use the program that wrote the file", r->path, name);
+    bt_errors_add(r->err,
+                  "%s: %s cannot be read or has another shape than expected; use the program that wrote the file",
+                  r->path, name);
 }
 
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
 {
     *r = (bt_h5_reader){.file = -1, .path = path, .err = err};
-    r->status = bt_seal_check(path, kind, NULL, err);
+    r->status = bt_checksum_check(path, kind, NULL, err);
     if (r->status != BT_OK) return r->status;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
@@ -111,7 +113,8 @@ void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int
         size[0] = (hsize_t)n;
         const hid_t here = H5Screate_simple(rank, size, NULL);
         const bool filled = H5Sget_simple_extent_npoints(here) > 0;
-        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 && (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
+        good = H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+               (!filled || H5Dread(d, mem, here, space, H5P_DEFAULT, to) >= 0);
         H5Sclose(here);
     }
     if (space >= 0) H5Sclose(space);

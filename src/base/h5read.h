@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a sealed file, with one way to fail.
+// Reading back what this program wrote: a protected by a checksum file, with one way to fail.
 #ifndef BT_H5READ_H
 #define BT_H5READ_H
 
@@ -20,7 +20,7 @@ typedef struct bt_h5_reader {
     bt_errors *err;
 } bt_h5_reader;
 
-/// Check the seal, open, and bt_h5_whole. path must stay valid. Errors: those of bt_seal_check and bt_h5_whole.
+/// Check the checksum, open, and bt_h5_whole. path must stay valid. Errors: those of bt_checksum_check and bt_h5_whole.
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
 bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 
@@ -28,7 +28,8 @@ bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 bool bt_h5_there(const bt_h5_reader *r, const char *name);
 /// Size of a dataset's dimension k, 0 = not so many.
 int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
-/// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem: H5T_NATIVE_...
+/// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem:
+/// H5T_NATIVE_...
 void bt_h5_read(bt_h5_reader *r, const char *name, hid_t mem, int64_t first, int64_t n, int64_t width, void *to);
 
 #endif

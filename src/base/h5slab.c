@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // A dataset whose rows are written by all ranks, each its own.
 //
-// On one rank rows go through HDF5, in chunks of at most 1 MB that are shuffled and deflated. On several, HDF5 has the file
-// open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill values), says where the rows
-// lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
+// On one rank rows go through HDF5, in chunks of at most 1 MB that are shuffled and deflated. On several, HDF5 has the
+// file open on rank 0 alone: it lays the datasets out (space allocated when a dataset is made or grows, no fill
+// values), says where the rows lie, and every rank writes its rows there with pwrite. Such rows are not compressed.
 //
-// Rejected: HDF5's own parallel driver. It must keep one copy of all metadata a rank, and each change of it is collective. A write that fails on
-// one rank (full disk, quota) leaves the others waiting inside the library or inside MPI-IO, and a file that cannot
-// be closed crashes in MPI_Finalize; the reason, a number from the system, is lost on the way. Here errors are plain errno values
-// on the rank that met them. What deflate gains on poses and vertices, a quarter to a third, is the price.
+// Rejected: HDF5's own parallel driver. It must keep one copy of all metadata a rank, and each change of it is
+// collective. A write that fails on one rank (full disk, quota) leaves the others waiting inside the library or inside
+// MPI-IO, and a file that cannot be closed crashes in MPI_Finalize; the reason, a number from the system, is lost on
+// the way. Here errors are plain errno values on the rank that met them. What deflate gains on poses and vertices, a
+// quarter to a third, is the price.
 #include "base/h5slab.h"
 
 #include <errno.h>
@@ -23,7 +24,13 @@ static bt_slab describe(bt_h5 *h, hid_t type, int64_t n, int width)
     const size_t row = H5Tget_size(type) * (size_t)(width ? width : 1);
     // Pieces of equal length, as the last one is stored whole too.
     const int64_t most = (int64_t)(BT_SLAB_BYTES / row), pieces = n > 0 ? (n + most - 1) / most : 1;
-    return (bt_slab){.h = h, .dataset = -1, .type = type, .n = n, .width = width, .row_bytes = row, .piece = n > 0 ? (n + pieces - 1) / pieces : 1};
+    return (bt_slab){.h = h,
+                     .dataset = -1,
+                     .type = type,
+                     .n = n,
+                     .width = width,
+                     .row_bytes = row,
+                     .piece = n > 0 ? (n + pieces - 1) / pieces : 1};
 }
 
 bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int width, bool packed)
@@ -31,7 +38,8 @@ bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int wid
     bt_slab s = describe(h, type, n, width);
     packed = packed && !bt_h5_shared(h) && (size_t)n * s.row_bytes > SMALL;
     if (!packed && n > 0) s.piece = n;
-    s.dataset = bt_h5_dataset(h, name, type, width ? 2 : 1, (hsize_t[]){(hsize_t)n, (hsize_t)width}, packed ? (hsize_t)s.piece : 0);
+    s.dataset = bt_h5_dataset(h, name, type, width ? 2 : 1, (hsize_t[]){(hsize_t)n, (hsize_t)width},
+                              packed ? (hsize_t)s.piece : 0);
     return s;
 }
 
@@ -39,7 +47,8 @@ bt_slab bt_slab_growing(bt_h5 *h, const char *name, hid_t type, int64_t n, int w
 {
     bt_slab s = describe(h, type, n, width);
     s.growing = true;
-    s.dataset = bt_h5_growing(h, name, type, width ? 3 : 2, (hsize_t[]){(hsize_t)n, (hsize_t)width}, (hsize_t[]){1, (hsize_t)s.piece}, !bt_h5_shared(h));
+    s.dataset = bt_h5_growing(h, name, type, width ? 3 : 2, (hsize_t[]){(hsize_t)n, (hsize_t)width},
+                              (hsize_t[]){1, (hsize_t)s.piece}, !bt_h5_shared(h));
     return s;
 }
 
@@ -60,7 +69,9 @@ bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k)
     if (c->rank == 0)
         for (int i = 0; i < k; i++) {
             const int64_t pieces = pieces_of(s[i]);
-            for (int64_t j = 0; j < pieces; j++) p[j] = bt_h5_address(s[i]->h, s[i]->dataset, s[i]->growing, (hsize_t)s[i]->frame, (hsize_t)(j * s[i]->piece));
+            for (int64_t j = 0; j < pieces; j++)
+                p[j] = bt_h5_address(s[i]->h, s[i]->dataset, s[i]->growing, (hsize_t)s[i]->frame,
+                                     (hsize_t)(j * s[i]->piece));
             p += pieces;
         }
     words[0] = (uint64_t)s[0]->h->status;

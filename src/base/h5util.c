@@ -12,7 +12,7 @@
 
 #include "base/fileio.h"
 #include "base/h5driver.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 static herr_t innermost_text(unsigned n, const H5E_error2_t *e, void *data)
 {
@@ -53,9 +53,10 @@ static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_er
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
     bool set = bt_h5driver_select(access, h->errnum) >= 0;
-    // Metadata stay in memory between flushes, so that a reader, or an interrupted run, finds the state of the last flush. The
-    // cache has room for far more than changes between two flushes, so what leaves it is old and unchanged; and a bound,
-    // since a flush looks at all of it: without one 3,000 frames of 142 floes took 7 s to write and 10,000 took 89 s, with it 2 s and 8 s.
+    // Metadata stay in memory between flushes, so that a reader, or an interrupted run, finds the state of the last
+    // flush. The cache has room for far more than changes between two flushes, so what leaves it is old and unchanged;
+    // and a bound, since a flush looks at all of it: without one 3,000 frames of 142 floes took 7 s to write and 10,000
+    // took 89 s, with it 2 s and 8 s.
     const size_t room = (size_t)1 << 21;
     H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
     set = set && H5Pget_mdc_config(access, &cache) >= 0;
@@ -80,7 +81,10 @@ static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_er
 }
 
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, 0, err); }
-bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err) { return create(h, path, BT_SEAL_BYTES, err); }
+bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err)
+{
+    return create(h, path, BT_CHECKSUM_BYTES, err);
+}
 
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err)
 {
@@ -257,7 +261,8 @@ void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double va
     attr(h, object, name, H5T_NATIVE_DOUBLE, &value);
 }
 
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk, bool packed)
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk,
+                    bool packed)
 {
     if (idle(h)) return -1;
     hsize_t now[3] = {0}, most[3] = {H5S_UNLIMITED}, piece[3] = {chunk[0]};
@@ -293,7 +298,8 @@ void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length)
 }
 
 /// A block of a dataset, from start, of the given size.
-static void write_block(bt_h5 *h, hid_t dataset, hid_t mem, int rank, const hsize_t *start, const hsize_t *size, const void *data)
+static void write_block(bt_h5 *h, hid_t dataset, hid_t mem, int rank, const hsize_t *start, const hsize_t *size,
+                        const void *data)
 {
     const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(rank, size, NULL);
     const bool filled = H5Sget_simple_extent_npoints(here) > 0;
@@ -318,13 +324,15 @@ void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t 
 {
     if (idle(h) || n == 0) return;
     const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(1, &n, NULL);
-    const bool done = H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, NULL, &n, NULL) >= 0 && H5Dread(dataset, mem, here, space, H5P_DEFAULT, data) >= 0;
+    const bool done = H5Sselect_hyperslab(space, H5S_SELECT_SET, &first, NULL, &n, NULL) >= 0 &&
+                      H5Dread(dataset, mem, here, space, H5P_DEFAULT, data) >= 0;
     if (!done || *h->errnum) fail(h, "read the file back");
     H5Sclose(here);
     H5Sclose(space);
 }
 
-void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n, const void *rows)
+void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n,
+                      const void *rows)
 {
     if (idle(h) || n == 0) return;
     hsize_t size[3] = {0}, start[3] = {0};
@@ -347,9 +355,10 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
     } else {
         unsigned mask;
         hsize_t size;
-        if (H5Dget_chunk_info_by_coord(dataset, (hsize_t[3]){frame, row}, &mask, &address, &size) < 0) address = HADDR_UNDEF;
+        if (H5Dget_chunk_info_by_coord(dataset, (hsize_t[3]){frame, row}, &mask, &address, &size) < 0)
+            address = HADDR_UNDEF;
 #if !H5_VERSION_GE(1, 14, 4) // before that without the user block (HDF5 issue 3003)
-        if (address != HADDR_UNDEF) address += BT_SEAL_BYTES;
+        if (address != HADDR_UNDEF) address += BT_CHECKSUM_BYTES;
 #endif
     }
     check(h, address != HADDR_UNDEF);

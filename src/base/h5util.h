@@ -7,8 +7,8 @@
 
 #include "bergtow/comm.h"
 
-/// An open file and its state. After a failure, and on a rank that has the file not open in HDF5, every function below does
-/// nothing, so that a sequence of writes needs one check at its end.
+/// An open file and its state. After a failure, and on a rank that has the file not open in HDF5, every function below
+/// does nothing, so that a sequence of writes needs one check at its end.
 typedef struct bt_h5 {
     hid_t file;     ///< −1 on ranks other than 0
     int raw;        ///< descriptor for bt_h5_write_raw, −1 on one rank
@@ -20,9 +20,10 @@ typedef struct bt_h5 {
 
 /// Create (truncate) a file that other programs may read while it is being written.
 bt_status bt_h5_create(bt_h5 *h, const char *path, bt_errors *err);
-/// The same with room for a seal at its front (seal.h).
+/// The same with room for a checksum at its front (checksum.h).
 bt_status bt_h5_create_with_room(bt_h5 *h, const char *path, bt_errors *err);
-/// Collective. The same on rank 0, with room for a seal, for a file into which the other ranks write too, see h5slab.h. Returns the same on all ranks.
+/// Collective. The same on rank 0, with room for a checksum, for a file into which the other ranks write too, see
+/// h5slab.h. Returns the same on all ranks.
 bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_errors *err);
 /// Several ranks write into the file.
 static inline bool bt_h5_shared(const bt_h5 *h) { return h->raw >= 0; }
@@ -38,7 +39,8 @@ bt_status bt_h5_close(bt_h5 *h);
 void bt_h5_group(bt_h5 *h, const char *name);
 /// Whole dataset [n] (width 0) or [n][width], contiguous. mem: H5T_NATIVE_...
 void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data);
-/// A dataset of rank 1 or 2 to be filled later. chunk: rows in a chunk, shuffled and deflated; 0 = contiguous. −1 on failure.
+/// A dataset of rank 1 or 2 to be filled later. chunk: rows in a chunk, shuffled and deflated; 0 = contiguous. −1 on
+/// failure.
 hid_t bt_h5_dataset(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, hsize_t chunk);
 void bt_h5_write_text(bt_h5 *h, const char *name, const char *text);                         ///< scalar, UTF-8
 void bt_h5_write_names(bt_h5 *h, const char *name, hsize_t n, const char *const *names);     ///< [n], UTF-8
@@ -48,9 +50,10 @@ void bt_h5_attr_int(bt_h5 *h, const char *object, const char *name, int64_t valu
 void bt_h5_attr_double(bt_h5 *h, const char *object, const char *name, double value);
 
 /// A dataset of rank 1 to 3 that grows along its first dimension from zero; the others are dims[rank − 1].
-/// chunk: entries of the first two dimensions in a chunk. packed: shuffled and deflated; chunk[0] = 1 then, for a chunk that is written again has
-/// another length, and a kill finds neither the old one nor the new. Returns −1 on failure.
-hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk, bool packed);
+/// chunk: entries of the first two dimensions in a chunk. packed: shuffled and deflated; chunk[0] = 1 then, for a chunk
+/// that is written again has another length, and a kill finds neither the old one nor the new. Returns −1 on failure.
+hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsize_t *dims, const hsize_t *chunk,
+                    bool packed);
 /// Set the length of the first dimension.
 void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length);
 /// Append n entries along the first dimension, which has `at` entries now.
@@ -60,7 +63,8 @@ void bt_h5_append(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t at, hsize_t n, con
 void bt_h5_read_back(bt_h5 *h, hid_t dataset, hid_t mem, hsize_t first, hsize_t n, void *data);
 
 /// Rows first up to first + n of a dataset [rows]... or, if it has frames, [frame][rows]...
-void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n, const void *rows);
+void bt_h5_write_rows(bt_h5 *h, hid_t dataset, hid_t mem, bool frames, hsize_t frame, hsize_t first, hsize_t n,
+                      const void *rows);
 /// Where in the file a row lies, in bytes; of a dataset that is not packed, in a shared file.
 uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsize_t row);
 /// Bytes to a place in a shared file, from any rank.

@@ -44,8 +44,11 @@ void bt_largest_print(FILE *out)
         {"mean size of the floes", BT_LEAST_SIZE, "m"},
         {"thickness of a floe", BT_LEAST_THICKNESS, "m"},
     };
-    fputs("\nWhat is refused as too large, with the remedy. Beyond these, a run that needs more memory than the machine has is refused before it begins.\n\n", out);
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) fprintf(out, "%-40s %12.10g %s\n", rows[i].what, rows[i].most, rows[i].unit);
+    fputs("\nWhat is refused as too large, with the remedy. Beyond these, a run that needs more memory than the "
+          "machine has is refused before it begins.\n\n",
+          out);
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        fprintf(out, "%-40s %12.10g %s\n", rows[i].what, rows[i].most, rows[i].unit);
     fputs("\nWhat is refused as too small to be ice.\n\n", out);
     for (size_t i = 0; i < sizeof floors / sizeof *floors; i++)
         fprintf(out, "%-40s %12.10g %s\n", floors[i].what, floors[i].least, floors[i].unit);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What one input may ask for at most: every limit of size, in one place.
 //
-// A case of twenty lines can ask for more memory, disk or time than any machine has, and a damaged or hostile file for more than that. Whatever
-// grows with a number of an input is held against a limit here before it is begun, and refused with key, value, limit and remedy. The limits are
-// choices, far above what is simulated today and below what would exhaust a large machine. `bergtow --list-keys` prints them.
+// A case of twenty lines can ask for more memory, disk or time than any machine has, and a damaged or hostile file for
+// more than that. Whatever grows with a number of an input is held against a limit here before it is begun, and refused
+// with key, value, limit and remedy. The limits are choices, far above what is simulated today and below what would
+// exhaust a large machine. `bergtow --list-keys` prints them.
 #ifndef BT_LARGEST_H
 #define BT_LARGEST_H
 
@@ -28,7 +29,9 @@ enum {
     BT_MOST_FRAMES = 1000000,
     BT_MOST_ROWS = 2000000,            ///< of a CSV table
     BT_MOST_RING = 10000,              ///< vertices of one outline before it is simplified or refused
-    BT_MOST_LISTS = 40000000,          ///< `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes where the file is not taken apart (map_features.h)
+    /// `[` of a GeoJSON file, about one a vertex: each takes some 200 bytes where the file is not taken apart
+    /// (map_features.h)
+    BT_MOST_LISTS = 40000000,
 };
 
 // What is less is no ice, but a slip of units; and products of smaller numbers leave the range of a double.

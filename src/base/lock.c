@@ -17,7 +17,8 @@
 static bool still_there(int fd, const char *path)
 {
     struct stat here, named;
-    return fstat(fd, &here) == 0 && stat(path, &named) == 0 && here.st_ino == named.st_ino && here.st_dev == named.st_dev;
+    return fstat(fd, &here) == 0 && stat(path, &named) == 0 && here.st_ino == named.st_ino &&
+           here.st_dev == named.st_dev;
 }
 
 static void tell_holder(int fd, const char *dir, bt_errors *err)
@@ -26,7 +27,8 @@ static void tell_holder(int fd, const char *dir, bt_errors *err)
     const ssize_t n = pread(fd, who, sizeof who - 1, 0);
     who[n > 0 ? n : 0] = 0;
     who[strcspn(who, "\n")] = 0;
-    bt_errors_add(err, "%s: another run is at work in this folder (%s); wait for its end, or give another folder", dir, *who ? who : "it has not said who");
+    bt_errors_add(err, "%s: another run is at work in this folder (%s); wait for its end, or give another folder", dir,
+                  *who ? who : "it has not said who");
 }
 
 int bt_lock_take(const char *dir, bt_errors *err)
@@ -39,7 +41,8 @@ int bt_lock_take(const char *dir, bt_errors *err)
             bt_file_fail(path, "make the file", errno, err);
             break;
         }
-        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno != ENOLCK && errno != EOPNOTSUPP && errno != ENOSYS) { // a file system without locks has to do without
+        // a file system without locks has to do without
+        if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno != ENOLCK && errno != EOPNOTSUPP && errno != ENOSYS) {
             tell_holder(fd, dir, err);
             close(fd);
             fd = -1;
@@ -52,7 +55,8 @@ int bt_lock_take(const char *dir, bt_errors *err)
         char host[128] = "unknown host", who[200];
         gethostname(host, sizeof host - 1);
         const int n = snprintf(who, sizeof who, "process %ld on %s\n", (long)getpid(), host);
-        if (ftruncate(fd, 0) != 0 || pwrite(fd, who, (size_t)n, 0) != n) errno = 0; // who it is helps the next one; the lock holds without
+        // who it is helps the next one; the lock holds without
+        if (ftruncate(fd, 0) != 0 || pwrite(fd, who, (size_t)n, 0) != n) errno = 0;
     }
     free(path);
     return fd;

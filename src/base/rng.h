@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Random numbers that depend on (seed, purpose, id) alone: Philox 4×64-10 (Salmon et al. 2011, SC11, "Parallel random
-// numbers: as easy as 1, 2, 3") with key (seed, purpose) and counter (id, block). No state is shared between ids, so the
-// numbers of a floe do not depend on threads, on ranks, or on how many numbers another floe has drawn.
+// numbers: as easy as 1, 2, 3") with key (seed, purpose) and counter (id, block). No state is shared between ids, so
+// the numbers of a floe do not depend on threads, on ranks, or on how many numbers another floe has drawn.
 #ifndef BT_RNG_H
 #define BT_RNG_H
 

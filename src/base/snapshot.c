@@ -10,7 +10,9 @@
 
 size_t bt_item_size(bt_item_type type)
 {
-    static const size_t size[BT_ITEM_TYPES] = {[BT_ITEM_F64] = 8, [BT_ITEM_I64] = 8, [BT_ITEM_I32] = 4, [BT_ITEM_U32] = 4, [BT_ITEM_U16] = 2, [BT_ITEM_U8] = 1, [BT_ITEM_TEXT] = 1};
+    static const size_t size[BT_ITEM_TYPES] = {
+        [BT_ITEM_F64] = 8, [BT_ITEM_I64] = 8, [BT_ITEM_I32] = 4, [BT_ITEM_U32] = 4,
+        [BT_ITEM_U16] = 2, [BT_ITEM_U8] = 1,  [BT_ITEM_TEXT] = 1};
     return size[type];
 }
 
@@ -29,9 +31,18 @@ void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64
     return i->data;
 }
 
-void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text) { bt_snapshot_add(s, name, BT_ITEM_TEXT, (int64_t)strlen(text) + 1, 1, text); }
-void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value) { bt_snapshot_add(s, name, BT_ITEM_I64, 1, 1, &value); }
-void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value) { bt_snapshot_add(s, name, BT_ITEM_F64, 1, 1, &value); }
+void bt_snapshot_add_text(bt_snapshot *s, const char *name, const char *text)
+{
+    bt_snapshot_add(s, name, BT_ITEM_TEXT, (int64_t)strlen(text) + 1, 1, text);
+}
+void bt_snapshot_add_int(bt_snapshot *s, const char *name, int64_t value)
+{
+    bt_snapshot_add(s, name, BT_ITEM_I64, 1, 1, &value);
+}
+void bt_snapshot_add_real(bt_snapshot *s, const char *name, double value)
+{
+    bt_snapshot_add(s, name, BT_ITEM_F64, 1, 1, &value);
+}
 
 void bt_snapshot_add_rows(bt_snapshot *s, const char *group, const bt_state_row *row, int n_rows, const void *base)
 {
@@ -64,7 +75,10 @@ const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name)
 static void complain(bt_snapshot *s, const char *name, const char *what)
 {
     if (!s->faulty && s->err)
-        bt_errors_add(s->err, "%s: /%s %s; it was written by another version of the program: go on with that one, or start the run anew", s->path ? s->path : "checkpoint", name, what);
+        bt_errors_add(
+            s->err,
+            "%s: /%s %s; it was written by another version of the program: go on with that one, or start the run anew",
+            s->path ? s->path : "checkpoint", name, what);
     s->faulty = true;
 }
 
@@ -74,7 +88,8 @@ void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, 
     char where[32] = "";
     if (row >= 0) snprintf(where, sizeof where, ", row %" PRId64 ",", row);
     if (!s->faulty && s->err)
-        bt_errors_add(s->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew", s->path ? s->path : "checkpoint", name, where, what);
+        bt_errors_add(s->err, "%s: /%s%s %s; no run leaves that: take another checkpoint, or start the run anew",
+                      s->path ? s->path : "checkpoint", name, where, what);
     s->faulty = true;
 }
 
@@ -89,7 +104,8 @@ static const bt_item *demand(bt_snapshot *s, const char *name, bt_item_type type
 {
     const bt_item *i = bt_snapshot_find(s, name);
     if (!i) complain(s, name, "is missing");
-    else if (i->type != type || i->width != width || (n >= 0 && i->n != n)) complain(s, name, "has another shape than expected");
+    else if (i->type != type || i->width != width || (n >= 0 && i->n != n))
+        complain(s, name, "has another shape than expected");
     else if (type == BT_ITEM_U8 && !yes_and_no(i)) bt_snapshot_want(s, false, name, -1, "holds more than 0 and 1");
     else return i;
     return NULL;
@@ -205,7 +221,8 @@ static bool differ(const bt_item *a, const bt_item *b, char out[400])
         return true;
     }
     if (a->type != b->type || a->width != b->width || a->n != b->n) {
-        snprintf(out, 400, "/%s: %" PRId64 " rows of %d in one, %" PRId64 " of %d in the other", a->name, a->n, a->width, b->n, b->width);
+        snprintf(out, 400, "/%s: %" PRId64 " rows of %d in one, %" PRId64 " of %d in the other", a->name, a->n,
+                 a->width, b->n, b->width);
         return true;
     }
     int64_t first = -1, many = 0;
@@ -218,8 +235,8 @@ static bool differ(const bt_item *a, const bt_item *b, char out[400])
     char x[40], y[40];
     bt_item_number(a, first, x);
     bt_item_number(b, first, y);
-    snprintf(out, 400, "/%s: row %" PRId64 ", column %d: %s and %s (%" PRId64 " of %" PRId64 " numbers differ)", a->name, first / a->width, (int)(first % a->width), x, y, many,
-             a->n * a->width);
+    snprintf(out, 400, "/%s: row %" PRId64 ", column %d: %s and %s (%" PRId64 " of %" PRId64 " numbers differ)",
+             a->name, first / a->width, (int)(first % a->width), x, y, many, a->n * a->width);
     return true;
 }
 

@@ -1,16 +1,25 @@
 // SPDX-License-Identifier: MIT
 // A set of named arrays: what a checkpoint is in memory.
 //
-// Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows what the
-// arrays mean. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it took: they are no part of
-// it, and are not compared.
+// Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows
+// what the arrays mean. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it
+// took: they are no part of it, and are not compared.
 #ifndef BT_SNAPSHOT_H
 #define BT_SNAPSHOT_H
 
 #include "bergtow/comm.h"
 
 /// U8 is for yes and no alone: it is taken as a bool, for which other values are undefined.
-typedef enum { BT_ITEM_F64, BT_ITEM_I64, BT_ITEM_I32, BT_ITEM_U32, BT_ITEM_U16, BT_ITEM_U8, BT_ITEM_TEXT, BT_ITEM_TYPES } bt_item_type;
+typedef enum {
+    BT_ITEM_F64,
+    BT_ITEM_I64,
+    BT_ITEM_I32,
+    BT_ITEM_U32,
+    BT_ITEM_U16,
+    BT_ITEM_U8,
+    BT_ITEM_TEXT,
+    BT_ITEM_TYPES
+} bt_item_type;
 
 typedef struct bt_item {
     char *name;
@@ -37,7 +46,8 @@ typedef struct bt_state_row {
 } bt_state_row;
 
 size_t bt_item_size(bt_item_type type); ///< bytes of one number
-const char *bt_item_number(const bt_item *i, int64_t at, char out[40]); ///< number `at` of an array in digits that give it back; returns out
+/// number `at` of an array in digits that give it back; returns out
+const char *bt_item_number(const bt_item *i, int64_t at, char out[40]);
 
 /// Add an array [n][width]; data are copied, or zeros. Returns where it lies.
 void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, const void *data);
@@ -53,7 +63,8 @@ const bt_item *bt_snapshot_find(const bt_snapshot *s, const char *name);
 int64_t bt_snapshot_rows(bt_snapshot *s, const char *name);
 /// Copy an array that must be there with this type and shape; otherwise complain, and leave `to`.
 void bt_snapshot_take(bt_snapshot *s, const char *name, bt_item_type type, int64_t n, int width, void *to);
-/// Complain unless good: what the array holds, in its row (from 0; -1: as a whole), is what no run leaves; `what` completes "/name, row 3, ...".
+/// Complain unless good: what the array holds, in its row (from 0; -1: as a whole), is what no run leaves; `what`
+/// completes "/name, row 3, ...".
 void bt_snapshot_want(bt_snapshot *s, bool good, const char *name, int64_t row, const char *what);
 const char *bt_snapshot_text(bt_snapshot *s, const char *name); ///< "" and a complaint when it is missing
 int64_t bt_snapshot_int(bt_snapshot *s, const char *name);
@@ -70,7 +81,7 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// Into a sealed HDF5 file and back; errors as bt_seal_check, and BT_ERR_IO.
+/// Into a protected by a checksum HDF5 file and back; errors as bt_checksum_check, and BT_ERR_IO.
 bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err);
 bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
 

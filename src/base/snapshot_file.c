@@ -8,7 +8,7 @@
 
 #include "base/h5read.h"
 #include "base/h5util.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 
 static hid_t memory_type(bt_item_type type)
@@ -48,7 +48,7 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *e
         else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
     }
     status = bt_h5_close(&h);
-    return status == BT_OK ? bt_seal_write(path, BT_SEAL_CHECKPOINT, err) : status;
+    return status == BT_OK ? bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, err) : status;
 }
 
 enum { MOST_COLUMNS = 1000 };
@@ -65,16 +65,23 @@ static bool describe(hid_t d, bt_item_type *type, int64_t *n, int *width)
     const size_t bytes = H5Tget_size(t);
     // What it claims to be must be there: nothing this program writes is stored in another way than whole.
     const hsize_t stored = H5Dget_storage_size(d), numbers = bytes > 0 ? stored / bytes : 0;
-    good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS && (size[0] == 0 ? stored == 0 : stored == numbers * bytes && numbers % size[1] == 0 && numbers / size[1] == size[0]);
+    good = good && size[1] >= 1 && size[1] <= MOST_COLUMNS &&
+           (size[0] == 0 ? stored == 0
+                         : stored == numbers * bytes && numbers % size[1] == 0 && numbers / size[1] == size[0]);
     switch (H5Tget_class(t)) {
     case H5T_FLOAT: *type = BT_ITEM_F64, good = good && bytes == 8; break;
     case H5T_INTEGER: {
         const bool sign = H5Tget_sign(t) == H5T_SGN_2;
-        *type = sign ? bytes == 8 ? BT_ITEM_I64 : BT_ITEM_I32 : bytes == 4 ? BT_ITEM_U32 : bytes == 2 ? BT_ITEM_U16 : BT_ITEM_U8;
+        *type = sign         ? bytes == 8 ? BT_ITEM_I64 : BT_ITEM_I32
+                : bytes == 4 ? BT_ITEM_U32
+                : bytes == 2 ? BT_ITEM_U16
+                             : BT_ITEM_U8;
         good = good && bytes == bt_item_size(*type);
         break;
     }
-    case H5T_STRING: *type = BT_ITEM_TEXT, *n = (int64_t)bytes, *width = 1, good = good && rank == 0 && !H5Tis_variable_str(t); break;
+    case H5T_STRING:
+        *type = BT_ITEM_TEXT, *n = (int64_t)bytes, *width = 1, good = good && rank == 0 && !H5Tis_variable_str(t);
+        break;
     default: good = false;
     }
     H5Tclose(t);
@@ -105,7 +112,9 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
         } else {
             void *to = bt_snapshot_add(s, full + 1, type, n, width, NULL);
             const hid_t stored = H5Dget_type(o);
-            if (n * width > 0 && H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0) result = -1;
+            if (n * width > 0 &&
+                H5Dread(o, type == BT_ITEM_TEXT ? stored : memory_type(type), H5S_ALL, H5S_ALL, H5P_DEFAULT, to) < 0)
+                result = -1;
             if (type == BT_ITEM_TEXT && !is_text(to, n)) result = -1;
             H5Tclose(stored);
         }
@@ -124,7 +133,7 @@ bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err)
 {
     *s = (bt_snapshot){.path = path, .err = err};
     bt_h5_reader r;
-    if (bt_h5_open(&r, path, BT_SEAL_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
+    if (bt_h5_open(&r, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
     if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0) {
         bt_errors_add(err, "%s: holds what this program does not write; use the program that wrote it", path);
         r.status = BT_ERR_CASE;

@@ -1,28 +1,33 @@
 // SPDX-License-Identifier: MIT
 // Mean with its interval, trend, and the start of the steady window of a correlated series.
 //
-// Interval of the mean: the cosine estimator with equal weights [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36].
+// Interval of the mean: the cosine estimator with equal weights [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ.
+//     Stat. 36].
 //     Λ_j = √(2/n) Σ_i (x_i − m) cos(π j (i + ½)/n),   j = 1..ν      how much of the slowest waves the series holds
 //     S_ν = (1/ν) Σ_{j≤ν} Λ_j²,   var(m) = max(S_FEW, S_WAVES) / n,   interval m ± FACTOR √var(m)
-// The Λ_j are nearly independent, each with the variance of the spectrum near frequency zero, which is n var(m): S_ν alone would take Student's t
-// with ν degrees of freedom, 4.30 for 2 and 3.18 for 3. FACTOR is that of 3.
-// Why so few waves: what floes do about a body is slow. In dense ice the spectrum falls towards zero: ice that has been pushed away in one jam
-// is missing in the next, forces 1 to 3 body lengths apart are negatively correlated, and whatever looks at shorter times (autocorrelations up to
-// Sokal's window, batch means, an autoregression, six waves of a window of 40 min) gives 1.3 to 1.9 times the scatter of fields at 65 %. In open ice
-// it rises: floes stay on the bow for ten minutes, and three waves see only three quarters of the scatter at 20 %. Hence the larger of both.
-// Measured coverage (tests/long/test_intervals.py), chosen on 80 fields a concentration and tried on 80 others: full scale, a window of 40 min, 90 % at
-// 20 %, 95 % at 50 %, 96 % at 65 %, 94 % at 80 % (all 160: 91, 98, 96, 95 %). The larger of two and six waves with 2.78: 89, 98, 99, 97 % of the 160.
+// The Λ_j are nearly independent, each with the variance of the spectrum near frequency zero, which is n var(m): S_ν
+// alone would take Student's t with ν degrees of freedom, 4.30 for 2 and 3.18 for 3. FACTOR is that of 3.
+// Why so few waves: what floes do about a body is slow. In dense ice the spectrum falls towards zero: ice that has been
+// pushed away in one jam is missing in the next, forces 1 to 3 body lengths apart are negatively correlated, and
+// whatever looks at shorter times (autocorrelations up to Sokal's window, batch means, an autoregression, six waves of
+// a window of 40 min) gives 1.3 to 1.9 times the scatter of fields at 65 %. In open ice it rises: floes stay on the bow
+// for ten minutes, and three waves see only three quarters of the scatter at 20 %. Hence the larger of both. Measured
+// coverage (tests/long/test_intervals.py), chosen on 80 fields a concentration and tried on 80 others: full scale, a
+// window of 40 min, 90 % at 20 %, 95 % at 50 %, 96 % at 65 %, 94 % at 80 % (all 160: 91, 98, 96, 95 %). The larger of
+// two and six waves with 2.78: 89, 98, 99, 97 % of the 160.
 //
 // Correlation time: B batches (at most BATCHES), and a first-order autoregression through their deviations d_k,
-//     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²       p parameters fitted
+//     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²       p parameters
+//     fitted
 // It counts the independent samples of the short correlation and is far less noisy than ν squares.
 //
-// Trend: least squares on the same batches against the time u from −½ to ½. Of its deviations from the line, the larger of v and the mean square of
-// Λ_2..Λ_7 (slow waves that the short correlation does not know) gives
+// Trend: least squares on the same batches against the time u from −½ to ½. Of its deviations from the line, the larger
+// of v and the mean square of Λ_2..Λ_7 (slow waves that the short correlation does not know) gives
 //     se(change)² = v / Σ u_k²,                        interval change ± TREND_FACTOR se
-// A drift must be fitted before the correlation is, which it would otherwise enter as slow noise. The factor is set by measurement: 4 to 5 % false
-// alarms on white and AR(1) series of 50 to 2,600 independent samples, and a drift that parts the means of the two halves by three standard
-// errors of their difference is seen in 89 to 92 %, 90 % in the mean (tests/unit/test_stats.c).
+// A drift must be fitted before the correlation is, which it would otherwise enter as slow noise. The factor is set by
+// measurement: 4 to 5 % false alarms on white and AR(1) series of 50 to 2,600 independent samples, and a drift that
+// parts the means of the two halves by three standard errors of their difference is seen in 89 to 92 %, 90 % in the
+// mean (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
 
 #include <math.h>
@@ -104,8 +109,10 @@ bt_mean bt_stats_mean(const double *x, int64_t n)
     } else if (isfinite(sum)) {
         double z[BATCHES];
         const int count = batches_of(x, n, r.mean, z), most = count - 1;
-        const double few = slow_variance(z, count, n, 1, most < FEW ? most : FEW), more = slow_variance(z, count, n, 1, most < WAVES ? most : WAVES);
-        // One sample more or less at the end always moves the mean by about sd/n, also that of a series that alternates.
+        const double few = slow_variance(z, count, n, 1, most < FEW ? most : FEW),
+                     more = slow_variance(z, count, n, 1, most < WAVES ? most : WAVES);
+        // One sample more or less at the end always moves the mean by about sd/n, also that of a series that
+        // alternates.
         r.se = sqrt(bt_max(bt_max(few, more) / (double)n, r.sd * r.sd / ((double)n * (double)n)));
         r.low = r.mean - FACTOR * r.se;
         r.high = r.mean + FACTOR * r.se;

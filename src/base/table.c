@@ -75,7 +75,8 @@ static void read_lines(bt_table *t, char *rest, const char *end, const char *pat
     bool header = false;
     for (int number = 1; err->n - before < MOST_COMPLAINTS && (line = next_line(&rest, end, &length)); number++) {
         if (length > LONGEST_LINE || strlen(line) != length) {
-            bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number, length > LONGEST_LINE ? "is longer than a row of a table can be" : "holds a NUL character");
+            bt_errors_add(err, "%s:%d: %s; write t,u,v in each line", path, number,
+                          length > LONGEST_LINE ? "is longer than a row of a table can be" : "holds a NUL character");
             return;
         }
         char *text = trimmed(line);
@@ -83,12 +84,14 @@ static void read_lines(bt_table *t, char *rest, const char *end, const char *pat
         if (!header) {
             header = true;
             if (is_header(text)) continue;
-            bt_errors_add(err, "%s:%d: is not the header; begin the table with the line t,u,v (s, m/s, m/s)", path, number);
+            bt_errors_add(err, "%s:%d: is not the header; begin the table with the line t,u,v (s, m/s, m/s)", path,
+                          number);
             return;
         }
         double row[3];
         const char *fault = read_row(text, row, why);
-        if (!fault && t->n && !(row[0] > t->row[3 * (t->n - 1)])) fault = "its time is not after that of the row before; sort the rows and remove doubles";
+        if (!fault && t->n && !(row[0] > t->row[3 * (t->n - 1)]))
+            fault = "its time is not after that of the row before; sort the rows and remove doubles";
         if (fault) {
             bt_errors_add(err, "%s:%d: %s", path, number, fault);
             continue;
@@ -100,7 +103,8 @@ static void read_lines(bt_table *t, char *rest, const char *end, const char *pat
         if (t->n == cap) t->row = bt_realloc(t->row, (size_t)(cap = cap ? 2 * cap : 256), 3 * sizeof *t->row);
         memcpy(t->row + 3 * t->n++, row, sizeof row);
     }
-    if (err->n == before && t->n == 0) bt_errors_add(err, "%s: holds no row; write the header t,u,v and below it a row for each time", path);
+    if (err->n == before && t->n == 0)
+        bt_errors_add(err, "%s: holds no row; write the header t,u,v and below it a row for each time", path);
 }
 
 bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
@@ -120,7 +124,8 @@ bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err)
 bool bt_table_row_sound(const bt_table *t, int64_t i)
 {
     const double *row = t->row + 3 * i;
-    return isfinite(row[0]) && (i == 0 || row[0] > row[-3]) && fabs(row[1]) <= largest_speed && fabs(row[2]) <= largest_speed;
+    return isfinite(row[0]) && (i == 0 || row[0] > row[-3]) && fabs(row[1]) <= largest_speed &&
+           fabs(row[2]) <= largest_speed;
 }
 
 void bt_table_at(const bt_table *t, double time, double v[2])

@@ -5,9 +5,9 @@
 
 #include "bergtow/case.h"
 
-/// Read a table: the header "t,u,v", then rows of time and two components, times ascending; lines that are empty or begin with #
-/// are left out. Numbers are SI or carry their unit, as in a case file. t is empty after an error; what it held is released.
-/// Errors, with file and line: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+/// Read a table: the header "t,u,v", then rows of time and two components, times ascending; lines that are empty or
+/// begin with # are left out. Numbers are SI or carry their unit, as in a case file. t is empty after an error; what it
+/// held is released. Errors, with file and line: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_table_read(bt_table *t, const char *path, bt_errors *err);
 void bt_table_free(bt_table *t);
 

@@ -37,10 +37,12 @@ static bool next(parser *p, yaml_event_t *event)
     const yaml_parser_t *y = &p->yaml;
     p->failed = true;
     if (y->error == YAML_READER_ERROR)
-        bt_errors_add(p->err, "%s: byte %zu is not UTF-8 text (%s); is this a case file? save it as UTF-8", p->name, y->problem_offset, y->problem);
+        bt_errors_add(p->err, "%s: byte %zu is not UTF-8 text (%s); is this a case file? save it as UTF-8", p->name,
+                      y->problem_offset, y->problem);
     else
-        bt_errors_add(p->err, "%s:%zu: not valid YAML: %s%s%s; check indentation and colons near this line", p->name, y->problem_mark.line + 1,
-                      y->problem ? y->problem : "unknown error", y->context ? " " : "", y->context ? y->context : "");
+        bt_errors_add(p->err, "%s:%zu: not valid YAML: %s%s%s; check indentation and colons near this line", p->name,
+                      y->problem_mark.line + 1, y->problem ? y->problem : "unknown error", y->context ? " " : "",
+                      y->context ? y->context : "");
     return false;
 }
 
@@ -83,8 +85,12 @@ static bool plain_event(parser *p, const yaml_event_t *e, int line)
     if (e->type == YAML_SCALAR_EVENT) anchor = e->data.scalar.anchor, tag = e->data.scalar.tag;
     if (e->type == YAML_MAPPING_START_EVENT) anchor = e->data.mapping_start.anchor, tag = e->data.mapping_start.tag;
     if (e->type == YAML_SEQUENCE_START_EVENT) anchor = e->data.sequence_start.anchor, tag = e->data.sequence_start.tag;
-    if (e->type == YAML_ALIAS_EVENT || anchor) return refuse(p, line, "anchors and aliases (& and *) are not read in a case file; write the value out, or quote a text that begins so");
-    if (tag) return refuse(p, line, "tags (!) are not read in a case file; remove the tag, or quote a text that begins so");
+    if (e->type == YAML_ALIAS_EVENT || anchor)
+        return refuse(p, line,
+                      "anchors and aliases (& and *) are not read in a case file; write the value out, or quote a text "
+                      "that begins so");
+    if (tag)
+        return refuse(p, line, "tags (!) are not read in a case file; remove the tag, or quote a text that begins so");
     return true;
 }
 
@@ -102,8 +108,10 @@ static void read_map(parser *p, bt_node *map, int depth)
         int line = (int)e.start_mark.line + 1;
         bool good = plain_event(p, &e, line);
         if (good && e.type != YAML_SCALAR_EVENT) good = refuse(p, line, "a key must be a word; write key: value");
-        if (good && memchr(e.data.scalar.value, 0, e.data.scalar.length)) good = refuse(p, line, "a key holds a NUL character; remove it");
-        if (good && map->n >= BT_TREE_MAP) good = refuse(p, line, "more than 256 keys in one map; see bergtow --list-keys for the keys there are");
+        if (good && memchr(e.data.scalar.value, 0, e.data.scalar.length))
+            good = refuse(p, line, "a key holds a NUL character; remove it");
+        if (good && map->n >= BT_TREE_MAP)
+            good = refuse(p, line, "more than 256 keys in one map; see bergtow --list-keys for the keys there are");
         char *key = good ? copy_text(e.data.scalar.value, e.data.scalar.length) : NULL;
         yaml_event_delete(&e);
         if (!good) return;
@@ -117,7 +125,8 @@ static void read_map(parser *p, bt_node *map, int depth)
         for (int i = 0; i < map->n && twin < 0; i++)
             if (!strcmp(map->key[i], key)) twin = i;
         if (value && twin >= 0)
-            bt_errors_add(p->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", p->name, line, key, map->key_line[twin]);
+            bt_errors_add(p->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", p->name, line,
+                          key, map->key_line[twin]);
         if (!value || twin >= 0) {
             bt_tree_free(value);
             free(key);
@@ -145,8 +154,12 @@ static bt_node *read_node(parser *p, const yaml_event_t *first, int depth)
 {
     int line = (int)first->start_mark.line + 1;
     if (!plain_event(p, first, line)) return NULL;
-    if (depth > BT_TREE_DEPTH) return refuse(p, line, "nested deeper than 16 levels; no key of a case needs that"), NULL;
-    if (++p->n_nodes > BT_TREE_NODES) return refuse(p, line, "more than 2 million values; put large fields into an HDF5 file and name it in ice.field"), NULL;
+    if (depth > BT_TREE_DEPTH)
+        return refuse(p, line, "nested deeper than 16 levels; no key of a case needs that"), NULL;
+    if (++p->n_nodes > BT_TREE_NODES)
+        return refuse(p, line,
+                      "more than 2 million values; put large fields into an HDF5 file and name it in ice.field"),
+               NULL;
 
     bt_node *node = bt_alloc(1, sizeof *node);
     node->line = line;
@@ -159,7 +172,8 @@ static bt_node *read_node(parser *p, const yaml_event_t *first, int depth)
     } else {
         node->kind = BT_NODE_SCALAR;
         node->plain = first->data.scalar.style == YAML_PLAIN_SCALAR_STYLE;
-        if (memchr(first->data.scalar.value, 0, first->data.scalar.length)) refuse(p, line, "a text holds a NUL character; remove it");
+        if (memchr(first->data.scalar.value, 0, first->data.scalar.length))
+            refuse(p, line, "a text holds a NUL character; remove it");
         node->text = copy_text(first->data.scalar.value, first->data.scalar.length);
     }
     return node;
@@ -175,7 +189,8 @@ static bt_node *read_document(parser *p)
         if (e.type == YAML_STREAM_END_EVENT) end = true;
         else if (e.type == YAML_DOCUMENT_START_EVENT && ++n_documents > 1)
             refuse(p, (int)e.start_mark.line + 1, "a second document begins (---); keep one case in a file");
-        else if (e.type == YAML_SCALAR_EVENT || e.type == YAML_MAPPING_START_EVENT || e.type == YAML_SEQUENCE_START_EVENT || e.type == YAML_ALIAS_EVENT)
+        else if (e.type == YAML_SCALAR_EVENT || e.type == YAML_MAPPING_START_EVENT ||
+                 e.type == YAML_SEQUENCE_START_EVENT || e.type == YAML_ALIAS_EVENT)
             root = read_node(p, &e, 0);
         yaml_event_delete(&e);
     }

@@ -19,8 +19,8 @@ typedef struct bt_node {
 } bt_node;
 
 /// Parse a text of n bytes into a tree; NULL with one message in err, prefixed by name and line, when the text is not
-/// YAML of the plain kind: anchors, aliases, tags, several documents, keys that are not scalars and too deep nesting are
-/// refused. Duplicate keys are reported and the first one is kept. An empty text gives an empty map.
+/// YAML of the plain kind: anchors, aliases, tags, several documents, keys that are not scalars and too deep nesting
+/// are refused. Duplicate keys are reported and the first one is kept. An empty text gives an empty map.
 bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *err);
 void bt_tree_free(bt_node *node);
 

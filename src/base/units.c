@@ -44,8 +44,8 @@ static const unit units[] = {
 };
 enum { N_UNITS = sizeof units / sizeof *units };
 
-// froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b time^c has
-// the exponent 3 a + b + c/2.
+// froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b
+// time^c has the exponent 3 a + b + c/2.
 static const struct {
     const char *noun, *symbol, *bare;
     double froude;
@@ -104,13 +104,15 @@ static void list_units(bt_unit kind, char *out, size_t size)
     size_t used = 0;
     out[0] = 0;
     for (int i = 0; i < N_UNITS; i++)
-        if (units[i].kind == kind) used += (size_t)snprintf(out + used, size - used, "%s%s", used ? ", " : "", units[i].symbol);
+        if (units[i].kind == kind)
+            used += (size_t)snprintf(out + used, size - used, "%s%s", used ? ", " : "", units[i].symbol);
 }
 
 static const unit *find_unit(const char *symbol, size_t n, bt_unit kind)
 {
     for (int i = 0; i < N_UNITS; i++)
-        if ((kind == BT_UNIT_KINDS || units[i].kind == kind) && strlen(units[i].symbol) == n && !memcmp(units[i].symbol, symbol, n))
+        if ((kind == BT_UNIT_KINDS || units[i].kind == kind) && strlen(units[i].symbol) == n &&
+            !memcmp(units[i].symbol, symbol, n))
             return &units[i];
     return NULL;
 }
@@ -123,12 +125,14 @@ static bool refuse_unit(const char *number, size_t n_number, const char *symbol,
     int shown = n > 24 ? 24 : (int)n, digits = n_number > 24 ? 24 : (int)n_number;
     const char *cut = n > 24 ? "..." : "";
     if (!*known)
-        snprintf(why, BT_WHY, "\"%.*s%s\" after the number; give a plain number, as in %.*s", shown, symbol, cut, digits, number);
+        snprintf(why, BT_WHY, "\"%.*s%s\" after the number; give a plain number, as in %.*s", shown, symbol, cut,
+                 digits, number);
     else if (other)
         snprintf(why, BT_WHY, "%s is the unit of %s and this is %s; use %s", other->symbol, kinds[other->kind].noun,
                  kinds[kind].noun, known);
     else
-        snprintf(why, BT_WHY, "\"%.*s%s\" is not a unit of %s; use %s", shown, symbol, cut, kinds[kind].noun + (kinds[kind].noun[1] == 'n' ? 3 : 2), known);
+        snprintf(why, BT_WHY, "\"%.*s%s\" is not a unit of %s; use %s", shown, symbol, cut,
+                 kinds[kind].noun + (kinds[kind].noun[1] == 'n' ? 3 : 2), known);
     return false;
 }
 
@@ -138,7 +142,8 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
     size_t n = number_length(text);
     if (!n) {
         snprintf(why, BT_WHY, "\"%.40s%s\" is not a number; give %s%s%s", text, strlen(text) > 40 ? "..." : "",
-                 kinds[kind].noun, *kinds[kind].symbol ? ", as in 1.5 " : "", *kinds[kind].symbol ? kinds[kind].bare : "");
+                 kinds[kind].noun, *kinds[kind].symbol ? ", as in 1.5 " : "",
+                 *kinds[kind].symbol ? kinds[kind].bare : "");
         return false;
     }
     const char *symbol = text + n;
@@ -156,7 +161,8 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
     }
     double si = u ? number * u->up / u->down : number;
     if (!isfinite(si)) {
-        snprintf(why, BT_WHY, "%.*s is too large for a number of this program; give at most 1e308", n > 40 ? 40 : (int)n, text);
+        snprintf(why, BT_WHY, "%.*s is too large for a number of this program; give at most 1e308",
+                 n > 40 ? 40 : (int)n, text);
         return false;
     }
     *value = si;

@@ -35,7 +35,8 @@ bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_W
 /// Independent of the locale. Returns the length.
 int bt_units_format(double value, bt_unit kind, char *out, size_t size);
 
-/// Exponent a of the length ratio L under which a quantity of this kind scales as L^a at the same Froude number, with densities and gravity kept.
+/// Exponent a of the length ratio L under which a quantity of this kind scales as L^a at the same Froude number, with
+/// densities and gravity kept.
 double bt_units_froude(bt_unit kind);
 
 const char *bt_units_symbol(bt_unit kind); ///< SI symbol, "" for plain numbers; what the formatted value carries

@@ -9,14 +9,17 @@
 
 #define FIELD(name) {offsetof(bt_bodies, name), sizeof *((bt_bodies *)0)->name}
 const bt_body_field bt_body_fields[] = {
-    FIELD(vel),  FIELD(inv),    FIELD(pose), FIELD(path),    FIELD(vel_start), FIELD(vel_free),    FIELD(gid),  FIELD(radius),
-    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share), FIELD(friction), FIELD(restitution), FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),
-    FIELD(stirred), FIELD(tile), FIELD(home),
+    FIELD(vel),       FIELD(inv),  FIELD(pose),   FIELD(path),    FIELD(vel_start), FIELD(vel_free), FIELD(gid),
+    FIELD(radius),    FIELD(area), FIELD(mass),   FIELD(inertia), FIELD(share),     FIELD(friction), FIELD(restitution),
+    FIELD(thickness), FIELD(drag), FIELD(motion), FIELD(large),   FIELD(disturbed), FIELD(cell),     FIELD(home),
 };
 const int bt_n_body_fields = sizeof bt_body_fields / sizeof *bt_body_fields;
 
 const bt_body_field bt_vertex_fields[] = {
-    {offsetof(bt_bodies, vertices), 2 * sizeof(double)}, {offsetof(bt_bodies, outline), 2 * sizeof(double)}, FIELD(per_length), FIELD(mark),
+    {offsetof(bt_bodies, vertices), 2 * sizeof(double)},
+    {offsetof(bt_bodies, outline), 2 * sizeof(double)},
+    FIELD(per_length),
+    FIELD(mark),
 };
 const int bt_n_vertex_fields = sizeof bt_vertex_fields / sizeof *bt_vertex_fields;
 
@@ -136,8 +139,8 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
     b->drag[i] = d->drag;
     b->motion[i] = (uint8_t)d->motion;
     b->large[i] = d->large;
-    b->stirred[i] = 1;
-    b->tile[i][0] = b->tile[i][1] = 0;
+    b->disturbed[i] = 1;
+    b->cell[i][0] = b->cell[i][1] = 0;
     b->home[i] = (bt_home){0};
     bt_bodies_turn(b, i);
     return b->gid[i];

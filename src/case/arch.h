@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Can walls or periodic images beside the body carry arches of rigid floes, so that the load is a property of the domain's width?
+// Can walls or periodic images beside the body carry arches of rigid floes, so that the load is a property of the
+// domain's width?
 //
-//     wall ─────────────────────────      Dense rigid floes wedge between the body and what holds them at the sides: a wall, or the
-//        \ \ \   arch                     next image of the body in a periodic domain. The load of such an arch has no upper bound but what
+//     wall ─────────────────────────      Dense rigid floes wedge between the body and what holds them at the sides: a
+//        wall, or the
+//        \ \ \   arch                     next image of the body in a periodic domain. The load of such an arch has no
+//          upper bound but what
 //          ( body ) ──>                   the tow gives, and the wider the domain, the rarer it is.
 //        / / /   arch
 //     wall ─────────────────────────
 //
-// The limits are assumed, after trials with rigid floes of friction 0.05 to 0.35: at 50 % the width does not show, at 80 % in the basin of 10, 20
-// and 30 m (5, 10, 15 body widths) the mean falls from 100 to 10 and 5 N, and at 90 % at full scale from 650 kN at 15 body widths to 219 kN at 35.
+// The limits are assumed, after trials with rigid floes of friction 0.05 to 0.35: at 50 % the width does not show, at
+// 80 % in the basin of 10, 20 and 30 m (5, 10, 15 body widths) the mean falls from 100 to 10 and 5 N, and at 90 % at
+// full scale from 650 kN at 15 body widths to 219 kN at 35.
 #ifndef BT_ARCH_H
 #define BT_ARCH_H
 

@@ -40,25 +40,30 @@ static box bounds_of(int n, const double *v, double x, double y, double yaw)
     return b;
 }
 
-// Where a body stands against the boundaries: the axis in which it is outside, or 0. Walls hold the whole outline, open and
-// periodic boundaries the centroid. The slack is round-off of x0 + length.
+// Where a body stands against the boundaries: the axis in which it is outside, or 0. Walls hold the whole outline, open
+// and periodic boundaries the centroid. The slack is round-off of x0 + length.
 static char outside(const bt_case *c, box b, double x, double y)
 {
     double slack = 1e-9 * (c->domain.length + c->domain.width);
     bool ends = c->domain.ends == BT_BOUND_WALL, sides = c->domain.sides == BT_BOUND_WALL;
-    if ((ends ? b.x_min : x) < c->domain.x0 - slack || (ends ? b.x_max : x) > c->domain.x0 + c->domain.length + slack) return 'x';
-    if ((sides ? b.y_min : y) < c->domain.y0 - slack || (sides ? b.y_max : y) > c->domain.y0 + c->domain.width + slack) return 'y';
+    if ((ends ? b.x_min : x) < c->domain.x0 - slack || (ends ? b.x_max : x) > c->domain.x0 + c->domain.length + slack)
+        return 'x';
+    if ((sides ? b.y_min : y) < c->domain.y0 - slack || (sides ? b.y_max : y) > c->domain.y0 + c->domain.width + slack)
+        return 'y';
     return 0;
 }
 
 // ---- defaults that follow from other keys ----
 
-// A file that the case names, relative to the folder of the case file, as an absolute path: the resolved file lies elsewhere.
+// A file that the case names, relative to the folder of the case file, as an absolute path: the resolved file lies
+// elsewhere.
 static void follow_file(const bt_case *c, char **file)
 {
     if (!*file || **file == '/') return;
     const char *slash = c->path ? strrchr(c->path, '/') : NULL;
-    char *folder = slash == c->path && slash ? strdup("/") : slash ? strndup(c->path, (size_t)(slash - c->path)) : strdup(".");
+    char *folder = slash == c->path && slash ? strdup("/")
+                   : slash                   ? strndup(c->path, (size_t)(slash - c->path))
+                                             : strdup(".");
     char *absolute = folder ? realpath(folder, NULL) : NULL;
     char *joined = NULL;
     if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", *file) >= 0) {
@@ -69,7 +74,8 @@ static void follow_file(const bt_case *c, char **file)
     free(folder);
 }
 
-/// A velocity of which nothing is given stays open where the body drifts freely at the start; otherwise what is not given is 0.
+/// A velocity of which nothing is given stays open where the body drifts freely at the start; otherwise what is not
+/// given is 0.
 static void follow_start(bool drifts, double *vx, double *vy)
 {
     if (drifts && isnan(*vx) && isnan(*vy)) return;
@@ -119,17 +125,23 @@ static void check_run(const check *k)
     if (!(c->run.duration > 0)) bt_check_fault(k, "run.duration", "is not set; give a time, as in 450 s");
     if (!(c->run.dt > 0) || !(c->run.duration > 0)) return;
     if (c->run.dt > c->run.duration)
-        bt_check_fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run", c->run.dt, c->run.duration);
+        bt_check_fault(k, "run.dt", "%g s is longer than run.duration, %g s; shorten the step or lengthen the run",
+                       c->run.dt, c->run.duration);
     double steps = (double)bt_case_steps(c);
     if (steps > BT_MOST_STEPS)
-        bt_check_fault(k, "run.dt", "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run", steps, BT_MOST_STEPS);
+        bt_check_fault(k, "run.dt",
+                       "makes %.3g steps of run.duration, at most %d are run; lengthen the step or shorten the run",
+                       steps, BT_MOST_STEPS);
     if (bt_check_sound(k, "output.frame_interval") && c->run.duration / c->output.frame_interval > BT_MOST_FRAMES)
-        bt_check_fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it", c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
+        bt_check_fault(k, "output.frame_interval", "makes %.3g frames, at most %d are written; lengthen it",
+                       c->run.duration / c->output.frame_interval, BT_MOST_FRAMES);
     if (bt_check_sound(k, "output.window_start") && c->output.window_start >= c->run.duration)
-        bt_check_fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time", c->output.window_start, c->run.duration);
+        bt_check_fault(k, "output.window_start", "%g s is not before the end of the run, %g s; give an earlier time",
+                       c->output.window_start, c->run.duration);
 }
 
-static void check_closing(const check *k, const char *key, const char *boundary_key, double closing, bt_bound boundary, double extent)
+static void check_closing(const check *k, const char *key, const char *boundary_key, double closing, bt_bound boundary,
+                          double extent)
 {
     if (closing == 0 || !bt_check_sound(k, key) || !bt_check_sound(k, boundary_key)) return;
     if (boundary != BT_BOUND_WALL) {
@@ -137,7 +149,10 @@ static void check_closing(const check *k, const char *key, const char *boundary_
         return;
     }
     if (bt_check_sound(k, "run.duration domain.length domain.width") && 2 * closing * k->c->run.duration >= extent)
-        bt_check_fault(k, key, "%g m/s brings the walls together after %g s, before the end of the run; slow them or shorten run.duration", closing, extent / (2 * closing));
+        bt_check_fault(
+            k, key,
+            "%g m/s brings the walls together after %g s, before the end of the run; slow them or shorten run.duration",
+            closing, extent / (2 * closing));
 }
 
 static void check_domain(const check *k)
@@ -150,14 +165,28 @@ static void check_domain(const check *k)
 static void check_region(const check *k)
 {
     const bt_case *c = k->c;
-    if (!bt_check_sound(k, "domain.x0 domain.y0 domain.length domain.width ice.x_min ice.x_max ice.y_min ice.y_max")) return;
-    double x1 = c->domain.x0 + c->domain.length, y1 = c->domain.y0 + c->domain.width, slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (c->ice.x_min >= c->ice.x_max) bt_check_fault(k, "ice.x_min", "%g m is not below ice.x_max, %g m: the ice region is empty; move one of them", c->ice.x_min, c->ice.x_max);
-    if (c->ice.y_min >= c->ice.y_max) bt_check_fault(k, "ice.y_min", "%g m is not below ice.y_max, %g m: the ice region is empty; move one of them", c->ice.y_min, c->ice.y_max);
-    if (c->ice.x_min < c->domain.x0 - slack) bt_check_fault(k, "ice.x_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.x_min, c->domain.x0);
-    if (c->ice.x_max > x1 + slack) bt_check_fault(k, "ice.x_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.x_max, x1);
-    if (c->ice.y_min < c->domain.y0 - slack) bt_check_fault(k, "ice.y_min", "%g m is outside the domain, which begins at %g m; move the region inside", c->ice.y_min, c->domain.y0);
-    if (c->ice.y_max > y1 + slack) bt_check_fault(k, "ice.y_max", "%g m is outside the domain, which ends at %g m; move the region inside", c->ice.y_max, y1);
+    if (!bt_check_sound(k, "domain.x0 domain.y0 domain.length domain.width ice.x_min ice.x_max ice.y_min ice.y_max"))
+        return;
+    double x1 = c->domain.x0 + c->domain.length, y1 = c->domain.y0 + c->domain.width,
+           slack = 1e-9 * (c->domain.length + c->domain.width);
+    if (c->ice.x_min >= c->ice.x_max)
+        bt_check_fault(k, "ice.x_min", "%g m is not below ice.x_max, %g m: the ice region is empty; move one of them",
+                       c->ice.x_min, c->ice.x_max);
+    if (c->ice.y_min >= c->ice.y_max)
+        bt_check_fault(k, "ice.y_min", "%g m is not below ice.y_max, %g m: the ice region is empty; move one of them",
+                       c->ice.y_min, c->ice.y_max);
+    if (c->ice.x_min < c->domain.x0 - slack)
+        bt_check_fault(k, "ice.x_min", "%g m is outside the domain, which begins at %g m; move the region inside",
+                       c->ice.x_min, c->domain.x0);
+    if (c->ice.x_max > x1 + slack)
+        bt_check_fault(k, "ice.x_max", "%g m is outside the domain, which ends at %g m; move the region inside",
+                       c->ice.x_max, x1);
+    if (c->ice.y_min < c->domain.y0 - slack)
+        bt_check_fault(k, "ice.y_min", "%g m is outside the domain, which begins at %g m; move the region inside",
+                       c->ice.y_min, c->domain.y0);
+    if (c->ice.y_max > y1 + slack)
+        bt_check_fault(k, "ice.y_max", "%g m is outside the domain, which ends at %g m; move the region inside",
+                       c->ice.y_max, y1);
 }
 
 static void check_sizes(const check *k)
@@ -168,58 +197,82 @@ static void check_sizes(const check *k)
               BT_LEAST_THICKNESS);
     if (bt_check_sound(k, "ice.rafting.kappa") && c->ice.rafting_kappa > 0 && c->ice.rafting_kappa < 2)
         bt_check_fault(k, "ice.rafting.kappa",
-                       "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying over each other; "
-                       "0 = they do not, 5 to 17 in the literature", c->ice.rafting_kappa);
+                       "%g is less than 2, what the sheets gain in potential energy: floes would give energy by lying "
+                       "over each other; "
+                       "0 = they do not, 5 to 17 in the literature",
+                       c->ice.rafting_kappa);
     if (bt_check_sound(k, "ice.density water.density") && c->ice.density > c->water.density)
-        bt_check_fault(k, "ice.density", "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them", c->ice.density, c->water.density);
+        bt_check_fault(k, "ice.density",
+                       "%g kg/m3 is more than water.density, %g kg/m3: such ice sinks; correct one of them",
+                       c->ice.density, c->water.density);
     if (c->ice.field || c->ice.outlines || c->ice.concentration == 0) return;
     if (bt_check_sound(k, "ice.concentration") && c->ice.concentration < BT_LEAST_CONCENTRATION)
-        bt_check_fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water", c->ice.concentration,
-              BT_LEAST_CONCENTRATION);
+        bt_check_fault(k, "ice.concentration", "%g is below %g; give a fraction, or 0 for open water",
+                       c->ice.concentration, BT_LEAST_CONCENTRATION);
     if (c->ice.size_law != BT_SIZE_POWER && bt_check_sound(k, "ice.size") && c->ice.size < BT_LEAST_SIZE)
         bt_check_fault(k, "ice.size", "%g m is below %g m; check the unit", c->ice.size, BT_LEAST_SIZE);
     if (c->ice.size_law == BT_SIZE_POWER && bt_check_sound(k, "ice.size_min") && c->ice.size_min > 0 &&
         c->ice.size_min < BT_LEAST_SIZE)
         bt_check_fault(k, "ice.size_min", "%g m is below %g m; check the unit", c->ice.size_min, BT_LEAST_SIZE);
-    if (!bt_check_sound(k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread")) return;
+    if (!bt_check_sound(
+            k, "ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_exponent ice.size_spread"))
+        return;
     double lo = c->ice.size_min, hi = c->ice.size_max;
     bool power = c->ice.size_law == BT_SIZE_POWER, ordered = lo < hi || hi == 0;
-    if (power && !(lo > 0)) bt_check_fault(k, "ice.size_min", "is %g m and size_law power needs a smallest size; give it, as in 10 m", lo);
-    if (power && !(hi > 0)) bt_check_fault(k, "ice.size_max", "is %g m and size_law power needs a largest size; give it, as in 100 m", hi);
+    if (power && !(lo > 0))
+        bt_check_fault(k, "ice.size_min", "is %g m and size_law power needs a smallest size; give it, as in 10 m", lo);
+    if (power && !(hi > 0))
+        bt_check_fault(k, "ice.size_max", "is %g m and size_law power needs a largest size; give it, as in 100 m", hi);
     if (!ordered) bt_check_fault(k, "ice.size_min", "%g m is not below ice.size_max, %g m; swap them", lo, hi);
     if (c->ice.size_law == BT_SIZE_LOGNORMAL && ordered && (c->ice.size < lo || (hi > 0 && c->ice.size > hi)))
-        bt_check_fault(k, "ice.size", "%g m is not between ice.size_min and ice.size_max; change one of them", c->ice.size);
+        bt_check_fault(k, "ice.size", "%g m is not between ice.size_min and ice.size_max; change one of them",
+                       c->ice.size);
     if (!ordered || (power && !(lo > 0 && hi > 0))) return;
 
-    if (!bt_check_sound(k, "ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length domain.width")) return;
+    if (!bt_check_sound(k, "ice.x_min ice.x_max ice.y_min ice.y_max domain.x0 domain.y0 domain.length domain.width"))
+        return;
     double room = bt_min(c->ice.x_max - c->ice.x_min, c->ice.y_max - c->ice.y_min);
     if (room <= 0) return; // reported by check_region
-    if (power && hi > room) bt_check_fault(k, "ice.size_max", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
-    else if (!power && c->ice.size > room) bt_check_fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region", c->ice.size, room);
+    if (power && hi > room)
+        bt_check_fault(k, "ice.size_max",
+                       "%g m is larger than the ice region, %g m; take smaller floes or a larger region", hi, room);
+    else if (!power && c->ice.size > room)
+        bt_check_fault(k, "ice.size", "%g m is larger than the ice region, %g m; take smaller floes or a larger region",
+                       c->ice.size, room);
     double n = bt_case_expected_floes(c);
     if (n > BT_MOST_FLOES)
-        bt_check_fault(k, power ? "ice.size_min" : "ice.size", "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n, BT_MOST_FLOES);
+        bt_check_fault(k, power ? "ice.size_min" : "ice.size",
+                       "makes about %.3g floes, at most %d are simulated; take larger floes or a smaller region", n,
+                       BT_MOST_FLOES);
 }
 
-// The defaults of ice and body are those of a model basin. At full scale a number that nobody gave would look like an answer.
+// The defaults of ice and body are those of a model basin. At full scale a number that nobody gave would look like an
+// answer.
 static void check_geographic(const check *k)
 {
     const bt_case *c = k->c;
     if (!k->from || c->domain.frame != BT_FRAME_GEOGRAPHIC || !bt_check_sound(k, "domain.frame")) return;
-    const bool read = c->ice.field || c->ice.outlines, made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0), body = c->body.shape != BT_BODY_ABSENT;
+    const bool read = c->ice.field || c->ice.outlines,
+               made = !read && !(bt_check_given(k, "ice.concentration") && c->ice.concentration == 0),
+               body = c->body.shape != BT_BODY_ABSENT;
     bool by_hand = false; // floes of the list without a thickness of their own
     for (bt_idx i = 0; i < c->n_floes; i++) by_hand = by_hand || c->floes[i].thickness == c->ice.thickness;
     const struct {
         const char *key, *what;
         bool needed;
     } keys[] = {{"ice.concentration", "area fraction of ice, as in 50 %, or 0 for open water", !read},
-                {"ice.size", "mean floe diameter, as in 30 m", made && c->ice.size_law != BT_SIZE_POWER}, // that asks for both its ends
+                // that asks for both its ends
+                {"ice.size", "mean floe diameter, as in 30 m", made && c->ice.size_law != BT_SIZE_POWER},
                 {"ice.thickness", "mean floe thickness, as in 1 m", made || by_hand},
-                {"body.length", "length of the towed body, as in 80 m, or set body.shape: none", body && c->body.shape != BT_BODY_POLYGON},
+                {"body.length", "length of the towed body, as in 80 m, or set body.shape: none",
+                 body && c->body.shape != BT_BODY_POLYGON},
                 {"body.draft", "its depth below the waterline, as in 60 m, or set body.shape: none", body}};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
         if (keys[i].needed && !bt_check_given(k, keys[i].key))
-            bt_check_fault(k, keys[i].key, "missing, and in domain.frame: geographic it has no default (that would be a model basin's); add it (%s)", keys[i].what);
+            bt_check_fault(k, keys[i].key,
+                           "missing, and in domain.frame: geographic it has no default (that would be a model "
+                           "basin's); add it (%s)",
+                           keys[i].what);
 }
 
 static void check_outlines(const check *k)
@@ -228,11 +281,16 @@ static void check_outlines(const check *k)
     if (!bt_check_sound(k, "ice.field ice.outlines ice.outlines_crs ice.origin_lon ice.origin_lat ice.origin_east "
                   "ice.origin_north ice.nonconvex"))
         return;
-    if (c->ice.field && c->ice.outlines) bt_check_fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys", c->ice.field);
+    if (c->ice.field && c->ice.outlines)
+        bt_check_fault(k, "ice.outlines", "the field is read from ice.field already, %s; remove one of the two keys",
+                       c->ice.field);
     const bool lon = !isnan(c->ice.origin_lon), lat = !isnan(c->ice.origin_lat), east = !isnan(c->ice.origin_east),
                north = !isnan(c->ice.origin_north);
     const bt_crs crs = c->ice.outlines_crs;
-    if (lon != lat) bt_check_fault(k, lon ? "ice.origin_lon" : "ice.origin_lat", "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
+    if (lon != lat)
+        bt_check_fault(
+            k, lon ? "ice.origin_lon" : "ice.origin_lat",
+            "is given without the other coordinate of the origin; give both, or none for the middle of the outlines");
     if (east != north)
         bt_check_fault(k, east ? "ice.origin_east" : "ice.origin_north",
               "is given without the other coordinate of the origin; give both or none");
@@ -251,41 +309,63 @@ static void check_outlines(const check *k)
     if (crs != BT_CRS_FILE && crs != BT_CRS_METRES && !c->ice.outlines)
         bt_check_fault(k, "ice.outlines_crs", "has no effect without ice.outlines; name the file, or remove the key");
     if (c->ice.nonconvex != BT_NONCONVEX_REFUSE && !c->ice.outlines && !c->ice.field)
-        bt_check_fault(k, "ice.nonconvex", "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or ice.field, or remove the key");
+        bt_check_fault(k, "ice.nonconvex",
+                       "has no effect on a field that is made, whose floes are convex; read one with ice.outlines or "
+                       "ice.field, or remove the key");
 }
 
 static void check_polygon(const check *k, const char *key, bt_body_shape shape, int n, const char *shape_key)
 {
-    if (shape == BT_BODY_POLYGON && !n) bt_check_fault(k, key, "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]");
-    if (shape != BT_BODY_POLYGON && n) bt_check_fault(k, key, "is given but the shape is not polygon; set %s: polygon, or remove the corners", shape_key);
+    if (shape == BT_BODY_POLYGON && !n)
+        bt_check_fault(k, key, "is missing for shape polygon; give the corners as [[x, y], [x, y], ...]");
+    if (shape != BT_BODY_POLYGON && n)
+        bt_check_fault(k, key, "is given but the shape is not polygon; set %s: polygon, or remove the corners",
+                       shape_key);
 }
 
 static bool check_body(const check *k, int *n, double *v)
 {
     const bt_case *c = k->c;
     *n = 0;
-    if (c->body.shape == BT_BODY_ABSENT || !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw")) return false;
+    if (c->body.shape == BT_BODY_ABSENT ||
+        !bt_check_sound(k, "body.shape body.length body.width body.vertices body.x body.y body.yaw"))
+        return false;
     check_polygon(k, "body.vertices", c->body.shape, c->body.n_vertices, "body.shape");
     if (c->body.shape == BT_BODY_SQUARE && c->body.width != c->body.length)
-        bt_check_fault(k, "body.width", "%g m differs from body.length, %g m, and the shape is square; remove the key or set body.shape: rectangle", c->body.width, c->body.length);
+        bt_check_fault(
+            k, "body.width",
+            "%g m differs from body.length, %g m, and the shape is square; remove the key or set body.shape: rectangle",
+            c->body.width, c->body.length);
     if (c->body.shape == BT_BODY_POLYGON && !c->body.n_vertices) return false;
     const char *why = NULL;
     *n = bt_case_outline(c->body.shape, c->body.length, c->body.width, c->body.n_vertices, c->body.vertices, v, &why);
     if (why) {
-        bt_check_fault(k, c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length", "the waterline is refused: %s", why);
+        bt_check_fault(k, c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length",
+                       "the waterline is refused: %s", why);
         return false;
     }
-    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return false;
+    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
+        return false;
     box b = bounds_of(*n, v, c->body.x, c->body.y, c->body.yaw);
     const char *extent = c->body.shape == BT_BODY_POLYGON ? "body.vertices" : "body.length";
     bool too_long = c->domain.ends != BT_BOUND_OPEN && b.x_max - b.x_min >= c->domain.length;
     bool too_wide = c->domain.sides != BT_BOUND_OPEN && b.y_max - b.y_min >= c->domain.width;
-    if (too_long) bt_check_fault(k, extent, "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length", b.x_max - b.x_min, c->domain.length);
-    if (too_wide) bt_check_fault(k, extent, "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width", b.y_max - b.y_min, c->domain.width);
+    if (too_long)
+        bt_check_fault(k, extent,
+                       "the body spans %g m along x in a domain of %g m; take a smaller body or a larger domain.length",
+                       b.x_max - b.x_min, c->domain.length);
+    if (too_wide)
+        bt_check_fault(k, extent,
+                       "the body spans %g m along y in a domain of %g m; take a smaller body or a larger domain.width",
+                       b.y_max - b.y_min, c->domain.width);
     if (too_long || too_wide) return false;
     char axis = outside(c, b, c->body.x, c->body.y);
-    if (axis == 'x') bt_check_fault(k, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.x_min, b.x_max, c->domain.x0, c->domain.x0 + c->domain.length);
-    if (axis == 'y') bt_check_fault(k, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.y_min, b.y_max, c->domain.y0, c->domain.y0 + c->domain.width);
+    if (axis == 'x')
+        bt_check_fault(k, "body.x", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.x_min,
+                       b.x_max, c->domain.x0, c->domain.x0 + c->domain.length);
+    if (axis == 'y')
+        bt_check_fault(k, "body.y", "the body, %g to %g m, is outside the domain, %g to %g m; move it inside", b.y_min,
+                       b.y_max, c->domain.y0, c->domain.y0 + c->domain.width);
     return !axis;
 }
 
@@ -294,41 +374,57 @@ static void check_tow(const check *k)
     bt_case *c = k->c;
     if (!bt_check_sound(k, "tow.mode tow.speed body.shape")) return;
     if (c->body.shape == BT_BODY_ABSENT && c->tow.mode != BT_TOW_NONE) {
-        if (bt_check_given(k, "tow.mode")) bt_check_fault(k, "tow.mode", "there is no body to tow (body.shape: none); set tow.mode: none or give a body");
+        if (bt_check_given(k, "tow.mode"))
+            bt_check_fault(k, "tow.mode",
+                           "there is no body to tow (body.shape: none); set tow.mode: none or give a body");
         else c->tow.mode = BT_TOW_NONE;
     }
     if (c->tow.mode == BT_TOW_NONE && c->tow.speed != 0) {
-        if (bt_check_given(k, "tow.speed") && bt_check_given(k, "tow.mode")) bt_check_fault(k, "tow.speed", "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed", c->tow.speed);
+        if (bt_check_given(k, "tow.speed") && bt_check_given(k, "tow.mode"))
+            bt_check_fault(k, "tow.speed",
+                           "%g m/s has no effect with tow.mode: none; set it to 0, or set tow.mode: speed",
+                           c->tow.speed);
         else c->tow.speed = 0;
     }
     if (c->tow.mode != BT_TOW_SPEED) return;
     static const char *const start[] = {"body.vx", "body.vy", "body.yaw_rate"};
     const double value[] = {c->body.vx, c->body.vy, c->body.yaw_rate};
     for (int i = 0; i < 3; i++)
-        if (value[i] != 0 && bt_check_sound(k, start[i])) bt_check_fault(k, start[i], "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
+        if (value[i] != 0 && bt_check_sound(k, start[i]))
+            bt_check_fault(
+                k, start[i],
+                "has no effect with tow.mode: speed, which prescribes the velocity; remove it or set another mode");
 }
 
 // A body of prescribed velocity goes through a wall: two infinite masses have no contact law.
 static void check_path(const check *k, int n, const double *v)
 {
     const bt_case *c = k->c;
-    // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A vessel may be slower.
-    const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0; // way-points: case_tow.c
-    if (!straight || !(c->run.duration > 0) || !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme")) return;
+    // On a line the body follows the end, on the average at its speed, and would end up drawn against the wall. A
+    // vessel may be slower. way-points: case_tow.c
+    const bool straight = c->tow.mode != BT_TOW_NONE && c->tow.mode != BT_TOW_THRUST && c->tow.n_waypoints == 0;
+    if (!straight || !(c->run.duration > 0) ||
+        !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme"))
+        return;
     double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
     double reach = way, slack = 1e-9 * (c->domain.length + c->domain.width);
-    if (c->domain.ends == BT_BOUND_WALL && b.x_max > c->domain.x0 + c->domain.length + slack) reach = bt_min(reach, (c->domain.x0 + c->domain.length - start.x_max) / ux);
-    if (c->domain.ends == BT_BOUND_WALL && b.x_min < c->domain.x0 - slack) reach = bt_min(reach, (c->domain.x0 - start.x_min) / ux);
-    if (c->domain.sides == BT_BOUND_WALL && b.y_max > c->domain.y0 + c->domain.width + slack) reach = bt_min(reach, (c->domain.y0 + c->domain.width - start.y_max) / uy);
-    if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack) reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
+    if (c->domain.ends == BT_BOUND_WALL && b.x_max > c->domain.x0 + c->domain.length + slack)
+        reach = bt_min(reach, (c->domain.x0 + c->domain.length - start.x_max) / ux);
+    if (c->domain.ends == BT_BOUND_WALL && b.x_min < c->domain.x0 - slack)
+        reach = bt_min(reach, (c->domain.x0 - start.x_min) / ux);
+    if (c->domain.sides == BT_BOUND_WALL && b.y_max > c->domain.y0 + c->domain.width + slack)
+        reach = bt_min(reach, (c->domain.y0 + c->domain.width - start.y_max) / uy);
+    if (c->domain.sides == BT_BOUND_WALL && b.y_min < c->domain.y0 - slack)
+        reach = bt_min(reach, (c->domain.y0 - start.y_min) / uy);
     if (reach >= way) return;
     reach = bt_max(reach, 0);
-    double ramp = c->tow.ramp, ramp_way = c->tow.speed * ramp / 2;
-    double time = reach < ramp_way ? sqrt(2 * ramp * reach / c->tow.speed) : reach / c->tow.speed + ramp / 2;
-    if (c->tow.n_programme > 0) time = bt_case_tow_time(c, reach);
-    bt_check_fault(k, "run.duration", "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or enlarge the domain", way, reach, floor(time * 100) / 100);
+    const double time = bt_case_tow_time(c, reach);
+    bt_check_fault(k, "run.duration",
+                   "the tow is %g m long and a wall stands after %g m; shorten the run to %g s, or slow the tow, or "
+                   "enlarge the domain",
+                   way, reach, floor(time * 100) / 100);
 }
 
 // After check_tow: the reference speed goes by it.
@@ -344,17 +440,21 @@ static void check_water(const check *k)
     if (!bt_check_sound(k, "water.tilt")) return;
     if (c->water.tilt == BT_TILT_GEOSTROPHIC && c->water.latitude == 0 && bt_check_sound(k, "water.latitude"))
         bt_check_fault(k, "water.tilt", "geostrophic balance needs the Coriolis force; give water.latitude");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && bt_check_sound(k, "water.slope_x")) bt_check_fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
-    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && bt_check_sound(k, "water.slope_y")) bt_check_fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
+    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_x != 0 && bt_check_sound(k, "water.slope_x"))
+        bt_check_fault(k, "water.slope_x", "has no effect without water.tilt: slope; set it or remove the slope");
+    if (c->water.tilt != BT_TILT_SLOPE && c->water.slope_y != 0 && bt_check_sound(k, "water.slope_y"))
+        bt_check_fault(k, "water.slope_y", "has no effect without water.tilt: slope; set it or remove the slope");
 }
 
 static void check_estimate(const check *k)
 {
     const bt_case *c = k->c;
     if (bt_check_sound(k, "estimate.kappa estimate.kappa_low") && c->estimate.kappa < c->estimate.kappa_low)
-        bt_check_fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa, c->estimate.kappa_low);
+        bt_check_fault(k, "estimate.kappa", "%g is below estimate.kappa_low, %g; lower that too", c->estimate.kappa,
+                       c->estimate.kappa_low);
     if (bt_check_sound(k, "estimate.kappa estimate.kappa_high") && c->estimate.kappa > c->estimate.kappa_high)
-        bt_check_fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa, c->estimate.kappa_high);
+        bt_check_fault(k, "estimate.kappa", "%g is above estimate.kappa_high, %g; raise that too", c->estimate.kappa,
+                       c->estimate.kappa_high);
 }
 
 static void check_floe(const check *k, int index)
@@ -366,8 +466,11 @@ static void check_floe(const check *k, int index)
     else snprintf(where, sizeof where, "%.180s: floes[%d]", c->path ? c->path : "case", index);
     bool polygon = f->shape == BT_BODY_POLYGON;
     const size_t before = k->err->n;
-    if (polygon && !f->n_vertices) bt_errors_add(k->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
-    if (!polygon && f->n_vertices) bt_errors_add(k->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices", where);
+    if (polygon && !f->n_vertices)
+        bt_errors_add(k->err, "%s: has shape polygon and no vertices; give them as [[x, y], [x, y], ...]", where);
+    if (!polygon && f->n_vertices)
+        bt_errors_add(
+            k->err, "%s: has vertices but the shape is not polygon; set shape: polygon, or remove the vertices", where);
     else if (!polygon && !(f->length > 0)) bt_errors_add(k->err, "%s: has no length; give it, as in 1 m", where);
     if (k->err->n > before) return;
     double v[2 * BT_MAX_VERTICES];
@@ -386,14 +489,21 @@ static void check_floe(const check *k, int index)
         bt_errors_add(k->err, "%s: %s", where, why);
         return;
     }
-    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides")) return;
+    if (!bt_check_sound(k, "domain.frame domain.x0 domain.y0 domain.length domain.width domain.ends domain.sides"))
+        return;
     box b = bounds_of(n, v, f->x, f->y, f->yaw);
-    const bool long_x = bt_bound_wraps(c->domain.ends) && b.x_max - b.x_min >= c->domain.length, long_y = c->domain.sides == BT_BOUND_PERIODIC && b.y_max - b.y_min >= c->domain.width;
-    if (long_x || long_y) bt_errors_add(k->err, "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain", where, long_x ? 'x' : 'y');
+    const bool long_x = bt_bound_wraps(c->domain.ends) && b.x_max - b.x_min >= c->domain.length,
+               long_y = c->domain.sides == BT_BOUND_PERIODIC && b.y_max - b.y_min >= c->domain.width;
+    if (long_x || long_y)
+        bt_errors_add(k->err,
+                      "%s: spans more than the period of the domain in %c; take a shorter floe or a larger domain",
+                      where, long_x ? 'x' : 'y');
     // A fixed body may stand in a wall, as a pier does.
     if (f->fixed) b = (box){f->x, f->x, f->y, f->y};
     const char axis = outside(c, b, f->x, f->y);
-    if (axis) bt_errors_add(k->err, "%s: is outside the domain in %c, %g to %g m; move it inside", where, axis, axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
+    if (axis)
+        bt_errors_add(k->err, "%s: is outside the domain in %c, %g to %g m; move it inside", where, axis,
+                      axis == 'x' ? b.x_min : b.y_min, axis == 'x' ? b.x_max : b.y_max);
 }
 
 bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)

@@ -7,7 +7,8 @@
 #include "case/case_derived.h"
 #include "case/case_faults.h"
 
-/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err. Reads the tables that the case
+/// bt_case_finish with the origins [bt_n_case_keys] of the values, or NULL. Appends every fault to err. Reads the
+/// tables that the case
 /// names: BT_ERR_IO when nothing else is wrong than that one cannot be read.
 bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err);
 
@@ -17,7 +18,8 @@ bt_status bt_case_load_tables(bt_case *c, bt_errors *err);
 /// Checks of current and wind in time.
 void bt_case_check_environment(const bt_check *k);
 
-/// Width and length of the lead that follow from the body and the tow; checks of the lead. The waterline is v [n][2], n = 0 without a body.
+/// Width and length of the lead that follow from the body and the tow; checks of the lead. The waterline is v [n][2], n
+/// = 0 without a body.
 void bt_case_check_lead(const bt_check *k, int n, const double *v);
 
 /// Length of path that the tow has led along after time t, with ramp or programme, m.
@@ -26,12 +28,14 @@ double bt_case_tow_distance(const bt_case *c, double t);
 /// Time at which the tow has led along this way at the latest within the run, s.
 double bt_case_tow_time(const bt_case *c, double way);
 
-/// Natural period of the body, with added mass, on its line or lines (taken as parallel), against the vessel in mode thrust, s; 0 without a line.
+/// Natural period of the body, with added mass, on its line or lines (taken as parallel), against the vessel in mode
+/// thrust, s; 0 without a line.
 double bt_case_line_period(const bt_case *c);
 
 #define BT_RAMP_PERIODS 2.0 ///< of the body on its line that a start takes which does not jerk it, assumed
 
-/// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a line)?
+/// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a
+/// line)?
 bool bt_case_start_is_slow(const bt_case *c);
 /// Tell of a start that is not.
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
@@ -57,7 +61,8 @@ bool bt_case_tow_path(const bt_case *c, struct bt_path *p, char why[200]);
 /// Distance from the body to the end of the domain ahead of the tow, m.
 double bt_case_window_ahead(const bt_case *c);
 
-/// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case leaves it open.
+/// Where the body stands in a moving window, and in the geographic frame where the window lies, as far as the case
+/// leaves it open.
 void bt_case_window_follow(bt_case *c);
 
 /// Checks of the moving window. The waterline is v [n][2], n = 0 without a body.

@@ -10,10 +10,12 @@
 
 static const char *const shape_names[] = {BT_SHAPE_NAMES};
 
-int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v, const char **why)
+int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
+                    const char **why)
 {
     if (shape == BT_BODY_ABSENT) return 0;
-    if (shape != BT_BODY_POLYGON) n = bt_shape_named(shape_names[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
+    if (shape != BT_BODY_POLYGON)
+        n = bt_shape_named(shape_names[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
     else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
     else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
     const char *reason = bt_shape_fault(n, v);
@@ -38,7 +40,8 @@ int bt_case_floe_outline(const bt_floe_def *f, double *v)
 static double mean_square_size(const bt_case *c)
 {
     double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
-    if (c->ice.size_law != BT_SIZE_POWER) return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
+    if (c->ice.size_law != BT_SIZE_POWER)
+        return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
     double top = fabs(a - 2) < 1e-9 ? log(hi / lo) : (pow(hi, 2 - a) - pow(lo, 2 - a)) / (2 - a);
     return top / ((pow(lo, -a) - pow(hi, -a)) / a);
 }
@@ -49,7 +52,8 @@ double bt_case_expected_floes(const bt_case *c)
     double area = (c->ice.x_max - c->ice.x_min) * (c->ice.y_max - c->ice.y_min);
     double v[2 * BT_MAX_VERTICES];
     int n = bt_case_waterline(c, v);
-    bool inside = c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
+    bool inside =
+        c->body.x > c->ice.x_min && c->body.x < c->ice.x_max && c->body.y > c->ice.y_min && c->body.y < c->ice.y_max;
     if (n && inside) area -= bt_shape_moments(n, v).area;
     return bt_max(0, c->ice.concentration * area / (BT_PI / 4 * mean_square_size(c)));
 }

@@ -13,14 +13,17 @@
 bt_status bt_case_load_tables(bt_case *c, bt_errors *err)
 {
     // Those that are there have been kept (bt_case_read_kept).
-    const bt_status water = c->water.current_table && c->water.table.n == 0 ? bt_table_read(&c->water.table, c->water.current_table, err) : BT_OK;
-    const bt_status air = c->air.wind_table && c->air.table.n == 0 ? bt_table_read(&c->air.table, c->air.wind_table, err) : BT_OK;
+    const bt_status water = c->water.current_table && c->water.table.n == 0
+                                ? bt_table_read(&c->water.table, c->water.current_table, err)
+                                : BT_OK;
+    const bt_status air =
+        c->air.wind_table && c->air.table.n == 0 ? bt_table_read(&c->air.table, c->air.wind_table, err) : BT_OK;
     // What a table holds is told before what cannot be read: 3 before 4.
     return water == BT_OK ? air : air == BT_OK || water == BT_ERR_CASE ? water : air;
 }
 
-/// A table stands in place of the other keys of its fluid, and must cover the times that the run asks it for: from 0 to the
-/// middle of the last step (force/environment.h).
+/// A table stands in place of the other keys of its fluid, and must cover the times that the run asks it for: from 0 to
+/// the middle of the last step (force/environment.h).
 static void check_table(const bt_check *k, const char *key, const bt_table *t, const char *const *others)
 {
     if (t->n == 0) return;
@@ -33,19 +36,25 @@ static void check_table(const bt_check *k, const char *key, const bt_table *t, c
     }
     const double dt = k->c->run.dt, duration = k->c->run.duration;
     if (!bt_check_sound(k, "run.dt") || !bt_check_sound(k, "run.duration") || !(dt > 0) || !(duration > 0)) return;
-    const double first = t->row[0], end = t->row[3 * (t->n - 1)], need = bt_max(duration, ((double)bt_case_steps(k->c) - 0.5) * dt);
+    const double first = t->row[0], end = t->row[3 * (t->n - 1)],
+                 need = bt_max(duration, ((double)bt_case_steps(k->c) - 0.5) * dt);
     if (first > 0) bt_check_fault(k, key, "the table begins at %g s and the run at 0 s; add a row for 0 s", first);
     if (end < need * (1 - 1e-12))
-        bt_check_fault(k, key, "the table ends at %g s and the run asks it for %g s; add rows, or shorten run.duration", end, need);
+        bt_check_fault(k, key, "the table ends at %g s and the run asks it for %g s; add rows, or shorten run.duration",
+                       end, need);
 }
 
 void bt_case_check_environment(const bt_check *k)
 {
     const bt_case *c = k->c;
-    static const char *const current[] = {"water.current_x", "water.current_y", "water.tide.major", "water.tide.minor", NULL};
+    static const char *const current[] = {"water.current_x", "water.current_y", "water.tide.major", "water.tide.minor",
+                                          NULL};
     static const char *const wind[] = {"air.wind_x", "air.wind_y", NULL};
-    if (fabs(c->water.tide.minor) > c->water.tide.major && bt_check_sound(k, "water.tide.major") && bt_check_sound(k, "water.tide.minor"))
-        bt_check_fault(k, "water.tide.minor", "%g m/s is more than water.tide.major, %g m/s; swap them and turn the inclination by 90 deg", c->water.tide.minor, c->water.tide.major);
+    if (fabs(c->water.tide.minor) > c->water.tide.major && bt_check_sound(k, "water.tide.major") &&
+        bt_check_sound(k, "water.tide.minor"))
+        bt_check_fault(k, "water.tide.minor",
+                       "%g m/s is more than water.tide.major, %g m/s; swap them and turn the inclination by 90 deg",
+                       c->water.tide.minor, c->water.tide.major);
     check_table(k, "water.current_table", &c->water.table, current);
     check_table(k, "air.wind_table", &c->air.table, wind);
 }
@@ -55,14 +64,23 @@ void bt_case_check_lead(const bt_check *k, int n, const double *v)
     bt_case *c = k->c;
     const double ahead = c->tow.direction - c->body.yaw;
     if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, cos(ahead), sin(ahead)) : 0;
-    if (isnan(c->lead.length)) c->lead.length = c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;
-    if (c->lead.mode == BT_LEAD_NONE || !bt_check_sound(k, "lead.mode") || !bt_check_sound(k, "body.shape") || !bt_check_sound(k, "tow.mode")) return;
+    if (isnan(c->lead.length))
+        c->lead.length =
+            c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;
+    if (c->lead.mode == BT_LEAD_NONE || !bt_check_sound(k, "lead.mode") || !bt_check_sound(k, "body.shape") ||
+        !bt_check_sound(k, "tow.mode"))
+        return;
     if (c->body.shape == BT_BODY_ABSENT || c->tow.mode == BT_TOW_NONE) {
-        bt_check_fault(k, "lead.mode", "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode");
+        bt_check_fault(k, "lead.mode",
+                       "a lead lies along the tow, and nothing is towed; set it to none, or set tow.mode");
         return;
     }
-    if (!(c->lead.width > 0) && bt_check_sound(k, "lead.width")) bt_check_fault(k, "lead.width", "is %g m; give the width of the lead, as in 20 m", c->lead.width);
-    if (!(c->lead.length > 0) && bt_check_sound(k, "lead.length")) bt_check_fault(k, "lead.length", "is %g m; give the length of the lead, as in 500 m", c->lead.length);
+    if (!(c->lead.width > 0) && bt_check_sound(k, "lead.width"))
+        bt_check_fault(k, "lead.width", "is %g m; give the width of the lead, as in 20 m", c->lead.width);
+    if (!(c->lead.length > 0) && bt_check_sound(k, "lead.length"))
+        bt_check_fault(k, "lead.length", "is %g m; give the length of the lead, as in 500 m", c->lead.length);
     if (c->lead.mode == BT_LEAD_MANAGED && !(c->lead.floe_size > 0) && bt_check_sound(k, "lead.floe_size"))
-        bt_check_fault(k, "lead.floe_size", "is %g m and a managed lead needs the size of its pieces; give it, as in 10 m", c->lead.floe_size);
+        bt_check_fault(k, "lead.floe_size",
+                       "is %g m and a managed lead needs the size of its pieces; give it, as in 10 m",
+                       c->lead.floe_size);
 }

@@ -13,7 +13,8 @@ typedef struct bt_origin {
     bool faulty;     ///< refused; the member holds the default
 } bt_origin;
 
-/// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated to the buffer.
+/// "FILE:LINE: KEY", "FILE: KEY", "--set KEY=VALUE" or "PLACE: KEY=VALUE": how a message about a key begins. Truncated
+/// to the buffer.
 void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256]);
 
 /// A check under way.

@@ -33,16 +33,19 @@ static void unknown_key(reader *r, const bt_key *keys, int n, int line, const ch
 {
     char buffer[64];
     const char *near = bt_schema_suggest(keys, n, name, buffer);
-    if (near) bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->c->path, line, where, name, near);
+    if (near)
+        bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->c->path, line, where, name, near);
     else bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", r->c->path, line, where, name);
 }
 
 static bool is_nothing(const bt_node *node)
 {
-    return node->kind == BT_NODE_SCALAR && node->plain && (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
+    return node->kind == BT_NODE_SCALAR && node->plain &&
+           (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
 }
 
-// Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed: 1).
+// Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed:
+// 1).
 static void walk(reader *r, const bt_node *map, const char *prefix)
 {
     for (int i = 0; i < map->n; i++) {
@@ -53,7 +56,8 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
         int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
         if (k >= 0) {
             if (r->given[k])
-                bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", r->c->path, line, name, r->from[k].line);
+                bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them",
+                              r->c->path, line, name, r->from[k].line);
             else {
                 r->given[k] = value;
                 r->from[k].line = line;
@@ -65,7 +69,8 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
         } else if (value->kind == BT_NODE_MAP) {
             walk(r, value, name);
         } else if (!is_nothing(value)) {
-            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->c->path, line, name);
+            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->c->path,
+                          line, name);
         }
     }
 }
@@ -80,14 +85,16 @@ static bool read_points(const bt_key *k, void *base, const bt_node *list, const 
     }
     const int least = k->least > 0 ? k->least : 3, most = k->most > 0 ? k->most : BT_MAX_VERTICES;
     if (list->n < least || list->n > most) {
-        bt_errors_add(err, "%s: has %d points; a %s has %d to %d", where, list->n, k->most > 0 ? "list here" : "polygon", least, most);
+        bt_errors_add(err, "%s: has %d points; a %s has %d to %d", where, list->n,
+                      k->most > 0 ? "list here" : "polygon", least, most);
         return false;
     }
     double *p = bt_alloc((size_t)list->n, 2 * sizeof *p);
     bool good = true;
     for (int i = 0; i < list->n && good; i++) {
         const bt_node *point = list->item[i];
-        good = point->kind == BT_NODE_LIST && point->n == 2 && point->item[0]->kind == BT_NODE_SCALAR && point->item[1]->kind == BT_NODE_SCALAR;
+        good = point->kind == BT_NODE_LIST && point->n == 2 && point->item[0]->kind == BT_NODE_SCALAR &&
+               point->item[1]->kind == BT_NODE_SCALAR;
         if (!good) bt_errors_add(err, "%s: point %d is not a pair; give it as [x, y]", where, i + 1);
         for (int j = 0; j < 2 && good; j++) {
             char why[BT_WHY];
@@ -109,7 +116,8 @@ static bool read_value(const bt_key *k, void *base, const bt_node *value, const 
 {
     if (k->type == BT_KEY_POINTS) return read_points(k, base, value, where, err);
     if (value->kind != BT_NODE_SCALAR) {
-        bt_errors_add(err, "%s: is a %s and needs a single value; write key: value", where, value->kind == BT_NODE_MAP ? "section" : "list");
+        bt_errors_add(err, "%s: is a %s and needs a single value; write key: value", where,
+                      value->kind == BT_NODE_MAP ? "section" : "list");
         return false;
     }
     char why[BT_WHY];
@@ -125,7 +133,8 @@ static void read_given(reader *r)
         if (r->from[k].faulty || r->from[k].set) continue;
         if (!r->given[k]) {
             if (key->preset) continue;
-            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->c->path, key->name, key->doc);
+            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->c->path, key->name,
+                          key->doc);
             r->from[k].faulty = true;
             continue;
         }
@@ -140,7 +149,8 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
     char where[256], item[32];
     snprintf(item, sizeof item, "floes[%d].", index);
     if (map->kind != BT_NODE_MAP) {
-        bt_errors_add(r->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}", r->c->path, map->line, index);
+        bt_errors_add(r->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}",
+                      r->c->path, map->line, index);
         return false;
     }
     size_t before = r->err->n;
@@ -155,7 +165,9 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
     }
     for (int k = 0; k < bt_n_floe_keys; k++) {
         const bool found = bt_floe_keys[k].preset || bt_tree_has(map, bt_floe_keys[k].name);
-        if (!found) bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->c->path, map->line, item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
+        if (!found)
+            bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->c->path, map->line,
+                          item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
     }
     return r->err->n == before;
 }
@@ -169,7 +181,9 @@ static void read_floes(reader *r)
         return;
     }
     if (list->n > BT_MAX_FLOES_BY_HAND) {
-        bt_errors_add(r->err, "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name it in ice.field",
+        bt_errors_add(r->err,
+                      "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name "
+                      "it in ice.field",
                       r->c->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
         return;
     }
@@ -177,7 +191,8 @@ static void read_floes(reader *r)
     const size_t before = r->err->n;
     for (int i = 0; i < list->n; i++) {
         if (r->err->n - before >= BT_MOST_COMPLAINTS) {
-            bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first", r->c->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+            bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first",
+                          r->c->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
             return;
         }
         bt_floe_def f = {.line = list->item[i]->line};
@@ -192,7 +207,8 @@ static void read_override(reader *r, const char *set, const char *place)
 {
     const char *equals = strchr(set, '=');
     if (!equals || equals == set) {
-        bt_errors_add(r->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ", set, place ? "" : "--set ");
+        bt_errors_add(r->err, "%s%.80s: is not key=value; write %sice.concentration=0.5", place ? place : "--set ", set,
+                      place ? "" : "--set ");
         return;
     }
     char name[96], where[256], why[BT_WHY], buffer[64];
@@ -204,8 +220,10 @@ static void read_override(reader *r, const char *set, const char *place)
     int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
-        if (!strcmp(name, "floes")) bt_errors_add(r->err, "%s: the list of floes cannot be set here; edit the case file", where);
-        else if (bt_schema_is_section(name)) bt_errors_add(r->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
+        if (!strcmp(name, "floes"))
+            bt_errors_add(r->err, "%s: the list of floes cannot be set here; edit the case file", where);
+        else if (bt_schema_is_section(name))
+            bt_errors_add(r->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
         else if (near) bt_errors_add(r->err, "%s: unknown key; did you mean %s?", where, near);
         else bt_errors_add(r->err, "%s: unknown key; see bergtow --list-keys", where);
         return;
@@ -233,16 +251,25 @@ static void begin_case(bt_case *c, const char *path)
 }
 
 /// The text of c into its values.
-static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n, bt_errors *err)
+static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n,
+                           bt_errors *err)
 {
     const size_t before = err->n;
     const char *path = c->path;
     bt_node *root = bt_tree_parse(c->text, size, path, err);
     const char *kind = root && root->kind == BT_NODE_LIST ? "list" : "single text";
     const bool is_map = root && root->kind == BT_NODE_MAP, study = bt_tree_has(root, "base");
-    if (root && !is_map) bt_errors_add(err, "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/", path, kind);
-    else if (study) bt_errors_add(err, "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with `bergtow check`", path);
-    else if (is_map && !root->n) bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
+    if (root && !is_map)
+        bt_errors_add(err,
+                      "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
+                      path, kind);
+    else if (study)
+        bt_errors_add(err,
+                      "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with "
+                      "`bergtow check`",
+                      path);
+    else if (is_map && !root->n)
+        bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
     if (!is_map || study || !root->n) {
         bt_tree_free(root);
         return BT_ERR_CASE;
@@ -267,7 +294,8 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
     return bt_case_read_placed(c, path, overrides, NULL, n, err);
 }
 
-bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place, int n, bt_errors *err)
+bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place,
+                              int n, bt_errors *err)
 {
     size_t size;
     begin_case(c, path);
@@ -283,7 +311,8 @@ static void keep_table(bt_table *t, const bt_table *from)
     memcpy(t->row, from->row, (size_t)t->n * 3 * sizeof *t->row);
 }
 
-bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current, const bt_table *wind, bt_errors *err)
+bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,
+                            const bt_table *wind, bt_errors *err)
 {
     begin_case(c, path);
     c->text = strdup(text);

@@ -8,6 +8,7 @@
 #include "case/rope.h"
 #include "bergtow/shape.h"
 #include "case/case_check.h"
+#include "case/speed_law.h"
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
@@ -27,31 +28,22 @@ static void largest_speed(const bt_case *c, double *speed, double *time)
         if (p[2 * i + 1] > *speed) *speed = p[2 * i + 1], *time = i > 0 ? p[2 * i] : 0;
 }
 
+static bt_speed_law speed_law(const bt_case *c)
+{
+    return (bt_speed_law){
+        .speed = c->tow.speed, .ramp = c->tow.ramp, .programme = c->tow.programme, .n = c->tow.n_programme};
+}
+
 double bt_case_tow_distance(const bt_case *c, double t)
 {
-    const int n = c->tow.n_programme;
-    if (n > 0) {
-        const double *p = c->tow.programme;
-        double way = bt_min(t, p[0]) * p[1]; // constant before the first
-        for (int i = 0; i + 1 < n && t > p[2 * i]; i++) {
-            const double dt = p[2 * i + 2] - p[2 * i], rise = (p[2 * i + 3] - p[2 * i + 1]) / dt, s = bt_min(t - p[2 * i], dt);
-            way += s * (p[2 * i + 1] + 0.5 * rise * s);
-        }
-        return way + bt_max(0, t - p[2 * n - 2]) * p[2 * n - 1];
-    }
-    const double ramp = c->tow.ramp;
-    return c->tow.speed * (t < ramp ? t * t / (2 * ramp) : t - ramp / 2);
+    const bt_speed_law l = speed_law(c);
+    return bt_speed_law_way(&l, t);
 }
 
 double bt_case_tow_time(const bt_case *c, double way)
 {
-    double low = 0, high = c->run.duration;
-    for (int i = 0; i < 100; i++) {
-        const double mid = 0.5 * (low + high);
-        if (bt_case_tow_distance(c, mid) < way) low = mid;
-        else high = mid;
-    }
-    return low;
+    const bt_speed_law l = speed_law(c);
+    return bt_speed_law_time(&l, way, c->run.duration);
 }
 
 // ---- where it starts, and its path ----
@@ -73,8 +65,8 @@ bool bt_case_tow_start(const bt_case *c, double at[2])
     at[0] = p[0] + c->tow.line_length * ux;
     at[1] = p[1] + c->tow.line_length * uy;
     if (c->tow.line.branches < 2 || !has_line(c)) return true;
-    // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are just taut may lie far
-    // off the tow's axis, when one point lies ahead of the other.)
+    // Two branches: ahead of the middle between their fastening points, as far as neither is stretched. (Where both are
+    // just taut may lie far off the tow's axis, when one point lies ahead of the other.)
     hull_at(c, c->tow.branch2.hull_x, c->tow.branch2.hull_y, q);
     const double *const hull[2] = {p, q}, length[2] = {c->tow.line_length, c->tow.branch2.length};
     const double mx = 0.5 * (p[0] + q[0]), my = 0.5 * (p[1] + q[1]);
@@ -94,11 +86,14 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
     double start[2];
     *path = (bt_path){0};
     if (!bt_case_tow_start(c, start)) {
-        snprintf(why, 200, "the branches do not reach the middle between their fastening points; lengthen the shorter one or move its fastening point");
+        snprintf(why, 200,
+                 "the branches do not reach the middle between their fastening points; lengthen the shorter one or "
+                 "move its fastening point");
         return false;
     }
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
-    if (c->tow.n_waypoints > 0) return bt_path_make(path, start[0], start[1], c->tow.n_waypoints, c->tow.waypoints, c->tow.turn_radius, why);
+    if (c->tow.n_waypoints > 0)
+        return bt_path_make(path, start[0], start[1], c->tow.n_waypoints, c->tow.waypoints, c->tow.turn_radius, why);
     const double ahead[2] = {start[0] + cos(c->tow.direction), start[1] + sin(c->tow.direction)};
     const bool made = bt_path_make(path, start[0], start[1], 1, ahead, 0, why);
     if (made) path->n_marks = 0; // the point ahead is no way-point
@@ -136,12 +131,14 @@ void bt_case_tow_follow(const bt_check *k)
     fill(&c->tow.vessel.lookahead, c->tow.line_length > 0 ? c->tow.line_length : 1);
 }
 
-// A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r with that amplitude. A
-// sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and whole periods leave no swing behind.
+// A linear ramp of T_r accelerates the body at v/T_r, under which the tension of an undamped line swings about M v/T_r
+// with that amplitude. A sudden start has the amplitude M v ω = 2π M v/T: two periods bring it down to a twelfth, and
+// whole periods leave no swing behind.
 double bt_case_line_period(const bt_case *c)
 {
     if (!has_line(c)) return 0;
-    const double body = bt_case_body_mass(c) * (1 + c->body.added_mass), vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass);
+    const double body = bt_case_body_mass(c) * (1 + c->body.added_mass),
+                 vessel = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass);
     const double mass = c->tow.mode == BT_TOW_THRUST ? body * vessel / (body + vessel) : body;
     double k = c->tow.line_stiffness / c->tow.line_length;
     if (c->tow.line.branches > 1) k += c->tow.branch2.stiffness / c->tow.branch2.length;
@@ -158,8 +155,11 @@ void bt_case_warn_start(const bt_case *c, bt_errors *warnings)
 {
     if (bt_case_start_is_slow(c)) return;
     const double period = bt_case_line_period(c);
-    bt_errors_add(warnings, "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the line, and it swings on; leave "
-                  "tow.ramp out, or take at least %.3g s", c->tow.ramp, period, BT_RAMP_PERIODS * period);
+    bt_errors_add(warnings,
+                  "tow.ramp: %.4g s is short for a body that swings on its line in %.3g s: the start jerks the line, "
+                  "and it swings on; leave "
+                  "tow.ramp out, or take at least %.3g s",
+                  c->tow.ramp, period, BT_RAMP_PERIODS * period);
 }
 
 void bt_case_tow_ramp(bt_case *c)
@@ -167,7 +167,8 @@ void bt_case_tow_ramp(bt_case *c)
     if (!isnan(c->tow.ramp)) return;
     double v[2 * BT_MAX_VERTICES];
     const int n = c->tow.mode == BT_TOW_NONE ? 0 : bt_case_waterline(c, v);
-    const double size = n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0, way = c->tow.speed > 0 ? size / c->tow.speed : 0;
+    const double size = n ? sqrt(4 / BT_PI * bt_shape_moments(n, v).area) : 0,
+                 way = c->tow.speed > 0 ? size / c->tow.speed : 0;
     c->tow.ramp = bt_max(way, BT_RAMP_PERIODS * bt_case_line_period(c));
 }
 
@@ -208,15 +209,22 @@ static void check_programme(const bt_check *k)
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++)
         if (!(p[2 * i + 2] > p[2 * i])) {
-            bt_check_fault(k, "tow.programme", "point %d is at %g s, not after the one before, %g s; put the times in order", i + 2, p[2 * i + 2], p[2 * i]);
+            bt_check_fault(k, "tow.programme",
+                           "point %d is at %g s, not after the one before, %g s; put the times in order", i + 2,
+                           p[2 * i + 2], p[2 * i]);
             return;
         }
     double speed, time;
     largest_speed(c, &speed, &time);
     if (bt_check_sound(k, "tow.speed") && c->tow.speed != speed)
-        bt_check_fault(k, "tow.speed", "%g m/s has no effect with tow.programme, whose largest speed is %g m/s; remove one of them", c->tow.speed, speed);
+        bt_check_fault(k, "tow.speed",
+                       "%g m/s has no effect with tow.programme, whose largest speed is %g m/s; remove one of them",
+                       c->tow.speed, speed);
     if (bt_check_sound(k, "tow.ramp") && c->tow.ramp != time)
-        bt_check_fault(k, "tow.ramp", "%g s has no effect with tow.programme, which reaches its largest speed at %g s; remove one of them", c->tow.ramp, time);
+        bt_check_fault(
+            k, "tow.ramp",
+            "%g s has no effect with tow.programme, which reaches its largest speed at %g s; remove one of them",
+            c->tow.ramp, time);
     if (c->tow.mode == BT_TOW_NONE && speed > 0 && bt_check_sound(k, "tow.mode"))
         bt_check_fault(k, "tow.programme", "has no effect with tow.mode: none; remove it or set another mode");
 }
@@ -227,13 +235,18 @@ static void check_lines(const bt_check *k)
     const char *mode = c->tow.mode == BT_TOW_THRUST ? "thrust" : "line";
     if (!bt_check_sound(k, "tow.mode") || !has_line(c)) return;
     if (!(c->tow.line_length > 0) && bt_check_sound(k, "tow.line_length"))
-        bt_check_fault(k, "tow.line_length", "is %g m and tow.mode %s needs a line; give its length, as in 5 m", c->tow.line_length, mode);
+        bt_check_fault(k, "tow.line_length", "is %g m and tow.mode %s needs a line; give its length, as in 5 m",
+                       c->tow.line_length, mode);
     if (!bt_check_sound(k, "tow.line.type tow.line.diameter")) return;
     const bool named = c->tow.line.type != BT_ROPE_NUMBERS;
-    if (named && !(c->tow.line.diameter > 0)) bt_check_fault(k, "tow.line.diameter", "is %g m and a named line needs a diameter; give it, as in 60 mm", c->tow.line.diameter);
+    if (named && !(c->tow.line.diameter > 0))
+        bt_check_fault(k, "tow.line.diameter", "is %g m and a named line needs a diameter; give it, as in 60 mm",
+                       c->tow.line.diameter);
     else if (!(c->tow.line_stiffness > 0) && bt_check_sound(k, "tow.line_stiffness"))
-        bt_check_fault(k, "tow.line_stiffness", "is %g N and tow.mode %s needs a stiffness EA; give it, as in 10 kN", c->tow.line_stiffness, mode);
-    if (!named && c->tow.line.diameter != 0) bt_check_fault(k, "tow.line.diameter", "has no effect without a named line; set tow.line.type, or remove it");
+        bt_check_fault(k, "tow.line_stiffness", "is %g N and tow.mode %s needs a stiffness EA; give it, as in 10 kN",
+                       c->tow.line_stiffness, mode);
+    if (!named && c->tow.line.diameter != 0)
+        bt_check_fault(k, "tow.line.diameter", "has no effect without a named line; set tow.line.type, or remove it");
 }
 
 static void check_vessel(const bt_check *k)
@@ -244,10 +257,13 @@ static void check_vessel(const bt_check *k)
     static const char *const example[] = {"3000 t", "1 MN", "15 kn"};
     const double value[] = {c->tow.vessel.mass, c->tow.vessel.bollard_pull, c->tow.vessel.free_speed};
     for (int i = 0; i < 3; i++)
-        if (!(value[i] > 0) && bt_check_sound(k, key[i])) bt_check_fault(k, key[i], "is %g and tow.mode thrust needs it; give it, as in %s", value[i], example[i]);
-    if (c->tow.vessel.free_resistance > c->tow.vessel.bollard_pull && bt_check_sound(k, "tow.vessel.free_resistance tow.vessel.bollard_pull"))
-        bt_check_fault(k, "tow.vessel.free_resistance", "%g N is more than tow.vessel.bollard_pull, %g N: thrust does not grow with speed; lower it", c->tow.vessel.free_resistance,
-                       c->tow.vessel.bollard_pull);
+        if (!(value[i] > 0) && bt_check_sound(k, key[i]))
+            bt_check_fault(k, key[i], "is %g and tow.mode thrust needs it; give it, as in %s", value[i], example[i]);
+    if (c->tow.vessel.free_resistance > c->tow.vessel.bollard_pull &&
+        bt_check_sound(k, "tow.vessel.free_resistance tow.vessel.bollard_pull"))
+        bt_check_fault(k, "tow.vessel.free_resistance",
+                       "%g N is more than tow.vessel.bollard_pull, %g N: thrust does not grow with speed; lower it",
+                       c->tow.vessel.free_resistance, c->tow.vessel.bollard_pull);
 }
 
 /// First time at which the body, led along the path, leaves the walls; negative = never. At 2000 times of the run.
@@ -274,9 +290,12 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
 static void check_waypoints(const bt_check *k)
 {
     const bt_case *c = k->c;
-    if (!bt_check_sound(k, "tow.waypoints tow.turn_radius tow.direction tow.mode tow.line_length tow.line.branches body.x body.y body.yaw")) return;
+    if (!bt_check_sound(k, "tow.waypoints tow.turn_radius tow.direction tow.mode tow.line_length tow.line.branches "
+                           "body.x body.y body.yaw"))
+        return;
     if (c->tow.n_waypoints == 0) {
-        if (c->tow.turn_radius > 0) bt_check_fault(k, "tow.turn_radius", "has no effect without tow.waypoints; give them or remove it");
+        if (c->tow.turn_radius > 0)
+            bt_check_fault(k, "tow.turn_radius", "has no effect without tow.waypoints; give them or remove it");
         return;
     }
     if (c->tow.mode == BT_TOW_NONE) {
@@ -285,15 +304,19 @@ static void check_waypoints(const bt_check *k)
     }
     const double dx = c->tow.waypoints[0] - c->body.x, dy = c->tow.waypoints[1] - c->body.y, course = atan2(dy, dx);
     if (fabs(remainder(c->tow.direction - course, 2 * BT_PI)) > 1e-9) {
-        bt_check_fault(k, "tow.direction", "%g deg is not the direction from the body to the first way-point, %g deg; remove one of them", c->tow.direction * 180 / BT_PI, course * 180 / BT_PI);
+        bt_check_fault(k, "tow.direction",
+                       "%g deg is not the direction from the body to the first way-point, %g deg; remove one of them",
+                       c->tow.direction * 180 / BT_PI, course * 180 / BT_PI);
         return;
     }
     double start[2];
     if (!bt_case_tow_start(c, start)) return; // told by bt_case_tow_check
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
     if (!((c->tow.waypoints[0] - start[0]) * cos(course) + (c->tow.waypoints[1] - start[1]) * sin(course) > 0)) {
-        bt_check_fault(k, "tow.waypoints", "the first, (%g, %g) m, is not ahead of where the towing end starts, (%g, %g) m; move it ahead or shorten the line", c->tow.waypoints[0],
-                       c->tow.waypoints[1], start[0], start[1]);
+        bt_check_fault(k, "tow.waypoints",
+                       "the first, (%g, %g) m, is not ahead of where the towing end starts, (%g, %g) m; move it ahead "
+                       "or shorten the line",
+                       c->tow.waypoints[0], c->tow.waypoints[1], start[0], start[1]);
         return;
     }
     bt_path path;
@@ -303,19 +326,26 @@ static void check_waypoints(const bt_check *k)
         return;
     }
     // As for the direction of a straight tow.
-    for (int i = 0; c->domain.ends == BT_BOUND_MOVING && i + 1 < c->tow.n_waypoints && bt_check_sound(k, "domain.ends"); i++) {
-        const double lx = c->tow.waypoints[2 * i + 2] - c->tow.waypoints[2 * i], ly = c->tow.waypoints[2 * i + 3] - c->tow.waypoints[2 * i + 1];
+    for (int i = 0; c->domain.ends == BT_BOUND_MOVING && i + 1 < c->tow.n_waypoints && bt_check_sound(k, "domain.ends");
+         i++) {
+        const double lx = c->tow.waypoints[2 * i + 2] - c->tow.waypoints[2 * i],
+                     ly = c->tow.waypoints[2 * i + 3] - c->tow.waypoints[2 * i + 1];
         if (lx * bt_case_tow_sign(c) >= 0.5 * hypot(lx, ly)) continue;
-        bt_check_fault(k, "tow.waypoints", "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within 60 deg of that, or set domain.ends: periodic or open",
+        bt_check_fault(k, "tow.waypoints",
+                       "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within "
+                       "60 deg of that, or set domain.ends: periodic or open",
                        i + 1, atan2(ly, lx) * 180 / BT_PI);
         break;
     }
     // A vessel may be slower than its programme, and is not held to it.
     if (c->tow.mode != BT_TOW_THRUST && c->run.duration > 0 && c->body.shape != BT_BODY_ABSENT &&
-        bt_check_sound(k, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 domain.y0 domain.ends domain.sides body.shape")) {
+        bt_check_sound(k, "run.duration tow.speed tow.ramp tow.programme domain.length domain.width domain.x0 "
+                          "domain.y0 domain.ends domain.sides body.shape")) {
         const double time = time_of_wall(c, &path);
         if (time >= 0)
-            bt_check_fault(k, "run.duration", "the way-points lead the body into a wall after %.4g m; shorten the run to %g s, or move the way-points, or enlarge the domain",
+            bt_check_fault(k, "run.duration",
+                           "the way-points lead the body into a wall after %.4g m; shorten the run to %g s, or move "
+                           "the way-points, or enlarge the domain",
                            bt_case_tow_distance(c, time), floor(time));
     }
     bt_path_free(&path);
@@ -328,9 +358,13 @@ void bt_case_tow_check(const bt_check *k)
     check_lines(k);
     check_vessel(k);
     double start[2];
-    if (has_line(c) && bt_check_sound(k, "tow.mode tow.line_length tow.line.branches tow.branch2.length tow.hull_x tow.hull_y tow.branch2.hull_x tow.branch2.hull_y") &&
+    if (has_line(c) &&
+        bt_check_sound(k, "tow.mode tow.line_length tow.line.branches tow.branch2.length tow.hull_x tow.hull_y "
+                          "tow.branch2.hull_x tow.branch2.hull_y") &&
         !bt_case_tow_start(c, start))
-        bt_check_fault(k, "tow.branch2.length", "the two branches, %g and %g m, do not both reach the middle between their fastening points; lengthen the shorter one or move its fastening point", c->tow.line_length,
-                       c->tow.branch2.length);
+        bt_check_fault(k, "tow.branch2.length",
+                       "the two branches, %g and %g m, do not both reach the middle between their fastening points; "
+                       "lengthen the shorter one or move its fastening point",
+                       c->tow.line_length, c->tow.branch2.length);
     check_waypoints(k);
 }

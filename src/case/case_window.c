@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and what it cannot follow or take along.
+// Case keys of the moving window (domain.ends: moving): defaults that follow from other keys, and what it cannot follow
+// or take along.
 #include <math.h>
 #include <stdio.h>
 
@@ -18,7 +19,10 @@ void bt_case_window_follow(bt_case *c)
     const double sign = bt_case_tow_sign(c), length = c->domain.length;
     const double ahead = isnan(c->domain.ahead) ? share_ahead * length : c->domain.ahead;
     if (c->domain.frame == BT_FRAME_GEOGRAPHIC && isnan(c->body.x)) c->body.x = 0;
-    if (isnan(c->domain.x0)) c->domain.x0 = c->domain.frame == BT_FRAME_BASIN ? 0 : sign > 0 ? c->body.x + ahead - length : c->body.x - ahead;
+    if (isnan(c->domain.x0))
+        c->domain.x0 = c->domain.frame == BT_FRAME_BASIN ? 0
+                       : sign > 0                        ? c->body.x + ahead - length
+                                                         : c->body.x - ahead;
     if (isnan(c->body.x)) c->body.x = sign > 0 ? c->domain.x0 + length - ahead : c->domain.x0 + ahead;
 }
 
@@ -27,7 +31,8 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
 {
     const double sign = bt_case_tow_sign(c), ahead = c->domain.ahead, length = c->domain.length, floe = c->ice.size;
     if (c->domain.ends != BT_BOUND_MOVING) {
-        if (!ahead_given || fabs(ahead - bt_case_window_ahead(c)) <= 1e-9 * length) return NULL; // the resolved file has every key
+        // the resolved file has every key
+        if (!ahead_given || fabs(ahead - bt_case_window_ahead(c)) <= 1e-9 * length) return NULL;
         snprintf(why, 256, "%g m has no effect without domain.ends: moving; set it or remove the key", ahead);
         return "domain.ahead";
     }
@@ -37,30 +42,39 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
         return "domain.ends";
     }
     if (fabs(cos(c->tow.direction)) < 0.5) {
-        snprintf(why, 256, "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
-                 c->tow.direction * 180 / BT_PI);
+        snprintf(
+            why, 256,
+            "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
+            c->tow.direction * 180 / BT_PI);
         return "tow.direction";
     }
     if (sign * c->water.current_x > 0 && sign * c->water.current_x >= c->tow.speed * fabs(cos(c->tow.direction))) {
-        snprintf(why, 256, "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
-                           "set domain.ends: periodic or open", c->water.current_x);
+        snprintf(why, 256,
+                 "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
+                 "set domain.ends: periodic or open",
+                 c->water.current_x);
         return "water.current_x";
     }
     const double front = sign > 0 ? x_max : -x_min, stern = sign > 0 ? -x_min : x_max;
     if (ahead < front + room * floe || length - ahead < stern + room * floe) {
-        snprintf(why, 256, "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; "
-                           "move the body or take a longer domain",
+        snprintf(why, 256,
+                 "%g m of the %g m of domain.length: %g floe sizes, %g m, are needed ahead of the body and behind it; "
+                 "move the body or take a longer domain",
                  ahead, length, room, room * floe);
         return "domain.ahead";
     }
     if (c->domain.sides_closing != 0) {
-        snprintf(why, 256, "%g m/s: closing walls leave no room for the ice that enters a moving window; remove the key, or set "
-                           "domain.ends: periodic", c->domain.sides_closing);
+        snprintf(why, 256,
+                 "%g m/s: closing walls leave no room for the ice that enters a moving window; remove the key, or set "
+                 "domain.ends: periodic",
+                 c->domain.sides_closing);
         return "domain.sides_closing";
     }
     for (bt_idx i = 0; i < c->n_floes; i++) {
         if (!c->floes[i].fixed) continue;
-        snprintf(why, 256, "moving cannot take floes[%d] along, which is fixed; remove it, or set domain.ends: periodic or open", (int)i);
+        snprintf(why, 256,
+                 "moving cannot take floes[%d] along, which is fixed; remove it, or set domain.ends: periodic or open",
+                 (int)i);
         return "domain.ends";
     }
     return NULL;
@@ -69,8 +83,10 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
 void bt_case_check_window(const bt_check *k, int n, const double *v)
 {
     const bt_case *c = k->c;
-    if (!bt_check_sound(k, "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction "
-                           "tow.speed water.current_x body.x body.yaw body.shape ice.size")) return;
+    if (!bt_check_sound(k,
+                        "domain.ends domain.length domain.x0 domain.ahead domain.sides_closing tow.mode tow.direction "
+                        "tow.speed water.current_x body.x body.yaw body.shape ice.size"))
+        return;
     if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
     double x_min = 0, x_max = 0;
     for (int i = 0; i < n; i++) {

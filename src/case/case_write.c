@@ -37,7 +37,8 @@ static void write_floes(const bt_case *c, FILE *out)
 
 char *bt_case_resolved(const bt_case *c)
 {
-    return bt_case_text(c, "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n");
+    return bt_case_text(c, "# A case with every key, its value in SI units, and what it means. Running this file gives "
+                           "the same result.\n");
 }
 
 char *bt_case_text(const bt_case *c, const char *head)
@@ -75,11 +76,13 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
             unit = "choice";
             *options = 0;
             for (int j = 0; k->choices[j]; j++)
-                snprintf(options + strlen(options), sizeof options - strlen(options), "%s%s", j ? " | " : "", k->choices[j]);
+                snprintf(options + strlen(options), sizeof options - strlen(options), "%s%s", j ? " | " : "",
+                         k->choices[j]);
             range = options;
         }
         const char *preset = k->preset ? k->preset : "required", *rule = preset[0] == '=' ? preset : NULL;
-        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc, rule ? "; default: " : "", rule ? rule + 2 : "");
+        fprintf(out, "%-24s %-8s %-10s %-36s %s%s%s\n", k->name, unit, rule ? "follows" : preset, range, k->doc,
+                rule ? "; default: " : "", rule ? rule + 2 : "");
     }
 }
 
@@ -88,8 +91,10 @@ void bt_case_list_keys(void *stream)
     FILE *out = stream;
     fprintf(out, "%-24s %-8s %-10s %-36s %s\n", "key", "unit", "default", "range", "meaning");
     list_keys(out, bt_case_keys, bt_n_case_keys);
-    fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the meaning.\n"
-          "floes: is a list of floes given by hand, each a map with the keys\n\n", out);
+    fputs("\nUnit is that of a number written without one. A default that follows from other keys is given in the "
+          "meaning.\n"
+          "floes: is a list of floes given by hand, each a map with the keys\n\n",
+          out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
     bt_largest_print(out);
 }
@@ -109,12 +114,13 @@ static void json_range(bt_json *j, const bt_key *k)
 
 static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
 {
-    static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer", [BT_KEY_BOOL] = "bool", [BT_KEY_TEXT] = "text",
-                                        [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points"};
+    static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer",   [BT_KEY_BOOL] = "bool",
+                                        [BT_KEY_TEXT] = "text", [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points"};
     bt_json_open(j, name, '[');
     for (int i = 0; i < n; i++) {
         const bt_key *k = &keys[i];
-        const bool number = k->type == BT_KEY_REAL || k->type == BT_KEY_INT || k->type == BT_KEY_POINTS, rule = k->preset && k->preset[0] == '=';
+        const bool number = k->type == BT_KEY_REAL || k->type == BT_KEY_INT || k->type == BT_KEY_POINTS,
+                   rule = k->preset && k->preset[0] == '=';
         bt_json_open(j, NULL, '{');
         bt_json_string(j, "name", k->name);
         bt_json_string(j, "type", types[k->type]);

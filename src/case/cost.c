@@ -12,12 +12,15 @@
 #include "case/case_check.h"
 #include "base/largest.h"
 
-static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS, BASE_BYTES = 20e6;
-static const double CHECKPOINT_BYTES_PER_FLOE = 1000; // on rank 0 while it writes one: rows on the way, columns, the field, contacts
+static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
+                    BASE_BYTES = 20e6;
+// on rank 0 while it writes one: rows on the way, columns, the field, contacts
+static const double CHECKPOINT_BYTES_PER_FLOE = 1000;
 
 // --- disk ------------------------------------------------------------------------------------------------------------
 
-// Of result.h5 without data; of a frame: its group and five datasets (xdmf.h); of a dataset that is deflated, its index.
+// Of result.h5 without data; of a frame: its group and five datasets (xdmf.h); of a dataset that is deflated, its
+// index.
 static const double RESULT_BASE = 255e3, FRAME_BASE = 2700, INDEX = 2600, LEAST_PACKED = 8192;
 // Shares that shuffle and deflate leave: of poses, of corners, and of speeds and forces, which are 0 of most floes.
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
@@ -39,7 +42,8 @@ double bt_cost_seconds(const bt_case *c)
     return floes * (double)bt_case_steps(c) * bt_cost_floe_step(c->ice.concentration);
 }
 
-/// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel (panel_blocks.h).
+/// What the summary keeps of the steps, in memory and in a checkpoint, B: the history, and the loads by panel
+/// (panel_blocks.h).
 static double steps_kept(const bt_case *c)
 {
     const bool panels = c->body.shape != BT_BODY_ABSENT && c->impact.conversion != BT_IMPACT_NONE;
@@ -49,25 +53,37 @@ static double steps_kept(const bt_case *c)
 
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here)
 {
-    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here + CHECKPOINT_BYTES_PER_FLOE * n_floes + steps_kept(c);
+    return (BASE_BYTES + n_floes * (BYTES_PER_FLOE / size + FIELD_BYTES_PER_FLOE)) * ranks_here +
+           CHECKPOINT_BYTES_PER_FLOE * n_floes + steps_kept(c);
 }
 
 double bt_cost_corners(const bt_case *c, const bt_field *f, double n)
 {
-    const double each = c->ice.shape == BT_ICE_RECTANGLES ? 4 : c->ice.shape == BT_ICE_POLYGONS ? (double)c->ice.sides : VORONOI_CORNERS;
-    double v[2 * BT_MAX_VERTICES], corners = f && f->n > 0 ? (double)f->offsets[f->n] : each * bt_max(0, n - c->n_floes);
+    const double each = c->ice.shape == BT_ICE_RECTANGLES ? 4
+                        : c->ice.shape == BT_ICE_POLYGONS ? (double)c->ice.sides
+                                                          : VORONOI_CORNERS;
+    double v[2 * BT_MAX_VERTICES],
+        corners = f && f->n > 0 ? (double)f->offsets[f->n] : each * bt_max(0, n - c->n_floes);
     for (bt_idx i = 0; i < c->n_floes; i++) corners += bt_case_floe_outline(&c->floes[i], v);
     return corners;
 }
 
 /// Bytes of a dataset that each frame has of its own.
-static double of_frame(double bytes, double left, bool packed) { return packed && bytes > LEAST_PACKED ? bytes * left + INDEX : bytes; }
+static double of_frame(double bytes, double left, bool packed)
+{
+    return packed && bytes > LEAST_PACKED ? bytes * left + INDEX : bytes;
+}
 
-static double entries_of(const bt_case *c) { return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every)); }
+static double entries_of(const bt_case *c)
+{
+    return ceil((double)bt_case_steps(c) / bt_max(1, (double)c->output.sample_every));
+}
 
 double bt_cost_frames(const bt_case *c)
 {
-    const double steps = (double)bt_case_steps(c), due = c->output.frame_interval > 0 ? c->run.duration / c->output.frame_interval : 0, whole = floor(due * (1 + 1e-12));
+    const double steps = (double)bt_case_steps(c),
+                 due = c->output.frame_interval > 0 ? c->run.duration / c->output.frame_interval : 0,
+                 whole = floor(due * (1 + 1e-12));
     return 1 + bt_min(steps, due - whole > 1e-9 * due ? whole + 1 : whole);
 }
 
@@ -76,14 +92,20 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const bool packed = ranks == 1;
     const double frames = bt_cost_frames(c);
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
-    const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) + 2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
+    const double frame = n * (24 * pose + 16 * still) + of_frame(8 * corners, CORNER_LEFT, packed) +
+                         2 * of_frame(4 * n, STILL_LEFT, packed) + FRAME_BASE + OTHERS_FRAME;
     const double outlines = 24 * n + 16 * corners + 4 * (corners + 2 * n);
-    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK, columns = BT_COST_SERIES + (c->output.panels ? 3 * (double)c->impact.panels : 0);
+    const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK,
+                 columns = BT_COST_SERIES + (c->output.panels ? 3 * (double)c->impact.panels : 0);
     const double checkpoint = CHECKPOINT_BASE + CHECKPOINT_FLOE * n + CHECKPOINT_CORNER * corners + steps_kept(c);
-    const bool on_the_way = (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
-                            (c->output.checkpoint_wall > 0 && (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);
-    bt_cost_disk d = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns + 8 * IMPACT_ROWS * IMPACT_COLUMNS,
-                      .checkpoints = on_the_way ? 2 * checkpoint : checkpoint, .texts = TEXTS + frames * XDMF_FRAME};
+    const bool on_the_way =
+        (c->output.checkpoint_steps > 0 && c->output.checkpoint_steps < bt_case_steps(c)) ||
+        (c->output.checkpoint_wall > 0 &&
+         (double)bt_case_steps(c) * n * bt_cost_floe_step(c->ice.concentration) > c->output.checkpoint_wall);
+    bt_cost_disk d = {.result = RESULT_BASE + outlines + frames * frame + 8 * entries * columns +
+                                8 * IMPACT_ROWS * IMPACT_COLUMNS,
+                      .checkpoints = on_the_way ? 2 * checkpoint : checkpoint,
+                      .texts = TEXTS + frames * XDMF_FRAME};
     d.most = bt_cost_left(&d) + (on_the_way ? 2 * d.result + checkpoint : checkpoint);
     return d;
 }
@@ -98,20 +120,29 @@ double bt_cost_member(const bt_case *c, const bt_cost_disk *d)
 void bt_case_check_cost(const bt_check *k)
 {
     const bt_case *c = k->c;
-    if (!bt_check_sound(k, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
-                           "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels impact.panels")) return;
-    const double n = bt_case_expected_floes(c) + c->n_floes, work = bt_cost_seconds(c), result = bt_cost_disk_of(c, n, bt_cost_corners(c, NULL, n), 2).result;
+    if (!bt_check_sound(k, "run.dt run.duration domain.length domain.width ice.concentration ice.size ice.size_law "
+                           "ice.size_min ice.size_max ice.size_spread ice.x_min ice.x_max "
+                           "ice.y_min ice.y_max output.frame_interval output.sample_every output.panels impact.panels"))
+        return;
+    const double n = bt_case_expected_floes(c) + c->n_floes, work = bt_cost_seconds(c),
+                 result = bt_cost_disk_of(c, n, bt_cost_corners(c, NULL, n), 2).result;
     if (work > BT_MOST_CORE_SECONDS)
-        bt_check_fault(k, "run.duration", "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are begun; shorten the run, lengthen run.dt, or take larger floes or a smaller region",
+        bt_check_fault(k, "run.duration",
+                       "about %.2g floes for %.2g steps need some %.2g s of one core, at most %g are begun; shorten "
+                       "the run, lengthen run.dt, or take larger floes or a smaller region",
                        n, (double)bt_case_steps(c), work, BT_MOST_CORE_SECONDS);
     if (result > BT_MOST_RESULT_BYTES)
-        bt_check_fault(k, "output.frame_interval", "frames and series of about %.2g bytes, at most %g are written; lengthen output.frame_interval, or raise output.sample_every", result, BT_MOST_RESULT_BYTES);
+        bt_check_fault(k, "output.frame_interval",
+                       "frames and series of about %.2g bytes, at most %g are written; lengthen output.frame_interval, "
+                       "or raise output.sample_every",
+                       result, BT_MOST_RESULT_BYTES);
 }
 
 double bt_cost_machine(void)
 {
     double bytes = (double)sysconf(_SC_PHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
-    static const char *const files[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"}; // cgroup v2 ("max": none), v1
+    // cgroup v2 ("max": none), v1
+    static const char *const files[] = {"/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
     for (int i = 0; i < 2; i++) {
         char text[64];
         FILE *f = fopen(files[i], "r");
@@ -124,14 +155,20 @@ double bt_cost_machine(void)
 
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err)
 {
-    const double need = bt_cost_memory(c, n_floes, comm->size, comm->ranks_here), result = bt_cost_disk_of(c, n_floes, bt_cost_corners(c, NULL, n_floes), 2).result;
+    const double need = bt_cost_memory(c, n_floes, comm->size, comm->ranks_here),
+                 result = bt_cost_disk_of(c, n_floes, bt_cost_corners(c, NULL, n_floes), 2).result;
     if (result > BT_MOST_RESULT_BYTES) { // of a field that was read; of others the case is refused
-        bt_errors_add(err, "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g are written; lengthen it, or raise output.sample_every",
+        bt_errors_add(err,
+                      "%s: output.frame_interval: frames and series of %.3g floes take about %.2g bytes, at most %g "
+                      "are written; lengthen it, or raise output.sample_every",
                       c->path ? c->path : "case", n_floes, result, BT_MOST_RESULT_BYTES);
         return BT_ERR_CASE;
     }
     if (need <= machine) return BT_OK;
-    bt_errors_add(err, "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take larger floes (ice.size), a smaller region, fewer steps (run.duration), "
-                  "or more machines (mpirun)", c->path ? c->path : "case", n_floes, (double)bt_case_steps(c), need / 1e9, machine / 1e9);
+    bt_errors_add(err,
+                  "%s: about %.3g floes and %.3g steps need some %.3g GB of memory, and this machine has %.3g GB; take "
+                  "larger floes (ice.size), a smaller region, fewer steps (run.duration), "
+                  "or more machines (mpirun)",
+                  c->path ? c->path : "case", n_floes, (double)bt_case_steps(c), need / 1e9, machine / 1e9);
     return BT_ERR_CASE;
 }

@@ -9,25 +9,26 @@
 
 /// What the layers above write, for the estimate of their size; each is held to it where it is defined.
 enum {
-    BT_COST_SERIES = 63,      ///< series of a run
+    BT_COST_SERIES = 69,      ///< series of a run
     BT_COST_COLUMNS = 15,     ///< of them kept in memory from every step
     BT_COST_PANEL_BYTES = 32, ///< a block of the loads of one panel
 };
 
-/// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 µs at 20, 50 and 80 %, where
-/// force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is linear.
-/// A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.
+/// Seconds a floe and step on one core, measured on cases/basin (AMD EPYC, 2026): 0.5, 2 and 15 µs at 20, 50 and 80 %,
+/// where force chains reach the walls and the contact solver sweeps a hundred times. Between them the logarithm is
+/// linear. A large pack at 80 % in which most floes rest costs a tenth of that: the order of magnitude, no more.
 double bt_cost_floe_step(double concentration);
 
 /// Of a whole case with a generated field, s of one core.
 double bt_cost_seconds(const bt_case *c);
 
-/// Memory of a node with ranks_here of `size` ranks, B: 2 kB a floe (body arrays about 0.5 kB, contacts and lists about 1.5 kB in dense ice) shared by the
-/// ranks, 0.2 kB a floe on each for the field at time zero, 1 kB a floe on one of them for the time of a checkpoint, and what the summary keeps of every step.
+/// Memory of a node with ranks_here of `size` ranks, B: 2 kB a floe (body arrays about 0.5 kB, contacts and lists about
+/// 1.5 kB in dense ice) shared by the ranks, 0.2 kB a floe on each for the field at time zero, 1 kB a floe on one of
+/// them for the time of a checkpoint, and what the summary keeps of every step.
 double bt_cost_memory(const bt_case *c, double n_floes, int size, int ranks_here);
 
-/// Corners of all floes: of the field where one was read (f->n > 0, or f NULL), else as many as n floes of the shape have in the mean (5.6 of Voronoi cells, as counted
-/// in the cases of cases/), and those given by hand.
+/// Corners of all floes: of the field where one was read (f->n > 0, or f NULL), else as many as n floes of the shape
+/// have in the mean (5.6 of Voronoi cells, as counted in the cases of cases/), and those given by hand.
 double bt_cost_corners(const bt_case *c, const bt_field *f, double n);
 
 /// Frames of a run: the start, the first step at or after each multiple of the interval, the end; one a step at most.
@@ -38,11 +39,13 @@ typedef struct bt_cost_disk {
     double result;      ///< result.h5: series, frames, outlines
     double checkpoints; ///< the last one, or two
     double texts;       ///< frames.xdmf, summary.json, case.resolved.yml
-    double most;        ///< all of it while it runs: result.part.h5, and result.h5 and a checkpoint before and after they are replaced
+    /// all of it while it runs: result.part.h5, and result.h5 and a checkpoint before and after they are replaced
+    double most;
 } bt_cost_disk;
 
-/// Lengths of the datasets that src/output/frames.c, src/output/record.c and src/base/snapshot_file.c write, with what HDF5 takes for each, and shares that deflate leaves, as measured in November 2026
-/// on the cases of cases/: one rank stores frames compressed, several do not. Within 20 % of what was left there: tests/cli/test_disk.py.
+/// Lengths of the datasets that src/output/frames.c, src/output/record.c and src/base/snapshot_file.c write, with what
+/// HDF5 takes for each, and shares that deflate leaves, as measured in November 2026 on the cases of cases/: one rank
+/// stores frames compressed, several do not. Within 20 % of what was left there: tests/cli/test_disk.py.
 bt_cost_disk bt_cost_disk_of(const bt_case *c, double n_floes, double corners, int ranks);
 static inline double bt_cost_left(const bt_cost_disk *d) { return d->result + d->checkpoints + d->texts; }
 
@@ -52,7 +55,8 @@ double bt_cost_member(const bt_case *c, const bt_cost_disk *d);
 /// Memory of this machine, or less where the control group of this process has less, B.
 double bt_cost_machine(void);
 
-/// Refuse a case of n_floes that needs more memory than a machine has, or more disk than any run may take. Errors: BT_ERR_CASE.
+/// Refuse a case of n_floes that needs more memory than a machine has, or more disk than any run may take. Errors:
+/// BT_ERR_CASE.
 bt_status bt_cost_fits(const bt_case *c, double n_floes, const bt_comm *comm, double machine, bt_errors *err);
 
 #endif

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The Froude-scaled twin of a case.
 //
-// With gravity and all densities kept, every equation of the model stays the same when lengths grow by L, times and speeds by √L, masses and
-// forces by L³ and pressures by L: the Froude number V/√(g l) is that of the original. The kind of unit in the schema gives the exponent
-// of a key (bt_units_froude). What the table below lists does not follow its unit.
+// With gravity and all densities kept, every equation of the model stays the same when lengths grow by L, times and
+// speeds by √L, masses and forces by L³ and pressures by L: the Froude number V/√(g l) is that of the original. The
+// kind of unit in the schema gives the exponent of a key (bt_units_froude). What the table below lists does not follow
+// its unit.
 #include "bergtow/case.h"
 
 #include <math.h>
@@ -28,7 +29,8 @@ static const struct {
 // Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well.
 static const char *const plain_texts[] = {"run.title", "reference.source"};
 
-// L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with other exponents.
+// L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with
+// other exponents.
 static double power(double ratio, double e)
 {
     const double whole = floor(e);
@@ -96,8 +98,9 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
             const char *text;
             memcpy(&text, member, sizeof text);
             if (text && !is_plain(k->name))
-                bt_errors_add(err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
-                              c->path ? c->path : "case", k->name, text);
+                bt_errors_add(
+                    err, "%s: %s: %s cannot be scaled with the case; remove the key, or make such a file for the twin",
+                    c->path ? c->path : "case", k->name, text);
             break;
         }
         case BT_KEY_INT:
@@ -123,20 +126,31 @@ char *bt_case_scaled_text(const bt_case *twin, double ratio)
 {
     char *head = NULL;
     const char *path = twin->path ? twin->path : "a case";
-    const char *coriolis = twin->water.latitude == 0 ? "" :
-        "#   - The earth turns as it does (water.latitude is kept): Coriolis force / inertia is sqrt(L) times that of the original.\n";
-    if (asprintf(&head,
-                 "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn 1/sqrt(L); masses,\n"
-                 "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles and ratios as they were.\n"
-                 "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full scale:\n"
-                 "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that of the original.\n"
-                 "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are those of full scale, and\n"
-                 "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
-                 "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the stiffness.\n"
-                 "%s"
-                 "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. Otherwise rounding changes the shaken\n"
-                 "# field into another of the same statistics (not so with ice.shake: 0).\n"
-                 "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n", path, ratio, coriolis) < 0)
+    const char *coriolis = twin->water.latitude == 0
+                               ? ""
+                               : "#   - The earth turns as it does (water.latitude is kept): Coriolis force / inertia "
+                                 "is sqrt(L) times that of the original.\n";
+    if (asprintf(
+            &head,
+            "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn "
+            "1/sqrt(L); masses,\n"
+            "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles "
+            "and ratios as they were.\n"
+            "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full "
+            "scale:\n"
+            "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that "
+            "of the original.\n"
+            "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are "
+            "those of full scale, and\n"
+            "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
+            "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the "
+            "stiffness.\n"
+            "%s"
+            "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. "
+            "Otherwise rounding changes the shaken\n"
+            "# field into another of the same statistics (not so with ice.shake: 0).\n"
+            "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n",
+            path, ratio, coriolis) < 0)
         return NULL;
     char *text = bt_case_text(twin, head);
     free(head);

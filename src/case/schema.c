@@ -6,7 +6,8 @@
 //   [Hunke & Comeau 2011]    J. Geophys. Res. 116, C05008: icebergs in sea ice, drag coefficients
 //   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
 //   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
-//   [Lichey & Hellmer 2001]  J. Glaciol. 47: giant iceberg drift, force of sea ice on a berg; numbers also as in FESOM2's iceberg code
+//   [Lichey & Hellmer 2001]  J. Glaciol. 47: giant iceberg drift, force of sea ice on a berg; numbers also as in
+//   FESOM2's iceberg code
 //   [Flato & Hibler 1995]    J. Geophys. Res. 100: ridging, work / potential energy
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
 // "assumed" is a choice of this program without a measurement behind it.
@@ -41,8 +42,11 @@ static const char *const tilts[] = {"none", "slope", "geostrophic", "dynamic", N
 static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 
 #define AT(member) .offset = offsetof(bt_case, member)
-#define REAL(key, member, kind, preset_, range_, doc_) \
-    {.name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member), .doc = doc_}
+#define REAL(key, member, kind, preset_, range_, doc_)                                                                 \
+    {                                                                                                                  \
+        .name = key, .type = BT_KEY_REAL, .unit = BT_UNIT_##kind, .preset = preset_, .range = range_, AT(member),      \
+        .doc = doc_                                                                                                    \
+    }
 #define INT(key, member, preset_, range_, doc_) \
     {.name = key, .type = BT_KEY_INT, .preset = preset_, .range = range_, AT(member), .doc = doc_}
 #define BOOL(key, member, preset_, doc_) {.name = key, .type = BT_KEY_BOOL, .preset = preset_, AT(member), .doc = doc_}
@@ -54,165 +58,289 @@ static const char *const lead_modes[] = {"none", "channel", "managed", NULL};
 #define ANYWHERE "[-1e7, 1e7]"
 #define ANY_SPEED "[-100, 100]"
 
-const bt_key bt_case_keys[] = {
+#define SPARE {.name = NULL}
+#define EIGHT_SPARE SPARE, SPARE, SPARE, SPARE, SPARE, SPARE, SPARE, SPARE
+
+bt_key bt_case_keys[] = {
     TEXT("run.title", run.title, "none", "one line for the reports"),
     REAL("run.dt", run.dt, TIME, NULL, "(0, 1000]",
-         "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at most 5 s at full scale [Yulmetov & Løset 2017]"),
+         "time step, about the duration of a collision and much smaller than floe size / speed: 0.1 s in a basin, at "
+         "most 5 s at full scale [Yulmetov & Løset 2017]"),
     REAL("run.duration", run.duration, TIME, NULL, "(0, 1e9]", "simulated time"),
-    INT("run.threads", run.threads, "0", "[0, 1024]", "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
+    INT("run.threads", run.threads, "0", "[0, 1024]",
+        "OpenMP threads, 0 = OMP_NUM_THREADS or all cores; the result does not depend on it"),
 
     CHOICE("domain.frame", domain.frame, frames, "basin",
-           "basin: origin at the middle of the short side, x along, y across, on a map x east and y north; geographic: origin at the body, x north, y east [Yulmetov & Løset 2017]"),
-    REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]", "extent along x; the default is HSVA's large ice tank, from memory"),
-    REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]", "extent along y; the default is HSVA's large ice tank, from memory"),
+           "basin: origin at the middle of the short side, x along, y across, on a map x east and y north; geographic: "
+           "origin at the body, x north, y east [Yulmetov & Løset 2017]"),
+    REAL("domain.length", domain.length, LENGTH, "72 m", "(0, 1e7]",
+         "extent along x; the default is HSVA's large ice tank, from memory"),
+    REAL("domain.width", domain.width, LENGTH, "10 m", "(0, 1e7]",
+         "extent along y; the default is HSVA's large ice tank, from memory"),
     REAL("domain.x0", domain.x0, LENGTH, "= 0 (basin), -length/2 (geographic)", ANYWHERE, "low corner of the domain"),
     REAL("domain.y0", domain.y0, LENGTH, "= -width/2", ANYWHERE, "low corner of the domain"),
-    CHOICE("domain.ends", domain.ends, end_bounds, "wall", "boundaries at the ends of x; moving: the domain goes with the towed body, ice enters ahead and is dropped behind"),
+    CHOICE("domain.ends", domain.ends, end_bounds, "wall",
+           "boundaries at the ends of x; moving: the domain goes with the towed body, ice enters ahead and is dropped "
+           "behind"),
     CHOICE("domain.sides", domain.sides, bounds, "wall", "boundaries at the ends of y"),
-    REAL("domain.wall_friction", domain.wall_friction, RATIO, "0.1", "[0, 10]", "Coulomb coefficient between ice or body and walls, assumed"),
+    REAL("domain.wall_friction", domain.wall_friction, RATIO, "0.1", "[0, 10]",
+         "Coulomb coefficient between ice or body and walls, assumed"),
     REAL("domain.wall_restitution", domain.wall_restitution, RATIO, "0", "[0, 1]", "restitution at walls, assumed"),
     REAL("domain.ends_closing", domain.ends_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each end wall"),
     REAL("domain.sides_closing", domain.sides_closing, SPEED, "0 m/s", "[0, 10]", "inward speed of each side wall"),
-    REAL("domain.ahead", domain.ahead, LENGTH, "= from body.x to the end ahead of the tow; 0.6 domain.length where that and body.x are open and the ends moving", "(0, 1e7]",
-         "distance from the body to the end ahead of it, which ends: moving keeps; without body.x it says where the body stands; the default is assumed"),
+    REAL("domain.ahead", domain.ahead, LENGTH,
+         "= from body.x to the end ahead of the tow; 0.6 domain.length where that and body.x are open and the ends "
+         "moving",
+         "(0, 1e7]",
+         "distance from the body to the end ahead of it, which ends: moving keeps; without body.x it says where the "
+         "body stands; the default is assumed"),
 
-    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]", "area fraction of ice in the ice region less the body's footprint, 0 = open water; as ice.size and ice.thickness, no default in the geographic frame"),
+    REAL("ice.concentration", ice.concentration, RATIO, "0.8", "[0, 0.95]",
+         "area fraction of ice in the ice region less the body's footprint, 0 = open water; as ice.size and "
+         "ice.thickness, no default in the geographic frame"),
     REAL("ice.x_min", ice.x_min, LENGTH, "= domain.x0", ANYWHERE, "ice region, low end of x"),
     REAL("ice.x_max", ice.x_max, LENGTH, "= domain.x0 + domain.length", ANYWHERE, "ice region, high end of x"),
     REAL("ice.y_min", ice.y_min, LENGTH, "= domain.y0", ANYWHERE, "ice region, low end of y"),
     REAL("ice.y_max", ice.y_max, LENGTH, "= domain.y0 + domain.width", ANYWHERE, "ice region, high end of y"),
-    CHOICE("ice.shape", ice.shape, ice_shapes, "voronoi", "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
+    CHOICE("ice.shape", ice.shape, ice_shapes, "voronoi",
+           "floe outlines: convex cells, rectangles as sawn in a basin, or regular polygons"),
     INT("ice.sides", ice.sides, "6", "[3, 32]", "corners of the floes of shape polygons"),
     REAL("ice.aspect", ice.aspect, RATIO, "1", "[1, 10]", "length / width of the floes of shape rectangles"),
     REAL("ice.size", ice.size, LENGTH, "1 m", "(0, 1e5]",
-         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale; no default in the geographic frame [Yulmetov & Løset 2017]"),
+         "mean diameter of the circle of a floe's area; 1 m in the basin, 30 m at full scale; no default in the "
+         "geographic frame [Yulmetov & Løset 2017]"),
     CHOICE("ice.size_law", ice.size_law, size_laws, "single", "distribution of the diameter"),
-    REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the diameter, laws single and lognormal, assumed"),
-    REAL("ice.size_min", ice.size_min, LENGTH, "0 m", "[0, 1e5]", "smallest diameter, needed by law power; 0 = no limit"),
-    REAL("ice.size_max", ice.size_max, LENGTH, "0 m", "[0, 1e5]", "largest diameter, needed by law power; 0 = no limit"),
+    REAL("ice.size_spread", ice.size_spread, RATIO, "0.2", "[0, 2]",
+         "standard deviation / mean of the diameter, laws single and lognormal, assumed"),
+    REAL("ice.size_min", ice.size_min, LENGTH, "0 m", "[0, 1e5]",
+         "smallest diameter, needed by law power; 0 = no limit"),
+    REAL("ice.size_max", ice.size_max, LENGTH, "0 m", "[0, 1e5]",
+         "largest diameter, needed by law power; 0 = no limit"),
     REAL("ice.size_exponent", ice.size_exponent, NONE, "2", "[0.5, 4]",
          "a of the power law N(>d) ~ d^-a, 1.5 to 2.5 observed [Rothrock & Thorndike 1984]"),
     REAL("ice.thickness", ice.thickness, LENGTH, "0.04 m", "(0, 100]", "mean floe thickness, assumed"),
-    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant", "distribution of the thickness over the floes; lognormal: cut at the ends of its range"),
-    REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]", "standard deviation / mean of the thickness, law lognormal, assumed"),
+    CHOICE("ice.thickness_law", ice.thickness_law, thickness_laws, "constant",
+           "distribution of the thickness over the floes; lognormal: cut at the ends of its range"),
+    REAL("ice.thickness_spread", ice.thickness_spread, RATIO, "0.2", "[0, 2]",
+         "standard deviation / mean of the thickness, law lognormal, assumed"),
     REAL("ice.density", ice.density, DENSITY, "910 kg/m3", "[100, 1100]", "density of the floes [Hunke & Comeau 2011]"),
     REAL("ice.friction", ice.friction, RATIO, "0.35", "[0, 10]",
-         "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & Løset 2013]"),
+         "Coulomb coefficient ice on ice, assumed between natural (0.48) and polished (0.05) surfaces [Sukhorukov & "
+         "Løset 2013]"),
     REAL("ice.restitution", ice.restitution, RATIO, "0", "[0, 1]", "restitution of floe collisions, assumed"),
     REAL("ice.crushing.pressure", ice.crushing_pressure, PRESSURE, "0 Pa", "[0, 1e9]",
-         "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = rigid contact without limit"),
-    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]", "least length of a contact / thickness of the floe that is crushed, assumed"),
+         "pressure at which the edge of a floe is crushed: a contact bears at most pressure x thickness x length; 0 = "
+         "rigid contact without limit"),
+    REAL("ice.crushing.least_length", ice.crushing_least, RATIO, "1", "[1e-3, 100]",
+         "least length of a contact / thickness of the floe that is crushed, assumed"),
     REAL("ice.rafting.kappa", ice.rafting_kappa, RATIO, "0", "[0, 1000]",
-         "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = "
+         "load under which floes slide over each other / what their potential energy alone would need on one side, 1/2 "
+         "rho_i (1 - rho_i/rho_w) g h2 per m; 0 = they never do; 2 = "
          "without loss; 5 to 17, assumed [Rothrock 1975; Parmerter 1975; Hopkins 1998]"),
     REAL("ice.added_mass", ice.added_mass, RATIO, "0", "[0, 10]", "added mass of a floe / its mass, assumed"),
-    REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]", "added moment of inertia of a floe / its own, assumed"),
-    REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag of the floe's edge in water [Hunke & Comeau 2011]"),
-    REAL("ice.drag.water_skin", ice.drag.water_skin, RATIO, "5.5e-3", "[0, 10]", "skin drag of water under a floe [Hunke & Comeau 2011]"),
-    REAL("ice.drag.air_form", ice.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag of the floe's edge in air [Hunke & Comeau 2011]"),
-    REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]", "skin drag of air over a floe [Hunke & Comeau 2011]"),
+    REAL("ice.added_inertia", ice.added_inertia, RATIO, "0", "[0, 10]",
+         "added moment of inertia of a floe / its own, assumed"),
+    REAL("ice.drag.water_form", ice.drag.water_form, RATIO, "0.85", "[0, 100]",
+         "form drag of the floe's edge in water [Hunke & Comeau 2011]"),
+    REAL("ice.drag.water_skin", ice.drag.water_skin, RATIO, "5.5e-3", "[0, 10]",
+         "skin drag of water under a floe [Hunke & Comeau 2011]"),
+    REAL("ice.drag.air_form", ice.drag.air_form, RATIO, "0.4", "[0, 100]",
+         "form drag of the floe's edge in air [Hunke & Comeau 2011]"),
+    REAL("ice.drag.air_skin", ice.drag.air_skin, RATIO, "2e-3", "[0, 10]",
+         "skin drag of air over a floe [Hunke & Comeau 2011]"),
     CHOICE("ice.start", ice.start, starts, "drift",
-           "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, water, Coriolis and slope at time zero balance, none across walls; rest: 0"),
+           "velocity of floes, and of a body that nothing tows, at time zero: drift: that at which the forces of wind, "
+           "water, Coriolis and slope at time zero balance, none across walls; rest: 0"),
     INT("ice.seed", ice.seed, "1", "[0, 9.2e18]", "seed of the field; the same seed gives the same field"),
-    REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]", "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
-    TEXT("ice.field", ice.field, "none", "HDF5 field file read instead of making a field; relative to the folder of the case file"),
+    REAL("ice.shake", ice.shake, RATIO, "15", "[0, 1000]",
+         "random displacement that takes the order out of the field, in mean free gaps, 0 = none, assumed"),
+    TEXT("ice.field", ice.field, "none",
+         "HDF5 field file read instead of making a field; relative to the folder of the case file"),
     TEXT("ice.outlines", ice.outlines, "none",
-         "GeoJSON file of floe outlines (FeatureCollection of Polygons, positions [east, north]; properties thickness in m and id are optional) read instead of making a field; relative to the folder of the case file"),
+         "GeoJSON file of floe outlines (FeatureCollection of Polygons, positions [east, north]; properties thickness "
+         "in m and id are optional) read instead of making a field; relative to the folder of the case file"),
     CHOICE("ice.outlines_crs", ice.outlines_crs, crss, "file",
-           "coordinates of the outlines: what the file's crs says, degrees without one [RFC 7946]; for a file without crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case; metres: its old name)"),
+           "coordinates of the outlines: what the file's crs says, degrees without one [RFC 7946]; for a file without "
+           "crs also lonlat (degrees, WGS84), plane (metres east, north) or frame (metres x, y of this case; metres: "
+           "its old name)"),
     REAL("ice.origin_lon", ice.origin_lon, ANGLE, "none", "[-180, 360]",
-         "longitude of x = y = 0: of outlines in degrees (none: their middle), projected about it (azimuthal equidistant, within 100 km), and of what bergtow field writes as GeoJSON"),
+         "longitude of x = y = 0: of outlines in degrees (none: their middle), projected about it (azimuthal "
+         "equidistant, within 100 km), and of what bergtow field writes as GeoJSON"),
     REAL("ice.origin_lat", ice.origin_lat, ANGLE, "none", "[-90, 90]", "latitude of x = y = 0, as ice.origin_lon"),
     REAL("ice.origin_east", ice.origin_east, LENGTH, "none", "[-1e8, 1e8]",
-         "east of x = y = 0 in the plane of outlines in metres; none: the middle of the outlines where their crs is a projection, otherwise 0"),
-    REAL("ice.origin_north", ice.origin_north, LENGTH, "none", "[-1e8, 1e8]", "north of x = y = 0 in the plane of outlines in metres, as ice.origin_east"),
+         "east of x = y = 0 in the plane of outlines in metres; none: the middle of the outlines where their crs is a "
+         "projection, otherwise 0"),
+    REAL("ice.origin_north", ice.origin_north, LENGTH, "none", "[-1e8, 1e8]",
+         "north of x = y = 0 in the plane of outlines in metres, as ice.origin_east"),
     CHOICE("ice.nonconvex", ice.nonconvex, nonconvexes, "refuse",
-           "outlines of a file that are not convex by more than a thousandth of their extent: refused, replaced by their hull (the area grows), or split into convex parts that move as one floe"),
+           "outlines of a file that are not convex by more than a thousandth of their extent: refused, replaced by "
+           "their hull (the area grows), or split into convex parts that move as one floe"),
 
     CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
-    REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]", "length of a named shape along its own x; no default in the geographic frame; assumed"),
+    REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]",
+         "length of a named shape along its own x; no default in the geographic frame; assumed"),
     REAL("body.width", body.width, LENGTH, "= body.length", "(0, 1e5]", "width of a named shape"),
-    {.name = "body.vertices", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = "[-1e5, 1e5]", AT(body.vertices),
-     .offset_count = offsetof(bt_case, body.n_vertices), .doc = "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
-    REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin), 0 (geographic)", ANYWHERE, "centroid at time zero"),
+    {.name = "body.vertices",
+     .type = BT_KEY_POINTS,
+     .unit = BT_UNIT_LENGTH,
+     .preset = "none",
+     .range = "[-1e5, 1e5]",
+     AT(body.vertices),
+     .offset_count = offsetof(bt_case, body.n_vertices),
+     .doc =
+         "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
+    REAL("body.x", body.x, LENGTH, "= domain.x0 + 2 body.length (basin), 0 (geographic)", ANYWHERE,
+         "centroid at time zero"),
     REAL("body.y", body.y, LENGTH, "0 m", ANYWHERE, "centroid at time zero"),
-    REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the body's own x from the x axis towards y at time zero"),
-    REAL("body.vx", body.vx, SPEED, "none", ANY_SPEED, "velocity at time zero, tow modes none and line; none: 0, or free drift in mode none without body.vy (ice.start)"),
-    REAL("body.vy", body.vy, SPEED, "none", ANY_SPEED, "velocity at time zero, tow modes none and line; none: as body.vx"),
-    REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero, tow modes none and line"),
-    REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]", "depth below the waterline; no default in the geographic frame; assumed"),
-    REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]", "height above the waterline"),
-    REAL("body.density", body.density, DENSITY, "900 kg/m3", "[1, 2e4]", "density of the body, for its mass when none is given [Hunke & Comeau 2011]"),
-    REAL("body.mass", body.mass, MASS, "0 kg", "[0, 1e13]", "mass without added mass; 0 = density x waterline area x (draft + sail)"),
+    REAL("body.yaw", body.yaw, ANGLE, "0 deg", "[-360, 360]",
+         "angle of the body's own x from the x axis towards y at time zero"),
+    REAL("body.vx", body.vx, SPEED, "none", ANY_SPEED,
+         "velocity at time zero, tow modes none and line; none: 0, or free drift in mode none without body.vy "
+         "(ice.start)"),
+    REAL("body.vy", body.vy, SPEED, "none", ANY_SPEED,
+         "velocity at time zero, tow modes none and line; none: as body.vx"),
+    REAL("body.yaw_rate", body.yaw_rate, TURN, "0 deg/s", "[-360, 360]",
+         "rate of turn at time zero, tow modes none and line"),
+    REAL("body.draft", body.draft, LENGTH, "0.5 m", "(0, 1000]",
+         "depth below the waterline; no default in the geographic frame; assumed"),
+    REAL("body.sail", body.sail, LENGTH, "= draft x (water.density / body.density - 1), at least 0", "[0, 1000]",
+         "height above the waterline"),
+    REAL("body.density", body.density, DENSITY, "900 kg/m3", "[1, 2e4]",
+         "density of the body, for its mass when none is given [Hunke & Comeau 2011]"),
+    REAL("body.mass", body.mass, MASS, "0 kg", "[0, 1e13]",
+         "mass without added mass; 0 = density x waterline area x (draft + sail)"),
     REAL("body.added_mass", body.added_mass, RATIO, "0.5", "[0, 10]", "added mass / mass [Hunke & Comeau 2011]"),
-    REAL("body.added_inertia", body.added_inertia, RATIO, "0.5", "[0, 10]", "added moment of inertia / its own, assumed equal to the added mass"),
+    REAL("body.added_inertia", body.added_inertia, RATIO, "0.5", "[0, 10]",
+         "added moment of inertia / its own, assumed equal to the added mass"),
     REAL("body.friction", body.friction, RATIO, "= ice.friction", "[0, 10]", "Coulomb coefficient ice on body"),
     REAL("body.restitution", body.restitution, RATIO, "= ice.restitution", "[0, 1]", "restitution ice on body"),
-    REAL("body.drag.water_form", body.drag.water_form, RATIO, "0.85", "[0, 100]", "form drag over the draft [Hunke & Comeau 2011]"),
-    REAL("body.drag.water_skin", body.drag.water_skin, RATIO, "5e-4", "[0, 10]", "skin drag of water under the body [Hunke & Comeau 2011]"),
-    REAL("body.drag.air_form", body.drag.air_form, RATIO, "0.4", "[0, 100]", "form drag over the sail [Hunke & Comeau 2011]"),
-    REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]", "skin drag of air over the body [Hunke & Comeau 2011]"),
+    REAL("body.drag.water_form", body.drag.water_form, RATIO, "0.85", "[0, 100]",
+         "form drag over the draft [Hunke & Comeau 2011]"),
+    REAL("body.drag.water_skin", body.drag.water_skin, RATIO, "5e-4", "[0, 10]",
+         "skin drag of water under the body [Hunke & Comeau 2011]"),
+    REAL("body.drag.air_form", body.drag.air_form, RATIO, "0.4", "[0, 100]",
+         "form drag over the sail [Hunke & Comeau 2011]"),
+    REAL("body.drag.air_skin", body.drag.air_skin, RATIO, "2.5e-4", "[0, 10]",
+         "skin drag of air over the body [Hunke & Comeau 2011]"),
 
-    CHOICE("tow.mode", tow.mode, tow_modes, "speed", "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on a line; thrust: a vessel does, by its own power"),
-    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]", "speed of the body (mode speed), of the end (mode line), or that the vessel keeps to if it can (mode thrust) [Yulmetov & Løset 2017]; with a programme its largest"),
-    REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]", "heading of the tow at the start, from the x axis towards y; with way-points that from the body to the first"),
-    REAL("tow.ramp", tow.ramp, TIME, "= the longer of 2 periods of the body on its line and the time of its own size at tow.speed", "[0, 1e7]",
+    CHOICE("tow.mode", tow.mode, tow_modes, "speed",
+           "none: free drift; speed: the body's velocity is prescribed; line: an end on a prescribed path pulls it on "
+           "a line; thrust: a vessel does, by its own power"),
+    REAL("tow.speed", tow.speed, SPEED, "0.13 m/s", "[0, 50]",
+         "speed of the body (mode speed), of the end (mode line), or that the vessel keeps to if it can (mode thrust) "
+         "[Yulmetov & Løset 2017]; with a programme its largest"),
+    REAL("tow.direction", tow.direction, ANGLE, "0 deg", "[-360, 360]",
+         "heading of the tow at the start, from the x axis towards y; with way-points that from the body to the first"),
+    REAL("tow.ramp", tow.ramp, TIME,
+         "= the longer of 2 periods of the body on its line and the time of its own size at tow.speed", "[0, 1e7]",
          "time in which the speed rises linearly from 0, assumed; with a programme the time of its largest speed"),
-    {.name = "tow.programme", .type = BT_KEY_POINTS, .unit = BT_UNIT_SPEED, .preset = "none", .range = "[0, 50]", AT(tow.programme), .unit_first = BT_UNIT_TIME,
-     .range_first = "[0, 1e9]", .offset_count = offsetof(bt_case, tow.n_programme), .least = 1, .most = BT_MOST_POINTS,
-     .doc = "speed over time, [[time, speed], ...], linear between and constant outside, instead of speed and ramp: ramp, hold, stop"},
-    {.name = "tow.waypoints", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = ANYWHERE, AT(tow.waypoints),
-     .offset_count = offsetof(bt_case, tow.n_waypoints), .least = 1, .most = BT_MOST_POINTS,
-     .doc = "[[x, y], ...] that the end of the line (mode speed: the body, which keeps its yaw) goes through from where it starts; after the last it goes straight on"},
-    REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]", "radius of the corners at way-points, 0 = sharp"),
-    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]", "length of the unstretched line, modes line and thrust, assumed"),
-    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "= 10 kN, of a named line its own", "[0, 1e12]", "EA: tension per unit of relative stretch, assumed unless the line is named"),
-    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]", "tension per stretching speed, assumed"),
-    REAL("tow.hull_x", tow.hull_x, LENGTH, "= foremost point of the waterline, of two branches the outermost on the +y side of the tow", "[-1e5, 1e5]",
+    {.name = "tow.programme",
+     .type = BT_KEY_POINTS,
+     .unit = BT_UNIT_SPEED,
+     .preset = "none",
+     .range = "[0, 50]",
+     AT(tow.programme),
+     .unit_first = BT_UNIT_TIME,
+     .range_first = "[0, 1e9]",
+     .offset_count = offsetof(bt_case, tow.n_programme),
+     .least = 1,
+     .most = BT_MOST_POINTS,
+     .doc = "speed over time, [[time, speed], ...], linear between and constant outside, instead of speed and ramp: "
+            "ramp, hold, stop"},
+    {.name = "tow.waypoints",
+     .type = BT_KEY_POINTS,
+     .unit = BT_UNIT_LENGTH,
+     .preset = "none",
+     .range = ANYWHERE,
+     AT(tow.waypoints),
+     .offset_count = offsetof(bt_case, tow.n_waypoints),
+     .least = 1,
+     .most = BT_MOST_POINTS,
+     .doc = "[[x, y], ...] that the end of the line (mode speed: the body, which keeps its yaw) goes through from "
+            "where it starts; after the last it goes straight on"},
+    REAL("tow.turn_radius", tow.turn_radius, LENGTH, "0 m", "[0, 1e6]",
+         "radius of the corners at way-points, 0 = sharp"),
+    REAL("tow.line_length", tow.line_length, LENGTH, "5 m", "[0, 1e5]",
+         "length of the unstretched line, modes line and thrust, assumed"),
+    REAL("tow.line_stiffness", tow.line_stiffness, FORCE, "= 10 kN, of a named line its own", "[0, 1e12]",
+         "EA: tension per unit of relative stretch, assumed unless the line is named"),
+    REAL("tow.line_damping", tow.line_damping, DAMPING, "100 N s/m", "[0, 1e12]",
+         "tension per stretching speed, assumed"),
+    REAL("tow.hull_x", tow.hull_x, LENGTH,
+         "= foremost point of the waterline, of two branches the outermost on the +y side of the tow", "[-1e5, 1e5]",
          "where the line is fastened, from the centroid along the body's own x"),
-    REAL("tow.hull_y", tow.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]", "where the line is fastened, from the centroid along the body's own y"),
+    REAL("tow.hull_y", tow.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]",
+         "where the line is fastened, from the centroid along the body's own y"),
     CHOICE("tow.line.type", tow.line.type, rope_types, "numbers",
-           "numbers: as line_stiffness says; a name gives EA and breaking load from the diameter (unless they are given): steel-wire 6x19 and 8-strand polypropylene [Orcina, OrcaFlex manual], dyneema [MoorPy, NREL]"),
+           "numbers: as line_stiffness says; a name gives EA and breaking load from the diameter (unless they are "
+           "given): steel-wire 6x19 and 8-strand polypropylene [Orcina, OrcaFlex manual], dyneema [MoorPy, NREL]"),
     REAL("tow.line.diameter", tow.line.diameter, LENGTH, "0 m", "[0, 1]", "diameter of a named line"),
-    INT("tow.line.branches", tow.line.branches, "1", "[1, 2]", "lines from hull to towing end: one, or two as a bridle"),
-    REAL("tow.line.breaking_load", tow.line.breaking_load, FORCE, "= 0 N, of a named line its own when new", "[0, 1e12]",
-         "mean tension of a step above which the branch is broken for good, 0 = never"),
-    REAL("tow.branch2.hull_x", tow.branch2.hull_x, LENGTH, "= outermost point of the waterline on the -y side of the tow", "[-1e5, 1e5]", "where the second branch is fastened, along the body's own x"),
-    REAL("tow.branch2.hull_y", tow.branch2.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]", "where the second branch is fastened, along the body's own y"),
-    REAL("tow.branch2.length", tow.branch2.length, LENGTH, "= tow.line_length", "(0, 1e5]", "length of the second branch, unstretched"),
-    REAL("tow.branch2.stiffness", tow.branch2.stiffness, FORCE, "= tow.line_stiffness", "(0, 1e12]", "EA of the second branch"),
-    REAL("tow.branch2.damping", tow.branch2.damping, DAMPING, "= tow.line_damping", "[0, 1e12]", "tension per stretching speed of the second branch"),
-    REAL("tow.branch2.breaking_load", tow.branch2.breaking_load, FORCE, "= tow.line.breaking_load", "[0, 1e12]", "breaking load of the second branch, 0 = never"),
-    REAL("tow.vessel.mass", tow.vessel.mass, MASS, "0 kg", "[0, 1e12]", "mass of the vessel without added mass, needed by mode thrust; the vessel touches no ice, assumed"),
-    REAL("tow.vessel.added_mass", tow.vessel.added_mass, RATIO, "0.05", "[0, 10]", "added mass / mass of the vessel, assumed"),
-    REAL("tow.vessel.bollard_pull", tow.vessel.bollard_pull, FORCE, "0 N", "[0, 1e9]", "thrust at rest at full power, needed by mode thrust"),
+    INT("tow.line.branches", tow.line.branches, "1", "[1, 2]",
+        "lines from hull to towing end: one, or two as a bridle"),
+    REAL("tow.line.breaking_load", tow.line.breaking_load, FORCE, "= 0 N, of a named line its own when new",
+         "[0, 1e12]", "mean tension of a step above which the branch is broken for good, 0 = never"),
+    REAL("tow.branch2.hull_x", tow.branch2.hull_x, LENGTH,
+         "= outermost point of the waterline on the -y side of the tow", "[-1e5, 1e5]",
+         "where the second branch is fastened, along the body's own x"),
+    REAL("tow.branch2.hull_y", tow.branch2.hull_y, LENGTH, "= as hull_x", "[-1e5, 1e5]",
+         "where the second branch is fastened, along the body's own y"),
+    REAL("tow.branch2.length", tow.branch2.length, LENGTH, "= tow.line_length", "(0, 1e5]",
+         "length of the second branch, unstretched"),
+    REAL("tow.branch2.stiffness", tow.branch2.stiffness, FORCE, "= tow.line_stiffness", "(0, 1e12]",
+         "EA of the second branch"),
+    REAL("tow.branch2.damping", tow.branch2.damping, DAMPING, "= tow.line_damping", "[0, 1e12]",
+         "tension per stretching speed of the second branch"),
+    REAL("tow.branch2.breaking_load", tow.branch2.breaking_load, FORCE, "= tow.line.breaking_load", "[0, 1e12]",
+         "breaking load of the second branch, 0 = never"),
+    REAL("tow.vessel.mass", tow.vessel.mass, MASS, "0 kg", "[0, 1e12]",
+         "mass of the vessel without added mass, needed by mode thrust; the vessel touches no ice, assumed"),
+    REAL("tow.vessel.added_mass", tow.vessel.added_mass, RATIO, "0.05", "[0, 10]",
+         "added mass / mass of the vessel, assumed"),
+    REAL("tow.vessel.bollard_pull", tow.vessel.bollard_pull, FORCE, "0 N", "[0, 1e9]",
+         "thrust at rest at full power, needed by mode thrust"),
     REAL("tow.vessel.free_speed", tow.vessel.free_speed, SPEED, "0 m/s", "[0, 50]",
-         "free-running speed at full power, needed by mode thrust; the net pull is bollard_pull x (1 - (speed / free_speed)^2), assumed"),
+         "free-running speed at full power, needed by mode thrust; the net pull is bollard_pull x (1 - (speed / "
+         "free_speed)^2), assumed"),
     REAL("tow.vessel.free_resistance", tow.vessel.free_resistance, FORCE, "= 0.4 tow.vessel.bollard_pull", "[0, 1e9]",
          "resistance of the vessel at its free-running speed, quadratic below it, assumed"),
-    REAL("tow.vessel.lateral_drag", tow.vessel.lateral_drag, RATIO, "20", "[0, 1000]", "drag of the vessel across its course / along it at the same speed, assumed"),
+    REAL("tow.vessel.lateral_drag", tow.vessel.lateral_drag, RATIO, "20", "[0, 1000]",
+         "drag of the vessel across its course / along it at the same speed, assumed"),
     REAL("tow.vessel.lookahead", tow.vessel.lookahead, LENGTH, "= tow.line_length", "(0, 1e6]",
-         "how far ahead on its path lies the point that the vessel steers for, assumed [line-of-sight guidance: Fossen 2011]"),
+         "how far ahead on its path lies the point that the vessel steers for, assumed [line-of-sight guidance: Fossen "
+         "2011]"),
 
     CHOICE("lead.mode", lead.mode, lead_modes, "none",
-           "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that reach into it; or those floes cut into pieces"),
+           "ice ahead of the body along its planned path, at time zero: as it is; a channel without the floes that "
+           "reach into it; or those floes cut into pieces"),
     REAL("lead.width", lead.width, LENGTH, "= width of the body across the tow", "[0, 1e5]", "width of the lead"),
-    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length", "[0, 1e7]", "length of the lead from the body's place at time zero"),
-    REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]", "diameter of the circle of the area of the largest piece, needed by mode managed"),
+    REAL("lead.length", lead.length, LENGTH, "= length of the tow + body.length", "[0, 1e7]",
+         "length of the lead from the body's place at time zero"),
+    REAL("lead.floe_size", lead.floe_size, LENGTH, "0 m", "[0, 1e5]",
+         "diameter of the circle of the area of the largest piece, needed by mode managed"),
 
-    REAL("water.density", water.density, DENSITY, "1027 kg/m3", "[500, 2000]", "density of the water [Hunke & Comeau 2011]"),
+    REAL("water.density", water.density, DENSITY, "1027 kg/m3", "[500, 2000]",
+         "density of the water [Hunke & Comeau 2011]"),
     REAL("water.current_x", water.current_x, SPEED, "0 m/s", ANY_SPEED, "current along x"),
     REAL("water.current_y", water.current_y, SPEED, "0 m/s", ANY_SPEED, "current along y"),
-    REAL("water.tide.major", water.tide.major, SPEED, "0 m/s", "[0, 100]", "tidal ellipse, added to the current: largest speed"),
+    REAL("water.tide.major", water.tide.major, SPEED, "0 m/s", "[0, 100]",
+         "tidal ellipse, added to the current: largest speed"),
     REAL("water.tide.minor", water.tide.minor, SPEED, "0 m/s", ANY_SPEED,
-         "tidal ellipse: speed across the major axis a quarter period later, positive when the current turns from x towards y"),
-    REAL("water.tide.inclination", water.tide.inclination, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: angle of the major axis from the x axis towards y"),
-    REAL("water.tide.period", water.tide.period, TIME, "44714.164 s", "(0, 1e9]", "tidal ellipse: period; the default is that of the constituent M2, 28.9841042 deg an hour"),
-    REAL("water.tide.phase", water.tide.phase, ANGLE, "0 deg", "[-360, 360]", "tidal ellipse: lag; the current is largest along the major axis at phase / 360 deg x period"),
+         "tidal ellipse: speed across the major axis a quarter period later, positive when the current turns from x "
+         "towards y"),
+    REAL("water.tide.inclination", water.tide.inclination, ANGLE, "0 deg", "[-360, 360]",
+         "tidal ellipse: angle of the major axis from the x axis towards y"),
+    REAL("water.tide.period", water.tide.period, TIME, "44714.164 s", "(0, 1e9]",
+         "tidal ellipse: period; the default is that of the constituent M2, 28.9841042 deg an hour"),
+    REAL("water.tide.phase", water.tide.phase, ANGLE, "0 deg", "[-360, 360]",
+         "tidal ellipse: lag; the current is largest along the major axis at phase / 360 deg x period"),
     TEXT("water.current_table", water.current_table, "none",
-         "CSV file with the header t,u,v: current along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
-    REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]", "latitude of the Coriolis force, 0 = no Coriolis force"),
-    CHOICE("water.tilt", water.tilt, tilts, "none", "tilt of the sea surface: none; given by its slope; in geostrophic balance with the current of the moment; or dynamic: it also accelerates the water where that changes"),
+         "CSV file with the header t,u,v: current along x and y in time, linear between rows, in place of the keys "
+         "above; relative to the folder of the case file"),
+    REAL("water.latitude", water.latitude, ANGLE, "0 deg", "[-90, 90]",
+         "latitude of the Coriolis force, 0 = no Coriolis force"),
+    CHOICE("water.tilt", water.tilt, tilts, "none",
+           "tilt of the sea surface: none; given by its slope; in geostrophic balance with the current of the moment; "
+           "or dynamic: it also accelerates the water where that changes"),
     REAL("water.slope_x", water.slope_x, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along x, for tilt slope"),
     REAL("water.slope_y", water.slope_y, RATIO, "0", "[-0.1, 0.1]", "rise of the sea surface along y, for tilt slope"),
 
@@ -220,77 +348,171 @@ const bt_key bt_case_keys[] = {
     REAL("air.wind_x", air.wind_x, SPEED, "0 m/s", ANY_SPEED, "wind along x"),
     REAL("air.wind_y", air.wind_y, SPEED, "0 m/s", ANY_SPEED, "wind along y"),
     TEXT("air.wind_table", air.wind_table, "none",
-         "CSV file with the header t,u,v: wind along x and y in time, linear between rows, in place of the keys above; relative to the folder of the case file"),
+         "CSV file with the header t,u,v: wind along x and y in time, linear between rows, in place of the keys above; "
+         "relative to the folder of the case file"),
 
-    REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]", "residual of the contact law / reference speed at which a step has converged, assumed"),
-    REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]", "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
-    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]", "limit of the work of a step, which is then left and counted as not converged: six updates of every contact for each of so many sweeps, looks at contacts counted as updates; assumed"),
-    INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]", "times a tile that still changes is swept before the next has its turn"),
-    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]", "without effect: sweeps no longer follow each other through large fields; accepted in cases written for earlier versions, and to be taken out"),
-    REAL("solver.tile", solver.tile, RATIO, "5", "[2, 100]", "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
-    BOOL("solver.plain", solver.plain, "false", "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of sweeps"),
+    REAL("solver.tolerance", solver.tolerance, RATIO, "1e-3", "(0, 1]",
+         "residual of the contact law / reference speed at which a step has converged, assumed"),
+    REAL("solver.reference_speed", solver.reference_speed, SPEED, "0 m/s", "[0, 100]",
+         "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
+    INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]",
+        "limit of the work of a step, which is then left and counted as not converged: six updates of every contact "
+        "for each of so many sweeps, looks at contacts counted as updates; assumed"),
+    INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
+        "times a tile that still changes is swept before the next has its turn"),
+    INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",
+        "without effect: sweeps no longer follow each other through large fields; accepted in cases written for "
+        "earlier versions, and to be taken out"),
+    REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]",
+         "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
+    BOOL("solver.plain", solver.plain, "false",
+         "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of "
+         "sweeps"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
-    REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]", "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the projection]"),
-    INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]", "limit of the work of the position projection: so many updates of every contact, looks counted as updates; assumed"),
-    REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]", "approach below this speed has no restitution, assumed"),
+    REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]",
+         "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the "
+         "projection]"),
+    INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]",
+        "limit of the work of the position projection: so many updates of every contact, looks counted as updates; "
+        "assumed"),
+    REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]",
+         "approach below this speed has no restitution, assumed"),
 
-    REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]", "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),
-    REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]", "kinetic energy of all bodies / that at the start and at the speeds that tow, walls, current, wind and slope can drive them to, that ends the run; 0 = any is let through; assumed"),
-    INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]", "steps in a row without convergence that end the run, 0 = any number is let through; assumed"),
+    REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]",
+         "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),
+    REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]",
+         "kinetic energy of all bodies / that at the start and at the speeds that tow, walls, current, wind and slope "
+         "can drive them to, that ends the run; 0 = any is let through; assumed"),
+    INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]",
+        "steps in a row without convergence that end the run, 0 = any number is let through; assumed"),
     BOOL("guard.escape", guard.escape, "true", "a floe or the towed body beyond a wall of the domain ends the run"),
 
     CHOICE("impact.conversion", impact.conversion, conversions, "duration",
-           "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a corner at a pressure; none: collisions are not told apart"),
+           "force of a collision with the body from its impulse: half-sine of a given duration, or crushing of a "
+           "corner at a pressure; none: collisions are not told apart"),
     REAL("impact.duration", impact.duration, TIME, "= run.dt", "(0, 1000]",
-         "duration of a collision for conversion duration; assumed, the time step being chosen about as long as a collision [Yulmetov & Løset 2017]"),
-    REAL("impact.pressure", impact.pressure, PRESSURE, "1 MPa", "(0, 1e9]", "pressure of crushed ice for conversion crushing, assumed; at model scale divided by the length ratio"),
-    CHOICE("impact.corner", impact.corner, corners, "given", "crushed corner for conversion crushing: the given angle, or the real one of the corner in contact"),
-    REAL("impact.corner_angle", impact.corner_angle, ANGLE, "90 deg", "(0, 179]", "angle of the crushed corner, assumed"),
-    REAL("impact.least_speed", impact.least_speed, SPEED, "= 0.05 x reference speed of the solver", "[0, 100]", "approach of a floe to the body below which its contact counts as a push, assumed"),
-    INT("impact.panels", impact.panels, "36", "[1, 1000]", "pieces of equal length that the hull's perimeter is cut into for loads, the first centred on the body's own x axis"),
+         "duration of a collision for conversion duration; assumed, the time step being chosen about as long as a "
+         "collision [Yulmetov & Løset 2017]"),
+    REAL("impact.pressure", impact.pressure, PRESSURE, "1 MPa", "(0, 1e9]",
+         "pressure of crushed ice for conversion crushing, assumed; at model scale divided by the length ratio"),
+    CHOICE("impact.corner", impact.corner, corners, "given",
+           "crushed corner for conversion crushing: the given angle, or the real one of the corner in contact"),
+    REAL("impact.corner_angle", impact.corner_angle, ANGLE, "90 deg", "(0, 179]",
+         "angle of the crushed corner, assumed"),
+    REAL("impact.least_speed", impact.least_speed, SPEED, "= 0.05 x reference speed of the solver", "[0, 100]",
+         "approach of a floe to the body below which its contact counts as a push, assumed"),
+    INT("impact.panels", impact.panels, "36", "[1, 1000]",
+        "pieces of equal length that the hull's perimeter is cut into for loads, the first centred on the body's own x "
+        "axis"),
 
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
-    REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]", "time between frames; 0 = a 200th of the duration"),
-    REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]", "start of the window of all means, peaks, collisions and panel loads; negative = found from the series"),
+    REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]",
+         "time between frames; 0 = a 200th of the duration"),
+    REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]",
+         "start of the window of all means, peaks, collisions and panel loads; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),
-    INT("output.checkpoint_steps", output.checkpoint_steps, "0", "[0, 1e12]", "steps between checkpoints, 0 = none by steps"),
-    REAL("output.checkpoint_wall", output.checkpoint_wall, TIME, "600 s", "[0, 1e9]", "wall time between checkpoints, 0 = none by time; one is always written at the end and at a stop"),
-    BOOL("output.panels", output.panels, "false", "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
+    INT("output.checkpoint_steps", output.checkpoint_steps, "0", "[0, 1e12]",
+        "steps between checkpoints, 0 = none by steps"),
+    REAL("output.checkpoint_wall", output.checkpoint_wall, TIME, "600 s", "[0, 1e9]",
+         "wall time between checkpoints, 0 = none by time; one is always written at the end and at a stop"),
+    BOOL("output.panels", output.panels, "false",
+         "series of the load on every panel of the hull (impact.panels), beside its mean and maximum"),
 
-    REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]", "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
-    REAL("estimate.p_s", estimate.p_s, LINE_LOAD, "13 kN/m", "[0, 1e9]", "strength P at which dense ice captures a berg, at full scale [Lichey & Hellmer 2001; FESOM2 takes 10 kN/m]"),
-    REAL("estimate.c_si", estimate.c_si, RATIO, "1", "[0, 100]", "drag coefficient of sea ice on the body's side [Lichey & Hellmer 2001]"),
-    REAL("estimate.kappa", estimate.kappa, RATIO, "11", "[1, 100]", "work of rafting / potential energy gained, the middle of the range, assumed"),
-    REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]", "low end of the range of estimate.kappa, assumed"),
-    REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]", "high end of the range of estimate.kappa, that of pressure ridges [Flato & Hibler 1995]; for rafting assumed"),
-    REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]", "concentration to which the body sweeps ice together, in the momentum closure and towards a wall ahead, assumed"),
+    REAL("estimate.p_star", estimate.p_star, PRESSURE, "20 kPa", "[0, 1e9]",
+         "P* of the ice strength P = P* h exp(-20 (1 - A)), at full scale [Lichey & Hellmer 2001, after Hibler 1979]"),
+    REAL("estimate.p_s", estimate.p_s, LINE_LOAD, "13 kN/m", "[0, 1e9]",
+         "strength P at which dense ice captures a berg, at full scale [Lichey & Hellmer 2001; FESOM2 takes 10 kN/m]"),
+    REAL("estimate.c_si", estimate.c_si, RATIO, "1", "[0, 100]",
+         "drag coefficient of sea ice on the body's side [Lichey & Hellmer 2001]"),
+    REAL("estimate.kappa", estimate.kappa, RATIO, "11", "[1, 100]",
+         "work of rafting / potential energy gained, the middle of the range, assumed"),
+    REAL("estimate.kappa_low", estimate.kappa_low, RATIO, "5", "[1, 100]",
+         "low end of the range of estimate.kappa, assumed"),
+    REAL("estimate.kappa_high", estimate.kappa_high, RATIO, "17", "[1, 100]",
+         "high end of the range of estimate.kappa, that of pressure ridges [Flato & Hibler 1995]; for rafting assumed"),
+    REAL("estimate.phi_j", estimate.phi_j, RATIO, "0.9", "(0, 1]",
+         "concentration to which the body sweeps ice together, in the momentum closure and towards a wall ahead, "
+         "assumed"),
     REAL("estimate.length_scale", estimate.length_scale, RATIO, "1", "(0, 1e4]",
          "full scale / this case: p_star is divided by it and p_s by its square, 1 at full scale [Froude]"),
 
-    REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]", "measured mean ice resistance, shown beside the computed one"),
+    REAL("reference.mean_force", reference.mean_force, FORCE, "none", "[-1e12, 1e12]",
+         "measured mean ice resistance, shown beside the computed one"),
     TEXT("reference.source", reference.source, "none", "where the measured force was published"),
+
+    EIGHT_SPARE,
+    EIGHT_SPARE,
+    EIGHT_SPARE,
+    EIGHT_SPARE, // BT_EXTRA_KEYS rows for bt_schema_add
 };
-const int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys;
+int bt_n_case_keys = sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS;
 
 #undef AT
 #define AT(member) .offset = offsetof(bt_floe_def, member)
 
 const bt_key bt_floe_keys[] = {
     CHOICE("shape", shape, floe_shapes, "disc", "outline of the floe"),
-    REAL("length", length, LENGTH, "none", "(0, 1e5]", "length of a named shape along its own x, needed unless the shape is polygon"),
+    REAL("length", length, LENGTH, "none", "(0, 1e5]",
+         "length of a named shape along its own x, needed unless the shape is polygon"),
     REAL("width", width, LENGTH, "= length", "(0, 1e5]", "width of a named shape"),
-    {.name = "vertices", .type = BT_KEY_POINTS, .unit = BT_UNIT_LENGTH, .preset = "none", .range = "[-1e5, 1e5]", AT(vertices),
-     .offset_count = offsetof(bt_floe_def, n_vertices), .doc = "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
+    {.name = "vertices",
+     .type = BT_KEY_POINTS,
+     .unit = BT_UNIT_LENGTH,
+     .preset = "none",
+     .range = "[-1e5, 1e5]",
+     AT(vertices),
+     .offset_count = offsetof(bt_floe_def, n_vertices),
+     .doc =
+         "corners of shape polygon, convex and anticlockwise: [[x, y], ...]; moved so that the centroid is the origin"},
     REAL("x", x, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("y", y, LENGTH, NULL, ANYWHERE, "centroid at time zero"),
     REAL("yaw", yaw, ANGLE, "0 deg", "[-360, 360]", "angle of the floe's own x from the x axis towards y"),
-    REAL("vx", vx, SPEED, "none", ANY_SPEED, "velocity at time zero; none: 0 where vy is given, otherwise as ice.start has it"),
+    REAL("vx", vx, SPEED, "none", ANY_SPEED,
+         "velocity at time zero; none: 0 where vy is given, otherwise as ice.start has it"),
     REAL("vy", vy, SPEED, "none", ANY_SPEED, "velocity at time zero; none: as vx"),
     REAL("yaw_rate", yaw_rate, TURN, "0 deg/s", "[-360, 360]", "rate of turn at time zero"),
     REAL("thickness", thickness, LENGTH, "= ice.thickness", "(0, 100]", "thickness"),
     BOOL("fixed", fixed, "false", "at rest for ever, as a structure or grounded ice"),
 };
 const int bt_n_floe_keys = sizeof bt_floe_keys / sizeof *bt_floe_keys;
+
+/// Does the section of this name stand in the table, and not at its end?
+static bool section_is_closed(const char *name)
+{
+    const size_t n = strcspn(name, ".") + 1;
+    const bool open = !strncmp(bt_case_keys[bt_n_case_keys - 1].name, name, n);
+    char section[64] = {0};
+    memcpy(section, name, bt_min(n - 1, sizeof section - 1));
+    return !open && bt_schema_is_section(section);
+}
+
+int bt_schema_add(const bt_key *k, bt_errors *err)
+{
+    const int place = bt_n_case_keys - (int)(sizeof bt_case_keys / sizeof *bt_case_keys - BT_EXTRA_KEYS);
+    const size_t before = err->n, length = strlen(k->name);
+    bt_key row = *k;
+    bt_range r;
+    char why[BT_WHY];
+    row.type = BT_KEY_REAL;
+    row.offset = offsetof(bt_case, extra) + (size_t)place * sizeof(double);
+    if (place >= BT_EXTRA_KEYS)
+        bt_errors_add(err, "%s: there is no room for more than %d added keys; raise BT_EXTRA_KEYS", k->name,
+                      BT_EXTRA_KEYS);
+    else if (length > 60 || !strchr(k->name, '.'))
+        bt_errors_add(err, "%s: a key is SECTION.NAME, of at most 60 characters", k->name);
+    else if (bt_schema_find(bt_case_keys, bt_n_case_keys, k->name) >= 0)
+        bt_errors_add(err, "%s: this key is there; choose another name", k->name);
+    else if (section_is_closed(k->name))
+        bt_errors_add(err, "%s: its section has keys of the program; choose a section of its own", k->name);
+    else if (!k->range || !bt_value_range(&row, &r))
+        bt_errors_add(err, "%s: the range must be \"[least, most]\" or with ( and )", k->name);
+    else if (!k->preset || k->preset[0] == '=' || !bt_value_read(&row, &(bt_case){0}, k->preset, true, why))
+        bt_errors_add(err, "%s: the default must be a number within the range, or none", k->name);
+    else if (!k->doc || strlen(k->doc) < 8) bt_errors_add(err, "%s: say in a sentence what it is", k->name);
+    if (err->n > before) return -1;
+    bt_case_keys[bt_n_case_keys++] = row;
+    return place;
+}
 
 int bt_schema_find(const bt_key *keys, int n, const char *name)
 {

@@ -30,10 +30,15 @@ typedef struct bt_key {
     const char *doc;     ///< one sentence with its source
 } bt_key;
 
-extern const bt_key bt_case_keys[];  ///< the keys of bt_case
-extern const int bt_n_case_keys;
+extern bt_key bt_case_keys[];        ///< the keys of bt_case; written by bt_schema_add alone
+extern int bt_n_case_keys;
 extern const bt_key bt_floe_keys[];  ///< the keys of one entry of the list `floes:`
 extern const int bt_n_floe_keys;
+
+/// Add a key with a real value to bt_case_keys, before any case is read: the member bt_case.extra[its result] holds the
+/// value. The texts stay the caller's and must outlive every case. offset and type are set here. −1 with the reason in
+/// err: no room, or the name, its section, preset, range or sentence will not do.
+int bt_schema_add(const bt_key *k, bt_errors *err);
 
 /// Index of a key by its dotted name, or −1.
 int bt_schema_find(const bt_key *keys, int n, const char *name);
@@ -41,7 +46,8 @@ int bt_schema_find(const bt_key *keys, int n, const char *name);
 /// True when name is a section: a dotted prefix of some key of bt_case_keys ("ice", "ice.drag").
 bool bt_schema_is_section(const char *name);
 
-/// The key, section or last part of a key closest to a mistyped dotted name, or NULL. The text is static or lies in buffer.
+/// The key, section or last part of a key closest to a mistyped dotted name, or NULL. The text is static or lies in
+/// buffer.
 const char *bt_schema_suggest(const bt_key *keys, int n, const char *name, char buffer[64]);
 
 /// A key of points as that of one column, 0 or 1, with its unit and range.

@@ -27,7 +27,8 @@ bool bt_value_range(const bt_key *k, bt_range *r)
     r->lo_open = text[0] == '(';
     r->hi_open = text[n - 1] == ')';
     *comma = text[n - 1] = 0;
-    return bt_units_parse(text + 1, k->unit, &r->lo, why) && bt_units_parse(comma + 1, k->unit, &r->hi, why) && r->lo < r->hi;
+    return bt_units_parse(text + 1, k->unit, &r->lo, why) && bt_units_parse(comma + 1, k->unit, &r->hi, why) &&
+           r->lo < r->hi;
 }
 
 static bool in_range(const bt_key *k, double value, const char *text, char *why)
@@ -37,7 +38,8 @@ static bool in_range(const bt_key *k, double value, const char *text, char *why)
     if ((r.lo_open ? value > r.lo : value >= r.lo) && (r.hi_open ? value < r.hi : value <= r.hi)) return true;
     const char *bare = bt_units_bare(k->unit);
     bool plain = !strcmp(bare, "-");
-    snprintf(why, BT_WHY, "%.40s is out of range; give a value in %s%s%s", text, k->range, plain ? "" : " ", plain ? "" : bare);
+    snprintf(why, BT_WHY, "%.40s is out of range; give a value in %s%s%s", text, k->range, plain ? "" : " ",
+             plain ? "" : bare);
     return false;
 }
 
@@ -45,7 +47,11 @@ bool bt_value_is_utf8(const char *text, size_t n)
 {
     const unsigned char *s = (const unsigned char *)text;
     for (size_t i = 0; i < n;) {
-        int more = s[i] < 0x80 ? 0 : s[i] >= 0xC2 && s[i] < 0xE0 ? 1 : (s[i] & 0xF0) == 0xE0 ? 2 : s[i] >= 0xF0 && s[i] < 0xF5 ? 3 : -1;
+        int more = s[i] < 0x80                   ? 0
+                   : s[i] >= 0xC2 && s[i] < 0xE0 ? 1
+                   : (s[i] & 0xF0) == 0xE0       ? 2
+                   : s[i] >= 0xF0 && s[i] < 0xF5 ? 3
+                                                 : -1;
         if (more < 0 || i + (size_t)more >= n || !s[i]) return false;
         for (int j = 1; j <= more; j++)
             if ((s[i + (size_t)j] & 0xC0) != 0x80) return false;
@@ -104,7 +110,8 @@ static bool read_choice(const bt_key *k, void *base, const char *text, char *why
     for (int i = 0; k->choices[i]; i++)
         if (!strcmp(text, k->choices[i])) {
             // gcc gives an enum without negative members the type unsigned int
-            _Static_assert(sizeof(bt_bound) == sizeof(unsigned) && sizeof(bt_body_shape) == sizeof(unsigned), "enums are unsigned int");
+            _Static_assert(sizeof(bt_bound) == sizeof(unsigned) && sizeof(bt_body_shape) == sizeof(unsigned),
+                           "enums are unsigned int");
             memcpy(member_of(k, base), &(unsigned){(unsigned)i}, sizeof(unsigned));
             return true;
         }
@@ -121,7 +128,10 @@ static bool read_text(const bt_key *k, void *base, const char *text, char *why)
 {
     size_t n = strlen(text);
     if (n > BT_MAX_TEXT || !bt_value_is_utf8(text, n)) {
-        snprintf(why, BT_WHY, n > BT_MAX_TEXT ? "the text has %zu bytes; give at most %d" : "the text is not UTF-8; save it as UTF-8", n, BT_MAX_TEXT);
+        snprintf(why, BT_WHY,
+                 n > BT_MAX_TEXT ? "the text has %zu bytes; give at most %d"
+                                 : "the text is not UTF-8; save it as UTF-8",
+                 n, BT_MAX_TEXT);
         return false;
     }
     char *old, *copy = bt_alloc(n + 1, 1);
@@ -181,7 +191,8 @@ static void write_text(const char *text, FILE *out)
         for (int i = 1; i < n; i++) code = code << 6 | (s[i] & 0x3Fu);
         if (code == '"' || code == '\\') fprintf(out, "\\%c", (int)code);
         else if (code < 0x20 || (code >= 0x7F && code <= 0xA0)) fprintf(out, "\\x%02X", code);
-        else if (code == 0x2028 || code == 0x2029 || code == 0xFEFF || code == 0xFFFE || code == 0xFFFF) fprintf(out, "\\u%04X", code);
+        else if (code == 0x2028 || code == 0x2029 || code == 0xFEFF || code == 0xFFFE || code == 0xFFFF)
+            fprintf(out, "\\u%04X", code);
         else fwrite(s, 1, (size_t)n, out);
         s += n;
     }

@@ -16,8 +16,8 @@ typedef struct bt_range {
 /// The range of a key from its text. False when the text is malformed.
 bool bt_value_range(const bt_key *k, bt_range *r);
 
-/// Read a scalar into the member of the key under base. plain: not quoted, so that none means "no value". On refusal the
-/// member keeps its value and why says reason and remedy. Not for points.
+/// Read a scalar into the member of the key under base. plain: not quoted, so that none means "no value". On refusal
+/// the member keeps its value and why says reason and remedy. Not for points.
 bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, char why[BT_WHY]);
 
 /// Read the coordinate of a point, with the key's unit and range.

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Which bodies touch or may touch within the step: pair lists, narrow phase, contact manifolds.
 //
-// Data flow of one step (detect.c), tile by tile (tiles.h):
-//   speeds ─> margins ─> pair list of the tile (kept over many steps) ─> narrow phase ─> units in the order they are swept
+// Data flow of one step (detect.c), cell by cell (cells.h):
+//   speeds ─> margins ─> pair list of the cell (kept over many steps) ─> narrow phase ─> contacts in the order they are
+//   swept
 //
-// What the result depends on is only this: a unit exists for every pair of an active tile whose gap along the best separating
-// axis is at most the tile's margin. The pair list with its skin, the cached axis and the skipping of far pairs are
-// conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by brute force).
+// What the result depends on is only this: a contact exists for every pair of an active cell whose gap along the best
+// separating axis is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
+// pairs are conservative shortcuts that cannot change it (tests/contact/test_contacts.c holds them against all pairs by
+// brute force).
 //
-// Margin. Twice the way that the fastest floe of the tile's neighbourhood makes in the step, through the water's frame.
+// Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame.
 #ifndef BERGTOW_CONTACTS_H
 #define BERGTOW_CONTACTS_H
 
@@ -30,36 +32,38 @@ typedef struct bt_manifold {
     bt_point p[2];
 } bt_manifold;
 
-/// Largest of the speeds at velocities v and v2 in each tile and around it into tiles->bound, at least what it was with `keep`;
-/// returns the largest of all, m/s. Collective.
+/// Largest of the speeds at velocities v and v2 in each cell and around it into cells->bound, at least what it was with
+/// `keep`; returns the largest of all, m/s. Collective.
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
 
-/// Speed s of tile (x, y) into the bounds of the tiles it matters to.
-void bt_contacts_spread(struct bt_tiles *t, int32_t x, int32_t y, double s);
+/// Speed s of cell (x, y) into the bounds of the cells it matters to.
+void bt_contacts_spread(struct bt_cells *t, int32_t x, int32_t y, double s);
 
 /// Has the bound grown beyond what the last detection was made for? Collective.
 bool bt_contacts_outrun(const bt_world *w);
 
-/// Find this step's units at the present poses in the tiles that are active under tiles->bound. Impulses are those of the
-/// same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
+/// Find this step's contacts at the present poses in the cells that are active under cells->bound. Impulses are those
+/// of the same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
 void bt_contacts_detect(bt_world *w, bool again);
 
-/// Deepest overlap of the state after a step, m: what the next step would find before it solves anything, in the tiles that have moved, crushed
-/// ice left out. Poses and velocities stay; contacts, labels, storage and marks of crushing that have come apart do not, so the state must have been
-/// saved. Collective.
+/// Deepest overlap of the state after a step, m: what the next step would find before it solves anything, in the cells
+/// that have moved, crushed ice left out. Poses and velocities stay; contacts, labels, storage and marks of crushing
+/// that have come apart do not, so the state must have been saved. Collective.
 double bt_contacts_overlap(bt_world *w);
 
 /// Everything within margin, whether at rest or not (tests, deepest overlap).
 void bt_contacts_detect_all(bt_world *w, double margin);
 
-/// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of b, −1:
-/// none) settles ties between nearly equal reference edges. gap_out: the largest separation over the edge normals of both (a lower
-/// bound of the distance), axis_out its edge (numbered as in bt_pair).
-bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
+/// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of
+/// b, −1: none) settles ties between nearly equal reference edges. gap_out: the largest separation over the edge
+/// normals of both (a lower bound of the distance), axis_out its edge (numbered as in bt_pair).
+bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
+                      double *gap_out, int32_t *axis_out);
 
-/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair; otherwise see src/contact/manifold.c.
-bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin, int reference_before, bt_manifold *m, double *gap_out,
-                       int32_t *axis_out);
+/// The same for one convex part of each body (bt_pair.part). Between bodies that are convex it is bt_contacts_pair;
+/// otherwise see src/contact/manifold.c.
+bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
+                       int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
 
 /// All manifolds by testing all pairs, for tests; in the order of gids.
 void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man);

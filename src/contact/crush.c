@@ -9,8 +9,8 @@
 #include "contact/row.h"
 #include "contact/work.h"
 
-// of the mean floe size: the contact length is linear over the approach of the step, or over this
-#define LEAST_WAY 0.01
+#define LEAST_WAY                                                                                                      \
+    0.01 // of the mean floe size: the contact length is linear over the approach of the step, or over this
 
 bool bt_crush_on(const bt_params *p) { return p->crush_pressure > 0; }
 
@@ -25,7 +25,7 @@ bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-bool bt_crush_keeps(const bt_world *w, bt_trace *r)
+bool bt_crush_keeps(const bt_world *w, bt_memory *r)
 {
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
     bt_manifold m;
@@ -34,9 +34,9 @@ bool bt_crush_keeps(const bt_world *w, bt_trace *r)
     return a >= 0 && b >= 0 && bt_contacts_parts(w, a, b, r->part, BT_CRUSH_MEMORY * w->par.size, -1, &m, &gap, &axis);
 }
 
-static double depth_of(const bt_trace *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
+static double depth_of(const bt_memory *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
 
-double bt_crush_count(const bt_world *w, const bt_trace *r, bt_totals *totals)
+double bt_crush_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
 {
     (void)w, (void)totals;
     return depth_of(r);
@@ -44,26 +44,26 @@ double bt_crush_count(const bt_world *w, const bt_trace *r, bt_totals *totals)
 
 static int by_bodies(const void *p, const void *q)
 {
-    const bt_trace *a = p, *b = q;
+    const bt_memory *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
 /// Depth of each point from what the two bodies have crushed before, in these parts or in others: contact that moves on
 /// from part to part is sliding.
-static void inherit(const bt_tile *t, const bt_trace *names, const bt_manifold *m, bt_limit *l)
+static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold *m, bt_limit *l)
 {
     if (t->n_memory == 0) return;
-    const bt_trace *any = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, by_bodies);
+    const bt_memory *any = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, by_bodies);
     if (!any) return;
-    const bt_trace *end = any + 1, *own = NULL;
+    const bt_memory *end = any + 1, *own = NULL;
     while (any > t->memory && by_bodies(any - 1, names) == 0) any--;
     while (end < t->memory + t->n_memory && by_bodies(end, names) == 0) end++;
     double deepest = 0;
-    for (const bt_trace *s = any; s < end; s++) {
+    for (const bt_memory *s = any; s < end; s++) {
         if (s->law != BT_LAW_CRUSHING) continue;
         deepest = bt_max(deepest, depth_of(s));
-        if (bt_trace_by_names(s, names) == 0) own = s;
+        if (bt_memory_by_names(s, names) == 0) own = s;
     }
     if (own) l->trace[BT_LAW_CRUSHING] = (int32_t)(own - t->memory);
     for (int i = 0; i < m->n_points; i++) {
@@ -104,14 +104,14 @@ static double share_of(const bt_manifold *m, int i, patch c)
     return i ? second : 1 - second;
 }
 
-void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     const bt_bodies *s = &w->bodies;
-    const bt_unit *u = &t->units[j];
+    const bt_contact *u = &t->contacts[j];
     bt_gaps *g = &t->gaps[j];
     bt_limit *l = &t->limits[j];
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
-    const bt_trace names = bt_law_names(w, p, BT_LAW_CRUSHING);
+    const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
     const bool rafts = l->trace[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
@@ -140,25 +140,25 @@ void bt_crush_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, c
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-bool bt_crush_gives_way(const bt_unit *u, const bt_limit *l, int i) { return u->ln[i] >= l->flat[i]; }
+bool bt_crush_gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->flat[i]; }
 
-void bt_crush_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals)
+void bt_crush_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {
     t->limits[j].depth[i] += t->limits[j].grown[i];
-    bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contacts_normal_work(w, &t->units[j], i));
+    bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
     bt_sum_add(&totals->sum[BT_CRUSHING_POINTS], 1);
 }
 
-double bt_crush_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
+double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
     (void)totals;
-    const bt_unit *u = &t->units[j];
+    const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->limits[j];
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
     if (deepest == 0 || l->trace[BT_LAW_RAFTING] >= 0) return 0;
     const bt_pair *p = &t->pairs[t->gaps[j].pair];
-    bt_trace r = bt_law_names(w, p, BT_LAW_CRUSHING);
+    bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
     r.n_points = u->n;
     for (int i = 0; i < u->n; i++) r.feature[i] = p->feature[i], r.value[i] = l->depth[i];
     bt_law_put(t, l->trace[BT_LAW_CRUSHING], &r);

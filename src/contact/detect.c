@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Contact detection of one step: which tiles are active, their margins, narrow phase, units with last step's impulses.
+// Contact detection of one step: which cells are active, their margins, narrow phase, contacts with last step's
+// impulses.
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -7,7 +8,7 @@
 
 #include "contact/contacts.h"
 #include "contact/law.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
 #include "contact/merge.h"
@@ -15,34 +16,34 @@
 #include "space/pairs.h"
 #include "space/phases.h"
 
-/// Speed s in the tiles x0..x1 × y0..y1. T has tile t in its block or in the ring around it when t − 2 <= T <= t + 1.
-static void raise(bt_tiles *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
+/// Speed s in the cells x0..x1 × y0..y1. T has cell t in its block or in the ring around it when t − 2 <= T <= t + 1.
+static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, double s)
 {
     for (int32_t y = y0 - 2; y <= y1 + 1; y++)
         for (int32_t x = x0 - 2; x <= x1 + 1; x++) {
-            const bt_idx k = bt_tiles_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
+            const bt_idx k = bt_cells_at(t, t->wrap_x == 1 ? 0 : x, t->wrap_y == 1 ? 0 : y);
             if (k < 0) continue;
-            bt_tiles_wake(t, k);
+            bt_cells_wake(t, k);
             t->bound[k] = bt_max(t->bound[k], s);
         }
 }
 
-void bt_contacts_spread(bt_tiles *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
+void bt_contacts_spread(bt_cells *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
 
-/// What a large body that moves, or can be moved, asks of the tiles under it and beside it.
+/// What a large body that moves, or can be moved, asks of the cells under it and beside it.
 static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     double fastest = 0;
     bool movable = false;
-    for (bt_idx l = t->n_tiled; l < b->n; l++) {
+    for (bt_idx l = t->n_in_cells; l < b->n; l++) {
         double s = bt_max(bt_bodies_speed(w, l, &v[l]), bt_bodies_speed(w, l, &v2[l]));
-        if (b->stirred[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
+        if (b->disturbed[l] && b->motion[l] == BT_DYNAMIC) s = bt_max(s, 0.5 * w->par.slop / w->par.dt);
         movable = movable || b->motion[l] == BT_DYNAMIC;
         if (s == 0) continue;
         fastest = bt_max(fastest, s);
-        const bt_tile_range r = bt_pairs_range(w, l, bt_margin_for(w, s) + t->reach + t->allowance);
+        const bt_cell_range r = bt_pairs_range(w, l, bt_margin_for(w, s) + t->reach + t->allowance);
         raise(t, r.x0, r.x1, r.y0, r.y1, s);
     }
     return movable ? fastest : 0;
@@ -50,7 +51,7 @@ static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
 
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     const double stir = 0.5 * w->par.slop / w->par.dt;
     const bt_idx n = t->n - 1;
@@ -61,30 +62,30 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         }
     }
     const bt_idx n_busy = t->n_busy; // others rest
-#pragma omp parallel for schedule(static) if (BT_MANY(n_busy, BT_FEW_TILES))
+#pragma omp parallel for schedule(static) if (BT_MANY(n_busy, BT_FEW_CELLS))
     for (bt_idx j = 0; j < n_busy; j++) {
         const bt_idx k = t->busy[j];
         double s = 0;
         if (k == n) continue;
-        for (bt_idx i = t->tile[k].first; i < t->tile[k].end && !(t->rest[k] && !t->awake[k]); i++) {
+        for (bt_idx i = t->cell[k].first; i < t->cell[k].end && !(t->asleep[k] && !t->awake[k]); i++) {
             s = bt_max(s, bt_max(bt_bodies_speed(w, i, &v[i]), bt_bodies_speed(w, i, &v2[i])));
-            if (b->stirred[i]) s = bt_max(s, stir);
+            if (b->disturbed[i]) s = bt_max(s, stir);
         }
         t->speed[k] = s;
     }
     double fastest = 0;
     for (bt_idx j = 0; j < n_busy; j++) {
         const bt_idx k = t->busy[j];
-        if (!(t->speed[k] > 0) || !t->tile[k].own) continue;
+        if (!(t->speed[k] > 0) || !t->cell[k].own) continue;
         fastest = bt_max(fastest, t->speed[k]);
-        bt_contacts_spread(t, t->tile[k].x, t->tile[k].y, t->speed[k]);
+        bt_contacts_spread(t, t->cell[k].x, t->cell[k].y, t->speed[k]);
     }
-    bt_domain_tell_tiles(w, t->speed, bt_contacts_spread);
+    bt_domain_tell_cells(w, t->speed, bt_contacts_spread);
     const double large = spread_large(w, v, v2);
-    bt_tiles_sort_busy(t);
-    // The last tile meets floes anywhere: it is made for the fastest of them all.
+    bt_cells_sort_busy(t);
+    // The last cell meets floes anywhere: it is made for the fastest of them all.
     bool movable = false;
-    for (bt_idx l = t->n_tiled; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
+    for (bt_idx l = t->n_in_cells; l < b->n; l++) movable = movable || b->motion[l] == BT_DYNAMIC;
     fastest = bt_max(fastest, large);
     bt_domain_maxima(w, &fastest, 1);
     if (movable) t->bound[n] = bt_max(t->bound[n], fastest);
@@ -93,13 +94,14 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
 
 bool bt_contacts_outrun(const bt_world *w)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     double any = 0;
     for (bt_idx j = 0; j < t->n_busy && any == 0; j++) {
         const bt_idx k = t->busy[j];
-        const bt_tile *tile = &t->tile[k];
-        any = tile->own && t->bound[k] > 0 &&
-              (!tile->active || bt_margin_for(w, t->bound[k]) > tile->margin || 2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
+        const bt_cell *cell = &t->cell[k];
+        any = cell->own && t->bound[k] > 0 &&
+              (!cell->active || bt_margin_for(w, t->bound[k]) > cell->margin ||
+               2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w));
     }
     bt_domain_maxima(w, &any, 1);
     return any > 0;
@@ -110,18 +112,18 @@ typedef struct {
     bt_pack_scratch pack;
 } thread_scratch;
 
-static void go_idle(bt_tile *t)
+static void go_idle(bt_cell *t)
 {
     free(t->pairs);
     t->pairs = NULL;
-    t->n_pairs = t->cap_pairs = t->n_units = 0;
+    t->n_pairs = t->cap_pairs = t->n_contacts = 0;
     t->n_points = 0;
     t->listed = false;
     t->overlap = 0;
 }
 
 /// Contacts that several parts of a floe have found are one.
-static void merge(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
+static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
 {
     bt_merge_parts(w, s->man, s->n);
     size_t kept = 0;
@@ -137,14 +139,14 @@ static void merge(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
 }
 
 /// Contacts that a law makes of pairs with a record, in place of those of the outlines, and after them.
-static void replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
+static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
 {
     const size_t n = s->n;
     for (int law = 0; law < BT_LAWS; law++) {
         if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
         for (size_t k = 0; k < n; k++) {
             bt_pair *p = &t->pairs[s->pair[k]];
-            const bt_trace names = bt_law_names(w, p, law);
+            const bt_memory names = bt_law_names(w, p, law);
             const bt_idx at = bt_law_find(t, &names);
             if (at < 0) continue;
             bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
@@ -162,7 +164,7 @@ static void replace(const bt_world *w, bt_tile *t, bt_pack_scratch *s)
 static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
-    bt_tile *t = &w->tiles->tile[k];
+    bt_cell *t = &w->cells->cell[k];
     if (t->n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
     bt_pack_begin(&s->pack, 2 * (size_t)t->n_pairs); // a pair may have a second contact (replace)
@@ -181,7 +183,8 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         if (!near) bt_pairs_add_near(t, i);
         double gap;
         bt_manifold *m = bt_pack_next(&s->pack, i);
-        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin, p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
+        const bool touch = bt_contacts_parts(w, p->a, p->b, p->part, t->margin,
+                                             p->n_points > 0 ? (int)(p->feature[0] >> 31) : -1, m, &gap, &p->axis);
         p->reach = gap + paths;
         if (!touch) {
             p->n_points = 0;
@@ -199,61 +202,63 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         t->n_points += m->n_points;
         for (int j = 0; j < m->n_points; j++) t->overlap = bt_max(t->overlap, 0 - m->p[j].gap);
     }
-    bt_pack_units(w, k, &s->pack);
+    bt_pack_contacts(w, k, &s->pack);
     if (bt_laws_on(&w->par)) t->overlap = bt_laws_overlap(t); // what has given way does not count as overlap
 }
 
 static void wake_body(bt_world *w, bt_idx i)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     if (w->bodies.large[i]) return;
-    const bt_idx k = bt_tiles_at(t, w->bodies.tile[i][0], w->bodies.tile[i][1]);
+    const bt_idx k = bt_cells_at(t, w->bodies.cell[i][0], w->bodies.cell[i][1]);
     t->awake[k] = 1;
-    bt_tiles_wake(t, k);
+    bt_cells_wake(t, k);
 }
 
-/// Tiles with bodies that units, here or on other ranks, may move; none of a step falls asleep when it is detected again.
+/// Cells with bodies that contacts, here or on other ranks, may move; none of a step falls asleep when it is detected
+/// again.
 static void find_awake(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     for (bt_idx i = 0; i < t->n_order; i++) {
-        const bt_tile *tile = &t->tile[t->order[i]];
-        if (tile->phase == BT_COLOURS) {
-            for (bt_idx j = 0; j < tile->n_units; j++) wake_body(w, tile->units[j].a), wake_body(w, tile->units[j].b);
+        const bt_cell *cell = &t->cell[t->order[i]];
+        if (cell->phase == BT_COLOURS) {
+            for (bt_idx j = 0; j < cell->n_contacts; j++)
+                wake_body(w, cell->contacts[j].a), wake_body(w, cell->contacts[j].b);
             continue;
         }
-        const bt_idx block[4] = {t->order[i], tile->right, tile->above, tile->diagonal};
+        const bt_idx block[4] = {t->order[i], cell->right, cell->above, cell->diagonal};
         for (int j = 0; j < 4; j++) {
             if (block[j] < 0) continue;
             t->awake[block[j]] = 1;
-            bt_tiles_wake(t, block[j]);
+            bt_cells_wake(t, block[j]);
         }
     }
     bt_domain_moved_elsewhere(w, wake_body);
-    bt_tiles_sort_busy(t);
+    bt_cells_sort_busy(t);
 }
 
 static void detect(bt_world *w, bool again)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
-        bt_tile *tile = &t->tile[k];
-        if (!tile->own) continue;
+        bt_cell *cell = &t->cell[k];
+        if (!cell->own) continue;
         const bool active = t->bound[k] > 0;
         if (!active) {
-            if (tile->pairs || tile->n_units) go_idle(tile);
-            tile->active = false;
+            if (cell->pairs || cell->n_contacts) go_idle(cell);
+            cell->active = false;
             continue;
         }
         const double margin = bt_margin_for(w, t->bound[k]);
-        if (again && tile->active && margin <= tile->margin) continue;
-        tile->active = true;
-        tile->margin = margin;
+        if (again && cell->active && margin <= cell->margin) continue;
+        cell->active = true;
+        cell->margin = margin;
         due[n_due++] = k;
     }
-#pragma omp parallel if (BT_MANY(n_due, BT_FEW_TILES))
+#pragma omp parallel if (BT_MANY(n_due, BT_FEW_CELLS))
     {
         thread_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)
@@ -265,21 +270,22 @@ static void detect(bt_world *w, bool again)
     bt_phases_order(w);
     bt_domain_select(w);
     find_awake(w);
-    bt_tiles_leave(t);
+    bt_cells_leave(t);
 }
 
 void bt_contacts_detect(bt_world *w, bool again) { detect(w, again); }
 
 void bt_contacts_detect_all(bt_world *w, double margin)
 {
-    bt_tiles_begin(w);
-    bt_tiles_update(w, margin);
-    bt_tiles_wake_all(w->tiles);
+    bt_cells_begin(w);
+    bt_cells_update(w, margin);
+    bt_cells_wake_all(w->cells);
     // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        w->cells->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
     bool movable = false;
-    for (bt_idx l = w->tiles->n_tiled; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
-    if (!movable) w->tiles->bound[w->tiles->n - 1] = 0;
+    for (bt_idx l = w->cells->n_in_cells; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
+    if (!movable) w->cells->bound[w->cells->n - 1] = 0;
     detect(w, false);
 }
 
@@ -298,7 +304,9 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
                     if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
                     double gap;
                     int32_t axis = -1;
-                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man], &gap, &axis)) ++*n_man;
+                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man],
+                                          &gap, &axis))
+                        ++*n_man;
                 }
         }
     bt_merge_parts(w, *man, (size_t)*n_man);
@@ -310,13 +318,14 @@ void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man
 
 double bt_contacts_overlap(bt_world *w)
 {
-    bt_tiles_begin(w); // from here on and again below, bodies may lie elsewhere
-    if (bt_tiles_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false)))) bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
+    bt_cells_begin(w); // from here on and again below, bodies may lie elsewhere
+    if (bt_cells_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false))))
+        bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
     detect(w, false);
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     double deepest = 0;
     for (bt_idx k = 0; k < t->n; k++)
-        if (t->tile[k].own) deepest = bt_max(deepest, t->tile[k].overlap);
+        if (t->cell[k].own) deepest = bt_max(deepest, t->cell[k].overlap);
     bt_domain_maxima(w, &deepest, 1);
     return deepest;
 }
@@ -331,8 +340,8 @@ static void deeper(bt_overlaps *to, const bt_overlaps *o)
     to->a = o->a, to->b = o->b;
 }
 
-/// Overlaps in the pairs of one tile. A body of several parts is one body.
-static bt_overlaps overlaps_of(const bt_world *w, const bt_tile *t, double allowed)
+/// Overlaps in the pairs of one cell. A body of several parts is one body.
+static bt_overlaps overlaps_of(const bt_world *w, const bt_cell *t, double allowed)
 {
     bt_overlaps all = {0}, pair = {0};
     for (bt_idx i = 0; i < t->n_pairs; i++) {
@@ -355,18 +364,18 @@ static bt_overlaps overlaps_of(const bt_world *w, const bt_tile *t, double allow
 
 bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
 {
-    bt_tiles_begin(w);
-    bt_tiles_update(w, w->par.slop);
-    const bt_tiles *t = w->tiles;
+    bt_cells_begin(w);
+    bt_cells_update(w, w->par.slop);
+    const bt_cells *t = w->cells;
     bt_overlaps all = {0};
-    // On lists of its own, a tile at a time: neither the contacts of the step nor the memory for all lists at once.
-#pragma omp parallel if (BT_MANY(t->n, BT_FEW_TILES))
+    // On lists of its own, a cell at a time: neither the contacts of the step nor the memory for all lists at once.
+#pragma omp parallel if (BT_MANY(t->n, BT_FEW_CELLS))
     {
         bt_pair_scratch s = {0};
 #pragma omp for schedule(dynamic, 4)
         for (bt_idx k = 0; k < t->n; k++) {
-            if (!t->tile[k].own) continue;
-            bt_tile own = t->tile[k];
+            if (!t->cell[k].own) continue;
+            bt_cell own = t->cell[k];
             own.pairs = NULL;
             own.n_pairs = own.cap_pairs = 0;
             own.listed = false;

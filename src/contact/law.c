@@ -51,7 +51,7 @@ bool bt_laws_rise(const bt_params *p) { return bt_law_on(p, BT_LAW_CRUSHING); }
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-void bt_laws_prune(const bt_world *w, bt_tile *t)
+void bt_laws_prune(const bt_world *w, bt_cell *t)
 {
     bt_idx kept = 0;
     for (bt_idx k = 0; k < t->n_memory; k++)
@@ -61,15 +61,15 @@ void bt_laws_prune(const bt_world *w, bt_tile *t)
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-void bt_laws_reserve(bt_tile *t)
+void bt_laws_reserve(bt_cell *t)
 {
-    if (t->n_units <= t->cap_limits) return;
-    t->cap_limits = t->n_units + t->n_units / 4;
+    if (t->n_contacts <= t->cap_limits) return;
+    t->cap_limits = t->n_contacts + t->n_contacts / 4;
     free(t->limits);
     t->limits = bt_alloc_aligned((size_t)t->cap_limits, sizeof *t->limits);
 }
 
-void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->limits[j];
     *l = (bt_limit){
@@ -82,13 +82,13 @@ void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
     for (int i = 0; i < m->n_points; i++) l->place[i] = bt_max(t->gaps[j].gap[i], 0) / w->par.dt;
 }
 
-double bt_laws_overlap(const bt_tile *t)
+double bt_laws_overlap(const bt_cell *t)
 {
     // 0 − gap, not −gap: a contact that just touches must not make the deepest overlap −0 on the one rank that holds it
     // alone.
     double deepest = 0;
-    for (bt_idx j = 0; j < t->n_units; j++)
-        for (int i = 0; i < t->units[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);
+    for (bt_idx j = 0; j < t->n_contacts; j++)
+        for (int i = 0; i < t->contacts[j].n; i++) deepest = bt_max(deepest, 0 - t->gaps[j].gap[i]);
     return deepest;
 }
 
@@ -108,9 +108,9 @@ static void tell(bt_step_stats *st, const bt_totals *t, const double most[BT_LAW
     st->rafted_largest = most[BT_LAW_RAFTING];
 }
 
-static void grow_unit(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
+static void grow_contact(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
-    const bt_unit *u = &t->units[j];
+    const bt_contact *u = &t->contacts[j];
     const bt_vel *v = w->bodies.vel;
     bt_limit *l = &t->limits[j];
     for (int i = 0; i < u->n; i++) {
@@ -124,30 +124,30 @@ static void grow_unit(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
     }
 }
 
-static void grow_tile(bt_world *w, bt_idx k, const void *context, bt_totals *totals)
+static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *totals)
 {
     (void)context;
-    bt_tile *t = &w->tiles->tile[k];
+    bt_cell *t = &w->cells->cell[k];
     const bt_idx before = t->n_memory;
     double most[BT_LAWS] = {0};
-    for (bt_idx j = 0; j < t->n_units; j++) {
-        grow_unit(w, t, j, totals);
+    for (bt_idx j = 0; j < t->n_contacts; j++) {
+        grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
             if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law].remember(w, t, j, totals));
     }
-    if (t->n_memory > before) qsort(t->memory, (size_t)t->n_memory, sizeof *t->memory, bt_trace_by_names);
+    if (t->n_memory > before) qsort(t->memory, (size_t)t->n_memory, sizeof *t->memory, bt_memory_by_names);
     // One maximum is what a pass carries; of other laws all that counts is in their records.
     totals->most = bt_max(totals->most, most[BT_LAW_CRUSHING]);
 }
 
-/// All records of this rank, also of pairs that have come to rest against each other and have no units.
+/// All records of this rank, also of pairs that have come to rest against each other and have no contacts.
 static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *totals)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; ts->tile[k].own && i < ts->tile[k].n_memory; i++) {
-            const bt_trace *r = &ts->tile[k].memory[i];
-            if (r->law == BT_LAW_CRUSHING && ts->tile[k].n_units > 0) continue;
+        for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].n_memory; i++) {
+            const bt_memory *r = &ts->cell[k].memory[i];
+            if (r->law == BT_LAW_CRUSHING && ts->cell[k].n_contacts > 0) continue;
             most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
         }
 }
@@ -157,7 +157,7 @@ void bt_laws_grow(bt_world *w)
     bt_totals t = {.n_sums = BT_LAW_SUMS};
     double most[BT_LAWS] = {0};
     if (bt_laws_on(&w->par)) {
-        bt_phases_any_order(w, grow_tile, NULL, &t);
+        bt_phases_any_order(w, grow_cell, NULL, &t);
         most[BT_LAW_CRUSHING] = t.most;
         count_records(w, most, &t);
         bt_domain_reduce(w, &t);

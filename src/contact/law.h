@@ -9,10 +9,10 @@
 // contact for all of them (solve/limit.h):
 //     L(w) = min(most, max(flat, base + slope (−w − place)))
 //
-// Memory. What a law remembers of a pair is one record, bt_trace (space/tiles.h), kept in the tile that owns the pair,
-// sorted by (a, b, part, law). It is state: it goes with the pair to other tiles and ranks, into checkpoints, and into
-// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step, travels and is saved
-// in the same way as the record of the rigid law.
+// Memory. What a law remembers of a pair is one record, bt_memory (space/cells.h), kept in the cell that owns the pair,
+// sorted by (a, b, part, law). It is state: it goes with the pair to other cells and ranks, into checkpoints, and into
+// the hash of the state, whatever the law. What every pair remembers, its impulses of the last step,
+// travels and is saved in the same way as the record of the rigid law.
 //
 // In a step: detection prunes the records (`keeps`), forms the bounds (`bound`) and may replace what the outlines give
 // (contact/raft.h); the sweeps know bounds only; after them `gives_way` tells which points are at the bound and
@@ -25,7 +25,7 @@
 
 #include "contact/contacts.h"
 #include "space/phases.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 
 enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS };
 
@@ -36,7 +36,7 @@ enum {
     BT_LAW_SUMS
 };
 
-/// Bounds of the points of one unit, and what gives way; all INFINITY (and slope 0) where no law applies.
+/// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
 typedef struct bt_limit {
     double flat[2];  ///< the bound at any approach; flat[0] of sheets: the radius of their disc, N s
     double base[2];  ///< of the rising part; never above flat, N s
@@ -46,7 +46,7 @@ typedef struct bt_limit {
     double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
     double depth[2]; ///< crushed so far, m (contact/crush.h)
     double grown[2]; ///< by how much the bodies go into each other in this step, m
-    int32_t trace[BT_LAWS]; ///< record of each law in the tile, −1 = none
+    int32_t trace[BT_LAWS]; ///< record of each law in the cell, −1 = none
 } bt_limit;
 
 typedef struct bt_law {
@@ -58,25 +58,25 @@ typedef struct bt_law {
     bool (*applies)(const bt_world *w, bt_idx a, bt_idx b);
     /// What touches instead of the outlines for a pair with record r: an edge, if true, and sheets (contact/raft.h).
     /// NULL = the outlines.
-    bool (*contact)(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_manifold *edge, bt_manifold *sheets);
-    /// Narrow the bounds of unit j of tile t, made from manifold m of pair p; its gaps become those between the
+    bool (*contact)(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets);
+    /// Narrow the bounds of contact j of cell t, made from manifold m of pair p; its gaps become those between the
     /// surfaces that are left.
-    void (*bound)(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+    void (*bound)(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
     /// Brings the record up to date with the poses; does it stay?
-    bool (*keeps)(const bt_world *w, bt_trace *r);
-    /// Is point i of the unit at the bound of this law?
-    bool (*gives_way)(const bt_unit *u, const bt_limit *l, int i);
+    bool (*keeps)(const bt_world *w, bt_memory *r);
+    /// Is point i of the contact at the bound of this law?
+    bool (*gives_way)(const bt_contact *u, const bt_limit *l, int i);
     /// It is, and approaches: limits[j].grown[i] has been set.
-    void (*give_way)(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals);
-    /// After the solve: into the records of the tile. Returns what the law wants the largest of.
-    double (*remember)(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals);
+    void (*give_way)(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals);
+    /// After the solve: into the records of the cell. Returns what the law wants the largest of.
+    double (*remember)(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals);
     /// A record into the sums; the same largest. Of all records, also where nothing moves.
-    double (*count)(const bt_world *w, const bt_trace *r, bt_totals *totals);
+    double (*count)(const bt_world *w, const bt_memory *r, bt_totals *totals);
 } bt_law;
 
 extern const bt_law bt_laws[BT_LAWS];
 
-/// Bounds with a rising part: units with them are not swept in batches (src/solve/batch.h).
+/// Bounds with a rising part: contacts with them are not swept in batches (src/solve/batch.h).
 bool bt_laws_rise(const bt_params *p);
 
 /// Does any law bound contacts in this world?
@@ -84,32 +84,32 @@ bool bt_laws_on(const bt_params *p);
 /// Does the law of this number bound contacts in this world?
 bool bt_law_on(const bt_params *p, int law);
 
-/// At the start of a detection: forget what tile t need not remember any more.
-void bt_laws_prune(const bt_world *w, bt_tile *t);
+/// At the start of a detection: forget what cell t need not remember any more.
+void bt_laws_prune(const bt_world *w, bt_cell *t);
 
-/// Room for the bounds of the units of a tile.
-void bt_laws_reserve(bt_tile *t);
+/// Room for the bounds of the contacts of a cell.
+void bt_laws_reserve(bt_cell *t);
 
-/// Bounds of unit j of tile t, made from manifold m of pair p.
-void bt_laws_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+/// Bounds of contact j of cell t, made from manifold m of pair p.
+void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
 
-/// Deepest overlap in a tile of what is left of the outlines, m.
-double bt_laws_overlap(const bt_tile *t);
+/// Deepest overlap in a cell of what is left of the outlines, m.
+double bt_laws_overlap(const bt_cell *t);
 
 /// After the solve: what gives way, into the records; work, numbers and depths into stats. Collective.
 void bt_laws_grow(bt_world *w);
 
-/// Record of the pair of names.a, b, part, law in tile t, −1 = none.
-bt_idx bt_law_find(const bt_tile *t, const bt_trace *names);
+/// Record of the pair of names.a, b, part, law in cell t, −1 = none.
+bt_idx bt_law_find(const bt_cell *t, const bt_memory *names);
 
 /// Write record r: over the one at `at`, or, −1, as a new one; new ones are in their order after bt_laws_grow.
-void bt_law_put(bt_tile *t, bt_idx at, const bt_trace *r);
+void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r);
 
 /// Names of the record that a law has, or would have, of pair p.
-static inline bt_trace bt_law_names(const bt_world *w, const bt_pair *p, int law)
+static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int law)
 {
     const bt_gid *gid = w->bodies.gid;
-    return (bt_trace){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .law = (uint16_t)law};
+    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .law = (uint16_t)law};
 }
 
 #endif

@@ -30,7 +30,8 @@ static polygon polygon_of(const bt_bodies *b, bt_idx i, int part, double x, doub
     return (polygon){b->outline + 2 * first, b->per_length + first, count, x, y};
 }
 
-/// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a floe's memory.
+/// Outward unit normal of edge i: its direction turned clockwise. Formed when needed: kept ones would be a fourth of a
+/// floe's memory.
 static inline void edge_normal(const polygon *p, int i, double *nx, double *ny)
 {
     const double *v = p->v + 2 * i, *next = p->v + 2 * (i + 1 < p->count ? i + 1 : 0);
@@ -38,8 +39,9 @@ static inline void edge_normal(const polygon *p, int i, double *nx, double *ny)
     *ny = (v[0] - next[0]) * p->per_length[i];
 }
 
-/// Signed distance of q from edge i of p; −∞ when it is certainly less than `floor`: q holds its centroid, so it reaches nearer to the
-/// edge's line than that does. One product instead of one a vertex, and it rules out two edges of three.
+/// Signed distance of q from edge i of p; −∞ when it is certainly less than `floor`: q holds its centroid, so it
+/// reaches nearer to the edge's line than that does. One product instead of one a vertex, and it rules out two edges of
+/// three.
 static inline double edge_separation(const polygon *p, int i, const polygon *q, double floor)
 {
     double nx, ny;
@@ -51,7 +53,8 @@ static inline double edge_separation(const polygon *p, int i, const polygon *q, 
     return least + centre;
 }
 
-/// Largest edge separation of q from p, exact if it is at least `floor`; stops at the first edge that separates by more than `enough`.
+/// Largest edge separation of q from p, exact if it is at least `floor`; stops at the first edge that separates by more
+/// than `enough`.
 static double max_separation(const polygon *p, const polygon *q, double enough, double floor, int *edge)
 {
     double best = -INFINITY;
@@ -181,12 +184,13 @@ static void clip_points(const polygon *ref, int i, const polygon *inc, bool flip
     // Both points on one line along the edge, half-way into the smaller gap: their tangential rows are then the same,
     // and the solver can treat the friction of the pair as one. The normal rows do not depend on that height.
     for (int k = 0; k < kept; k++)
-        set_point(m, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny, ends[k].gap, dx, dy,
-                  base | ends[k].id);
+        set_point(m, r[0] + ends[k].t * tx + 0.5 * depth * nx, r[1] + ends[k].t * ty + 0.5 * depth * ny, ends[k].gap,
+                  dx, dy, base | ends[k].id);
 }
 
 /// The deepest vertex of inc below reference edge i as the only point.
-static void deepest_point(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy, bt_manifold *m)
+static void deepest_point(const polygon *ref, int i, const polygon *inc, bool flip, double dx, double dy,
+                          bt_manifold *m)
 {
     double nx, ny;
     edge_normal(ref, i, &nx, &ny);
@@ -218,12 +222,14 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
     // Two edges that face each other squarely have nearly the same separation: keep the reference of the step
     // before, so that features, and with them impulses, persist. The tie is 1 % of the smaller floe's radius.
     const double tie = 0.01 * bt_min(w->bodies.radius[a], w->bodies.radius[b]);
-    // The axis that separated them last time usually does so again. Where not, an edge that separates by less than that one, and by more
-    // than the tie, is neither the best nor in question; so only the others are looked at in full, and the result is the same with any hint.
+    // The axis that separated them last time usually does so again. Where not, an edge that separates by less than that
+    // one, and by more than the tie, is neither the best nor in question; so only the others are looked at in full, and
+    // the result is the same with any hint.
     const int32_t hint = *axis_out;
     double known = -INFINITY;
     if (hint >= 0 && hint < pa.count + pb.count) {
-        known = hint < pa.count ? edge_separation(&pa, hint, &pb, -INFINITY) : edge_separation(&pb, hint - pa.count, &pa, -INFINITY);
+        known = hint < pa.count ? edge_separation(&pa, hint, &pb, -INFINITY)
+                                : edge_separation(&pb, hint - pa.count, &pa, -INFINITY);
         if (known > margin) {
             *gap_out = known;
             return false;
@@ -250,7 +256,8 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
     const bool square = ax * bx + ay * by < -0.98;
     if (square && reference_before >= 0 && fabs(sa - sb) < tie) ref_b = reference_before;
     else if (square && reference_before < 0 && sb < sa + tie) ref_b = false;
-    if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b; // apart by one of them: the tie must not feign overlap
+    // apart by one of them: the tie must not feign overlap
+    if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b;
     *gap_out = bt_max(sa, sb);
     *axis_out = ref_b ? pa.count + ib : ia;
 
@@ -292,17 +299,21 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
 
 // --- bodies that are not convex --------------------------------------------------------------------------------------
 //
-// The parts of such a body are convex, but some of their edges are cuts through the ice, and some of their corners are no corners of the body. A
-// contact there would be with something that is not there: a floe that slides along a shore of two parts would be stopped by the corner of
-// the part ahead ("ghost" or "internal edge" collisions). So a contact counts only where the outline itself can be touched:
+// The parts of such a body are convex, but some of their edges are cuts through the ice, and some of their corners are
+// no corners of the body. A contact there would be with something that is not there: a floe that slides along a shore
+// of two parts would be stopped by the corner of the part ahead ("ghost" or "internal edge" collisions). So a contact
+//   counts only where the outline itself can be touched:
 //   an edge       is one of the outline, not a cut;
-//   a corner V    of the outline, with edges e1 → V → e2, is convex, and the direction n from the body to the other one lies in its normal
+//   a corner V    of the outline, with edges e1 → V → e2, is convex, and the direction n from the body to the other one
+//   lies in its normal
 //                 cone: n·e1 >= 0 and n·e2 <= 0.
-// What is left out here is found with the part that has the edge, or with the one on the other side of the cut. Parts that are apart touch at
-// their nearest features or not at all. Parts that overlap part along the best axis that counts, if that is not much farther than along the best of
+// What is left out here is found with the part that has the edge, or with the one on the other side of the cut. Parts
+// that are apart touch at their nearest features or not at all. Parts that overlap part along the best axis that
+// counts, if that is not much farther than along the best of
 // all: the middle one of three parts that share a corner has edges of the outline only on its far side.
 
-#define CONE 1e-6 // rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
+#define CONE                                                                                                           \
+    1e-6 // rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
 #define DETOUR 4  // depth along an axis that counts / depth along the best of all; more only within the tie
 
 typedef struct {
@@ -316,7 +327,8 @@ typedef struct {
 static part_of_body part_of(const bt_bodies *b, bt_idx i, int part, double x, double y)
 {
     const int64_t first = b->offset[i];
-    return (part_of_body){polygon_of(b, i, part, x, y), b->mark + first + part, b->outline + 2 * first, bt_body_corners(b, i), part == 0};
+    return (part_of_body){polygon_of(b, i, part, x, y), b->mark + first + part, b->outline + 2 * first,
+                          bt_body_corners(b, i), part == 0};
 }
 
 static bool edge_counts(const part_of_body *q, int i)
@@ -328,7 +340,8 @@ static bool edge_counts(const part_of_body *q, int i)
 static bool corner_counts(const part_of_body *q, int i, double nx, double ny)
 {
     if (q->whole) return true;
-    const int here = q->mark[i].corner, before = here > 0 ? here - 1 : q->corners - 1, after = here + 1 < q->corners ? here + 1 : 0;
+    const int here = q->mark[i].corner, before = here > 0 ? here - 1 : q->corners - 1,
+              after = here + 1 < q->corners ? here + 1 : 0;
     const double *o = q->outline;
     const double ax = o[2 * here] - o[2 * before], ay = o[2 * here + 1] - o[2 * before + 1];
     const double bx = o[2 * after] - o[2 * here], by = o[2 * after + 1] - o[2 * here + 1];
@@ -366,7 +379,8 @@ static double separation_that_counts(const part_of_body *p, const part_of_body *
 }
 
 /// clip_points, without points on a cut: where the edge that faces the reference is one, only its ends can count.
-static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2], double margin, bt_manifold *m)
+static void clip_what_counts(const part_of_body *ref, int i, const part_of_body *inc, bool flip, const double d[2],
+                             double margin, bt_manifold *m)
 {
     clip_points(&ref->p, i, &inc->p, flip, d[0], d[1], margin, m);
     double nx, ny;
@@ -381,7 +395,8 @@ static void clip_what_counts(const part_of_body *ref, int i, const part_of_body 
 }
 
 /// The nearest features of two parts that are apart, where both count.
-static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], double margin, bt_manifold *m)
+static bool nearest_contact(const part_of_body *a, const part_of_body *b, const double d[2], double margin,
+                            bt_manifold *m)
 {
     int ca = 0, cb = 0, e = 0;
     bool of_b = false;
@@ -395,7 +410,8 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
         m->nx = (y[0] - x[0]) / gap;
         m->ny = (y[1] - x[1]) / gap;
         if (!corner_counts(a, ca, m->nx, m->ny) || !corner_counts(b, cb, -m->nx, -m->ny)) return false;
-        set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1], 0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
+        set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
+                  0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
         return true;
     }
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
@@ -407,20 +423,23 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
     return m->p[0].gap <= margin;
 }
 
-bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin, int reference_before, bt_manifold *m,
-                       double *gap_out, int32_t *axis_out)
+bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t part[2], double margin,
+                       int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out)
 {
-    if (part[0] == 0 && part[1] == 0) return bt_contacts_pair(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
+    if (part[0] == 0 && part[1] == 0)
+        return bt_contacts_pair(w, ia, ib, margin, reference_before, m, gap_out, axis_out);
     double d[2];
     bt_bodies_offset(w, ia, ib, d);
     const part_of_body a = part_of(&w->bodies, ia, part[0], 0, 0), b = part_of(&w->bodies, ib, part[1], d[0], d[1]);
     const double tie = 0.01 * bt_min(w->bodies.radius[ia], w->bodies.radius[ib]);
-    // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the last axis first.
+    // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the
+    // last axis first.
     const int32_t n = a.p.count + b.p.count, hint = *axis_out >= 0 && *axis_out < n ? *axis_out : 0;
     double best = -INFINITY;
     for (int32_t k = 0; k < n; k++) {
         const int32_t axis = k == 0 ? hint : k <= hint ? k - 1 : k;
-        const double s = axis < a.p.count ? edge_separation(&a.p, axis, &b.p, -INFINITY) : edge_separation(&b.p, axis - a.p.count, &a.p, -INFINITY);
+        const double s = axis < a.p.count ? edge_separation(&a.p, axis, &b.p, -INFINITY)
+                                          : edge_separation(&b.p, axis - a.p.count, &a.p, -INFINITY);
         if (s > best) best = s, *axis_out = axis;
         if (best > margin) break;
     }

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// Records of contact laws in the memory of a tile; contact/law.h.
+// Records of contact laws in the memory of a cell; contact/law.h.
 #include <stdlib.h>
 
 #include "contact/law.h"
 
-bt_idx bt_law_find(const bt_tile *t, const bt_trace *names)
+bt_idx bt_law_find(const bt_cell *t, const bt_memory *names)
 {
     if (t->n_memory == 0) return -1;
-    const bt_trace *r = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, bt_trace_by_names);
+    const bt_memory *r = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, bt_memory_by_names);
     return r ? (bt_idx)(r - t->memory) : -1;
 }
 
-void bt_law_put(bt_tile *t, bt_idx at, const bt_trace *r)
+void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r)
 {
     if (at >= 0) t->memory[at] = *r;
-    else bt_tiles_remember(t, r);
+    else bt_cells_remember(t, r);
 }

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: MIT
 // Contacts of several parts of one floe at one place become one.
 //
-// Parts that share a corner can both touch another floe there: one by the corner, the other by the end of its edge. The normals of the two then
-// differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it stops a floe that slides, and with friction the
-// sweeps find no solution at all (seen: a hexagon in two parts, 20,000 sweeps, 18 J gained). Normals farther apart than those of edges that face
-// each other squarely (manifold.c) belong to different shores, as in a notch, and stay.
+// Parts that share a corner can both touch another floe there: one by the corner, the other by the end of its edge. The
+// normals of the two then differ by the tilt of two nearly parallel edges. The rows are a wedge that is not there: it
+// stops a floe that slides, and with friction the sweeps find no solution at all (seen: a hexagon in two parts, 20,000
+// sweeps, 18 J gained). Normals farther apart than those of edges that face each other squarely (manifold.c) belong to
+// different shores, as in a notch, and stay.
 #include "contact/merge.h"
 
 #include <math.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 
 #define SQUARE 0.98 // cosine, as for reference edges
 #define PLACE 0.01  // of the smaller radius, as for reference edges
@@ -48,7 +49,8 @@ void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n)
         // Edges that lie on each other know more than single points: those go first, whatever their order.
         for (size_t i = k; i < end; i++)
             for (size_t j = k; j < end; j++)
-                if (i != j && man[i].n_points == 1 && (man[j].n_points == 2 || (man[j].n_points == 1 && j < i))) take_out(&man[i], &man[j], reach);
+                if (i != j && man[i].n_points == 1 && (man[j].n_points == 2 || (man[j].n_points == 1 && j < i)))
+                    take_out(&man[i], &man[j], reach);
         for (size_t i = k; i < end; i++)
             for (size_t j = k; j < i; j++)
                 if (man[i].n_points == 2 && man[j].n_points == 2) take_out(&man[i], &man[j], reach);

@@ -5,8 +5,8 @@
 
 #include "contact/contacts.h"
 
-/// Of the manifolds man [n], in the order of gids and parts, those of bodies that are not convex: points that another part of the same pair of
-/// bodies has as well are taken out. What has no point left has n_points = 0.
+/// Of the manifolds man [n], in the order of gids and parts, those of bodies that are not convex: points that another
+/// part of the same pair of bodies has as well are taken out. What has no point left has n_points = 0.
 void bt_merge_parts(const bt_world *w, bt_manifold *man, size_t n);
 
 #endif

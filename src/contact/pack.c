@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Units of a tile: order, geometry, effective masses, biases, warm start.
+// Contacts of a cell: order, geometry, effective masses, biases, warm start.
 //
-// Order. Units that follow each other should not share a body: the processor then works on several at once, where each
-// would otherwise wait for the velocities of the one before. So a tile's manifolds are coloured first-fit in the
+// Order. Contacts that follow each other should not share a body: the processor then works on several at once, where
+// each would otherwise wait for the velocities of the one before. So a cell's manifolds are coloured first-fit in the
 // order of their gids (every body of the block keeps a mask of the colours it has), and stand by colour. The order
 // follows from the manifolds and their gids alone, and is the same wherever and whenever the pair list was made.
 #include "contact/pack.h"
@@ -43,27 +43,27 @@ bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i)
 
 void bt_pack_keep(bt_pack_scratch *s) { s->n++; }
 
-/// Position of body i in the block of tile t, −1 = a large one.
-static bt_idx in_block(const bt_tiles *ts, const bt_tile *t, const bt_idx base[4], bt_idx i)
+/// Position of body i in the block of cell t, −1 = a large one.
+static bt_idx in_block(const bt_cells *ts, const bt_cell *t, const bt_idx base[4], bt_idx i)
 {
     const bt_idx block[4] = {t->right, t->above, t->diagonal};
     if (i >= t->first && i < t->end) return i - t->first;
     for (int k = 0; k < 3; k++)
-        if (block[k] >= 0 && i >= ts->tile[block[k]].first && i < ts->tile[block[k]].end)
-            return base[k + 1] + i - ts->tile[block[k]].first;
+        if (block[k] >= 0 && i >= ts->cell[block[k]].first && i < ts->cell[block[k]].end)
+            return base[k + 1] + i - ts->cell[block[k]].first;
     return -1;
 }
 
-static int colour_units(const bt_world *w, const bt_tile *t, bt_pack_scratch *s, bt_idx start[MAX_COLOURS + 2])
+static int colour_contacts(const bt_world *w, const bt_cell *t, bt_pack_scratch *s, bt_idx start[MAX_COLOURS + 2])
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     const bt_idx block[4] = {t->right, t->above, t->diagonal};
     bt_idx base[4] = {0};
     bt_idx n = t->end - t->first;
     for (int k = 0; k < 3; k++) {
         base[k + 1] = n;
-        if (block[k] >= 0) n += ts->tile[block[k]].end - ts->tile[block[k]].first;
+        if (block[k] >= 0) n += ts->cell[block[k]].end - ts->cell[block[k]].first;
     }
     if ((size_t)n > s->cap_used) s->used = bt_realloc(s->used, s->cap_used = 2 * (size_t)n, sizeof *s->used);
     if (n > 0) memset(s->used, 0, (size_t)n * sizeof *s->used);
@@ -86,7 +86,7 @@ static int colour_units(const bt_world *w, const bt_tile *t, bt_pack_scratch *s,
     return n_colours;
 }
 
-static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
+static void inherit(const bt_manifold *m, const bt_pair *p, bt_contact *u)
 {
     for (int i = 0; i < m->n_points; i++)
         for (int j = 0; j < p->n_points; j++)
@@ -98,11 +98,11 @@ static void inherit(const bt_manifold *m, const bt_pair *p, bt_unit *u)
 }
 
 /// Sheets that lie on each other (contact/raft.h): components along x and y, one step length for both.
-static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt_unit *u, bt_gaps *g)
+static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt_contact *u, bt_gaps *g)
 {
     const bt_inv ia = w->bodies.inv[m->a], ib = w->bodies.inv[m->b];
     const bt_point *q = &m->p[0];
-    *u = (bt_unit){
+    *u = (bt_contact){
         .a = m->a, .b = m->b, .nx = 1, .ran = {-q->ra[1]}, .rbn = {-q->rb[1]}, .rat = q->ra[0], .rbt = q->rb[0]};
     *g = (bt_gaps){.pair = pair};
     const double free = ia.m + ib.m, x = ia.i * u->ran[0] * u->ran[0] + ib.i * u->rbn[0] * u->rbn[0];
@@ -112,12 +112,13 @@ static void fill_sheets(const bt_world *w, const bt_manifold *m, bt_idx pair, bt
     u->mn[0] = u->mt = 1 / u->w[0];
 }
 
-static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_unit *u, bt_gaps *g)
+static void fill_contact(const bt_world *w, const bt_manifold *m, bt_idx pair, const bt_pair *p, bt_contact *u,
+                         bt_gaps *g)
 {
     const bt_bodies *b = &w->bodies;
     const bt_inv ia = b->inv[m->a], ib = b->inv[m->b];
     const double nx = m->nx, ny = m->ny;
-    *u = (bt_unit){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points};
+    *u = (bt_contact){.a = m->a, .b = m->b, .nx = nx, .ny = ny, .mu = b->friction[m->b], .n = m->n_points};
     *g = (bt_gaps){.pair = pair};
     for (int i = 0; i < m->n_points; i++) {
         const bt_point *q = &m->p[i];
@@ -141,7 +142,7 @@ static void fill_unit(const bt_world *w, const bt_manifold *m, bt_idx pair, cons
 }
 
 /// Normal bias b of model equation (1).
-static double bias_of(const bt_world *w, const bt_unit *u, double gap, int i, double restitution)
+static double bias_of(const bt_world *w, const bt_contact *u, double gap, int i, double restitution)
 {
     const bt_bodies *b = &w->bodies;
     if (restitution > 0) {
@@ -158,40 +159,40 @@ static double bias_of(const bt_world *w, const bt_unit *u, double gap, int i, do
     return bt_max(gap, 0) / w->par.dt;
 }
 
-void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share)
+void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share)
 {
     const double restitution = share * w->bodies.restitution[u->b];
     for (int i = 0; i < u->n; i++) u->bias[i] = bias_of(w, u, g->gap[i], i, restitution);
 }
 
-void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
+void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
 {
-    bt_tile *t = &w->tiles->tile[k];
-    if ((bt_idx)s->n > t->cap_units) {
-        t->cap_units = (bt_idx)(s->n + s->n / 4);
-        free(t->units);
+    bt_cell *t = &w->cells->cell[k];
+    if ((bt_idx)s->n > t->cap_contacts) {
+        t->cap_contacts = (bt_idx)(s->n + s->n / 4);
+        free(t->contacts);
         free(t->gaps);
-        t->units = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->units);
-        t->gaps = bt_alloc_aligned((size_t)t->cap_units, sizeof *t->gaps);
+        t->contacts = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->contacts);
+        t->gaps = bt_alloc_aligned((size_t)t->cap_contacts, sizeof *t->gaps);
     }
-    t->n_units = (bt_idx)s->n;
+    t->n_contacts = (bt_idx)s->n;
     if (s->n == 0) return;
     const bool bounded = bt_laws_on(&w->par);
     t->rising = bt_laws_rise(&w->par);
     if (bounded) bt_laws_reserve(t);
     bt_idx next[MAX_COLOURS + 2] = {0};
-    if (t->phase < BT_COLOURS) colour_units(w, t, s, next);
+    if (t->phase < BT_COLOURS) colour_contacts(w, t, s, next);
     else memset(s->colour, 0, s->n); // in sequence
     for (size_t i = 0; i < s->n; i++) {
         bt_pair *p = &t->pairs[s->pair[i]];
         const bt_idx at = next[s->colour[i]]++;
-        bt_unit *u = &t->units[at];
+        bt_contact *u = &t->contacts[at];
         if (s->man[i].n_points == 0) {
             fill_sheets(w, &s->man[i], s->pair[i], u, &t->gaps[at]);
             bt_laws_bound(w, t, at, p, &s->man[i]);
             continue;
         }
-        fill_unit(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
+        fill_contact(w, &s->man[i], s->pair[i], p, u, &t->gaps[at]);
         if (bounded) {
             bt_laws_bound(w, t, at, p, &s->man[i]);
             bt_pack_bias(w, u, &t->gaps[at], 1); // the gaps are others now
@@ -203,9 +204,9 @@ void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s)
 
 void bt_pack_store(bt_world *w, bt_idx k)
 {
-    bt_tile *t = &w->tiles->tile[k];
-    for (bt_idx i = 0; i < t->n_units; i++) {
-        const bt_unit *u = &t->units[i];
+    bt_cell *t = &w->cells->cell[k];
+    for (bt_idx i = 0; i < t->n_contacts; i++) {
+        const bt_contact *u = &t->contacts[i];
         if (u->n == 0) continue; // sheets have a record (contact/raft.h)
         bt_pair *p = &t->pairs[t->gaps[i].pair];
         p->ln[0] = u->ln[0];

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// From the manifolds of a tile to the units that the sweeps work on (private to detection and solver).
+// From the manifolds of a cell to the contacts that the sweeps work on (private to detection and solver).
 #ifndef BERGTOW_PACK_H
 #define BERGTOW_PACK_H
 
 #include "contact/contacts.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 
-/// Manifolds of one tile, in the order of its pairs; one a thread.
+/// Manifolds of one cell, in the order of its pairs; one a thread.
 typedef struct bt_pack_scratch {
     bt_manifold *man; ///< [n]
     bt_idx *pair;     ///< [n] which pair
@@ -21,14 +21,14 @@ void bt_pack_begin(bt_pack_scratch *s, size_t n);
 /// Place for the next manifold, of pair i; it counts once kept.
 bt_manifold *bt_pack_next(bt_pack_scratch *s, bt_idx i);
 void bt_pack_keep(bt_pack_scratch *s);
-/// The units of tile k from the manifolds kept, with the impulses of the pairs (without warm start: 0).
-void bt_pack_units(bt_world *w, bt_idx k, bt_pack_scratch *s);
+/// The contacts of cell k from the manifolds kept, with the impulses of the pairs (without warm start: 0).
+void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s);
 void bt_pack_scratch_free(bt_pack_scratch *s);
 
-/// Normal biases of a unit with these gaps, `share`: factor on the restitution.
-void bt_pack_bias(const bt_world *w, bt_unit *u, const bt_gaps *g, double share);
+/// Normal biases of a contact with these gaps, `share`: factor on the restitution.
+void bt_pack_bias(const bt_world *w, bt_contact *u, const bt_gaps *g, double share);
 
-/// Impulses and features of the units into the pairs, for the next detection.
+/// Impulses and features of the contacts into the pairs, for the next detection.
 void bt_pack_store(bt_world *w, bt_idx k);
 
 #endif

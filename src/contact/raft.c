@@ -7,7 +7,7 @@
 #include "contact/overlap.h"
 #include "contact/work.h"
 
-// of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other
+// Of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other.
 #define LEAST_LENGTH 1e-3
 
 bool bt_raft_on(const bt_params *p) { return p->raft_line > 0; }
@@ -30,7 +30,7 @@ static double line_load(const bt_world *w, bt_idx a, bt_idx b)
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-bool bt_raft_keeps(const bt_world *w, bt_trace *r)
+bool bt_raft_keeps(const bt_world *w, bt_memory *r)
 {
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
     if (a < 0 || b < 0) return false;
@@ -42,7 +42,7 @@ bool bt_raft_keeps(const bt_world *w, bt_trace *r)
     return r->value[1] > 0;
 }
 
-double bt_raft_count(const bt_world *w, const bt_trace *r, bt_totals *totals)
+double bt_raft_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
 {
     const bt_bodies *s = &w->bodies;
     const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
@@ -73,7 +73,7 @@ static void edge_of(const double grad[2], double turn, double length, double gap
 }
 
 /// False without an edge; `sheets` always.
-bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_manifold *edge, bt_manifold *sheets)
+bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets)
 {
     bt_overlap o;
     double grad[2], turn, centroid[2], off[2];
@@ -113,18 +113,18 @@ static void narrow(bt_limit *l, int i, double c)
     l->most[i] = bt_min(l->most[i], c);
 }
 
-static void bound_sheets(const bt_world *w, bt_tile *t, bt_idx j, const bt_trace *r)
+static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
 {
-    bt_unit *u = &t->units[j];
+    bt_contact *u = &t->contacts[j];
     const double pressure = w->par.raft_sheet * thinner(&w->bodies, u->a, u->b);
     t->limits[j].flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
-void bt_raft_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
+void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->limits[j];
-    const bt_trace names = bt_law_names(w, p, BT_LAW_RAFTING);
+    const bt_memory names = bt_law_names(w, p, BT_LAW_RAFTING);
     const bt_idx at = bt_law_find(t, &names);
     l->trace[BT_LAW_RAFTING] = (int32_t)at;
     if (m->n_points == 0) {
@@ -140,17 +140,17 @@ void bt_raft_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, co
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-bool bt_raft_gives_way(const bt_unit *u, const bt_limit *l, int i) { return u->ln[i] >= l->cap[i]; }
+bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->cap[i]; }
 
-void bt_raft_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals)
+void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {
-    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contacts_normal_work(w, &t->units[j], i));
+    bt_sum_add(&totals->sum[BT_RAFT_EDGE_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
 }
 
 /// A pair that gives way for the first time has a record from now on; sheets leave their friction in it.
-double bt_raft_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
+double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
-    const bt_unit *u = &t->units[j];
+    const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->limits[j];
     const bt_idx at = l->trace[BT_LAW_RAFTING];
     if (u->n == 0) {
@@ -162,7 +162,7 @@ double bt_raft_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals)
     bool begins = false;
     for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && bt_raft_gives_way(u, l, i));
     if (!begins || at >= 0) return 0;
-    bt_trace r = bt_law_names(w, &t->pairs[t->gaps[j].pair], BT_LAW_RAFTING);
+    bt_memory r = bt_law_names(w, &t->pairs[t->gaps[j].pair], BT_LAW_RAFTING);
     r.n_points = 2;
     bt_law_put(t, -1, &r);
     return 0;

@@ -32,11 +32,11 @@
 // Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they overlap,
 // friction of at most
 //     R = μ (ρ_w − ρ_i) g h A Δt
-// acts against sliding at the centroid of the overlap: two components, |λ| <= R, a disc. It is a unit of its own
-// without contact points (bt_unit.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0] of
+// acts against sliding at the centroid of the overlap: two components, |λ| <= R, a disc. It is a contact of its own
+// without contact points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0] of
 // its bounds. Its update is one step of
 //     λ <- proj_R(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
-// which is exact for floes without arms and never overshoots. Rejected: more unknowns in the unit of the edge, whose
+// which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, whose
 // three cache lines all sweeps over rigid ice read.
 //
 // The conservative part of the edge load pushes sheets apart; friction holds them from an overlap of (ρ_i/ρ_w) h/μ on,
@@ -58,12 +58,12 @@
 // The rafting law's row in the table (contact/law.h). Its record: A*, A (m²), friction along x and y (N s).
 bool bt_raft_on(const bt_params *p);
 bool bt_raft_applies(const bt_world *w, bt_idx a, bt_idx b);
-bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_trace *r, bt_manifold *edge, bt_manifold *sheets);
-void bt_raft_bound(const bt_world *w, bt_tile *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
-bool bt_raft_keeps(const bt_world *w, bt_trace *r);
-bool bt_raft_gives_way(const bt_unit *u, const bt_limit *l, int i);
-void bt_raft_give_way(bt_world *w, bt_tile *t, bt_idx j, int i, bt_totals *totals);
-double bt_raft_remember(bt_world *w, bt_tile *t, bt_idx j, bt_totals *totals);
-double bt_raft_count(const bt_world *w, const bt_trace *r, bt_totals *totals);
+bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt_manifold *edge, bt_manifold *sheets);
+void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m);
+bool bt_raft_keeps(const bt_world *w, bt_memory *r);
+bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i);
+void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals);
+double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals);
+double bt_raft_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
 
 #endif

@@ -9,19 +9,19 @@
 static bt_vel velocity_without_contacts(const bt_world *w, bt_idx i)
 {
     bt_vel v = w->bodies.vel_free[i];
-    if (i >= w->tiles->n_tiled && i == bt_world_towed(w) && bt_tow_has_line(w->tow))
+    if (i >= w->cells->n_in_cells && i == bt_world_towed(w) && bt_tow_has_line(w->tow))
         bt_tow_apply(w->tow, &v, w->bodies.inv[i]);
     return v;
 }
 
-double bt_contacts_normal_work(const bt_world *w, const bt_unit *u, int i)
+double bt_contacts_normal_work(const bt_world *w, const bt_contact *u, int i)
 {
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
     return 0.5 * u->ln[i] *
            (bt_normal_velocity(u, i, &fa, &fb) + bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]));
 }
 
-double bt_contacts_work(const bt_world *w, const bt_unit *u)
+double bt_contacts_work(const bt_world *w, const bt_contact *u)
 {
     const bt_vel fa = velocity_without_contacts(w, u->a), fb = velocity_without_contacts(w, u->b);
     const bt_vel *va = &w->bodies.vel[u->a], *vb = &w->bodies.vel[u->b];

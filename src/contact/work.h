@@ -3,14 +3,14 @@
 #ifndef BERGTOW_WORK_H
 #define BERGTOW_WORK_H
 
-#include "space/tiles.h"
+#include "space/cells.h"
 
-/// Work of the impulses of unit u in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
+/// Work of the impulses of contact u in this step, Σ λ·½(w* + w2), J: the change of kinetic energy they cause, less
 /// the work of prescribed motion. w* is the velocity without contacts, with the tow line's impulse: of two impulses
 /// that act at once the line's comes first, or the pull of the line into the ice would count as work of the ice.
-double bt_contacts_work(const bt_world *w, const bt_unit *u);
+double bt_contacts_work(const bt_world *w, const bt_contact *u);
 
 /// The part of it of the normal impulse of point i, J.
-double bt_contacts_normal_work(const bt_world *w, const bt_unit *u, int i);
+double bt_contacts_normal_work(const bt_world *w, const bt_contact *u, int i);
 
 #endif

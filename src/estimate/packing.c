@@ -26,18 +26,23 @@ bt_packing bt_packing_of(const bt_case *c, double concentration)
     const double ux = cos(c->tow.direction), uy = sin(c->tow.direction), yaw = c->body.yaw;
     const bool x = fabs(ux) >= fabs(uy);
     const bool wall = (x ? c->domain.ends : c->domain.sides) == BT_BOUND_WALL;
-    if (!n || !wall || !(concentration > 0) || c->tow.mode == BT_TOW_NONE || c->tow.n_waypoints > 0 || c->lead.mode != BT_LEAD_NONE) return p;
+    if (!n || !wall || !(concentration > 0) || c->tow.mode == BT_TOW_NONE || c->tow.n_waypoints > 0 ||
+        c->lead.mode != BT_LEAD_NONE)
+        return p;
     if (fabs(x ? ux : uy) < ALONG) return p;
     // Along the axis s = x or y, in the sense of the tow: bow, wall, end of the ice.
     const double sign = (x ? ux : uy) > 0 ? 1 : -1, at = x ? c->body.x : c->body.y;
     double bow = -INFINITY;
     for (int i = 0; i < n; i++) {
-        const double wx = cos(yaw) * v[2 * i] - sin(yaw) * v[2 * i + 1], wy = sin(yaw) * v[2 * i] + cos(yaw) * v[2 * i + 1];
+        const double wx = cos(yaw) * v[2 * i] - sin(yaw) * v[2 * i + 1],
+                     wy = sin(yaw) * v[2 * i] + cos(yaw) * v[2 * i + 1];
         bow = bt_max(bow, sign * (at + (x ? wx : wy)));
     }
-    const double low = x ? c->domain.x0 : c->domain.y0, length = x ? c->domain.length : c->domain.width, W = x ? c->domain.width : c->domain.length;
+    const double low = x ? c->domain.x0 : c->domain.y0, length = x ? c->domain.length : c->domain.width,
+                 W = x ? c->domain.width : c->domain.length;
     const double ice_low = x ? c->ice.x_min : c->ice.y_min, ice_high = x ? c->ice.x_max : c->ice.y_max;
-    const double L = (sign > 0 ? low + length : -low) - bow, ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high : -ice_low) - bow));
+    const double L = (sign > 0 ? low + length : -low) - bow,
+                 ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high : -ice_low) - bow));
     const double ahead = c->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, cos(ahead), sin(ahead)));
     const double room = W * (p.packed * L - concentration * ice), taken = p.packed * W - concentration * (W - b);
     p.way = room <= 0 ? 0 : room / taken;
@@ -50,10 +55,17 @@ void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings)
 {
     if (!(end > BT_PACKING_EARLY * p->time)) return;
     if (p->time == 0)
-        bt_errors_add(warnings, "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the start: the resistance is also a property of "
-                      "the domain's length; take domain.ends: open, periodic or moving where no wall is meant", p->packed);
+        bt_errors_add(warnings,
+                      "domain.length: ice as dense as this (estimate.phi_j %g) is packed up to the wall ahead from the "
+                      "start: the resistance is also a property of "
+                      "the domain's length; take domain.ends: open, periodic or moving where no wall is meant",
+                      p->packed);
     else
-        bt_errors_add(warnings, "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest (estimate: the ice of the body's track, packed to "
-                      "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a property of the domain's length; end the run before, "
-                      "or take a longer domain", p->time, BT_PACKING_EARLY * p->time, p->packed, end);
+        bt_errors_add(warnings,
+                      "domain.length: the packed ice ahead reaches the wall at about %.3g s, %.3g s at the earliest "
+                      "(estimate: the ice of the body's track, packed to "
+                      "%g over the width of the domain), and the end is at %g s: from then on the resistance is also a "
+                      "property of the domain's length; end the run before, "
+                      "or take a longer domain",
+                      p->time, BT_PACKING_EARLY * p->time, p->packed, end);
 }

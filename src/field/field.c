@@ -112,13 +112,14 @@ static int by_code(const void *a, const void *b)
     return (p->i > q->i) - (p->i < q->i);
 }
 
-void bt_field_sort(bt_field *f, const bt_yard *y)
+void bt_field_sort(bt_field *f, const bt_region *y)
 {
     double side = bt_max(y->x1 - y->x0, y->y1 - y->y0);
     key *order = bt_alloc((size_t)f->n, sizeof *order);
     for (bt_idx i = 0; i < f->n; i++) {
         double u = (f->pose[3 * i] - y->x0) / side, w = (f->pose[3 * i + 1] - y->y0) / side;
-        uint64_t a = (uint64_t)(bt_min(bt_max(u, 0), 1) * 0xffffffff), b = (uint64_t)(bt_min(bt_max(w, 0), 1) * 0xffffffff);
+        uint64_t a = (uint64_t)(bt_min(bt_max(u, 0), 1) * 0xffffffff),
+                 b = (uint64_t)(bt_min(bt_max(w, 0), 1) * 0xffffffff);
         order[i] = (key){spread_bits(a) | spread_bits(b) << 1, i};
     }
     qsort(order, (size_t)f->n, sizeof *order, by_code);

@@ -21,7 +21,8 @@ void bt_refuse(bt_refusals *r, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    if (r->said++ == BT_MOST_MESSAGES) bt_errors_add(r->err, "%s: more of the same; only the first %d are shown", r->path, BT_MOST_MESSAGES);
+    if (r->said++ == BT_MOST_MESSAGES)
+        bt_errors_add(r->err, "%s: more of the same; only the first %d are shown", r->path, BT_MOST_MESSAGES);
     else bt_errors_add(r->err, "%s: %s", r->path, text);
 }
 
@@ -56,9 +57,12 @@ static bool smooth(int *n, double *v, bt_outline_counts *counts)
 
 const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outline_counts *counts)
 {
-    // A hull needs no more of the outline than that it goes once round an area; it may have fewer vertices than the outline.
+    // A hull needs no more of the outline than that it goes once round an area; it may have fewer vertices than the
+    // outline.
     const bool many = *n > BT_MAX_VERTICES && nonconvex == BT_NONCONVEX_HULL;
-    const char *fault = !many ? bt_outline_fault(*n, v) : bt_outline_crosses(*n, v) ? "its edges cross or touch each other" : NULL;
+    const char *fault = !many                       ? bt_outline_fault(*n, v)
+                        : bt_outline_crosses(*n, v) ? "its edges cross or touch each other"
+                                                    : NULL;
     if (fault) return fault;
     if (!many && bt_outline_convex(*n, v)) return NULL;
     switch (nonconvex) {
@@ -76,7 +80,8 @@ const char *bt_outline_admit(bt_nonconvex nonconvex, int *n, double *v, bt_outli
     }
     case BT_NONCONVEX_SPLIT: {
         bt_parts p;
-        if (!bt_outline_split(*n, v, &p)) return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
+        if (!bt_outline_split(*n, v, &p))
+            return "it cannot be cut into convex parts: edges almost touch; move its vertices apart, or simplify it";
         counts->split++;
         counts->parts += p.n;
         return NULL;
@@ -141,8 +146,9 @@ static void visit(void *context, bt_idx i, bt_idx j, double dx, double dy)
     if (!(deepest > p->allowed)) return;
     p->overlapping++;
     p->deepest = bt_max(p->deepest, deepest);
-    bt_refuse(p->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s", p->noun, (int)(i < j ? i : j), p->noun,
-              (int)(i < j ? j : i), deepest, p->allowed, p->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
+    bt_refuse(p->r, "%s %d and %s %d overlap by %.3g m (allowed: %.3g m); move or shrink one of them%s", p->noun,
+              (int)(i < j ? i : j), p->noun, (int)(i < j ? j : i), deepest, p->allowed,
+              p->f->outlines.hulled ? ", or set ice.nonconvex: split, if it is their hulls that overlap" : "");
 }
 
 static void check_bounds(const bt_case *c, const place *p, bt_idx i)
@@ -158,21 +164,25 @@ static void check_bounds(const bt_case *c, const place *p, bt_idx i)
             low[a] = bt_min(low[a], q), high[a] = bt_max(high[a], q);
         }
     if (low[0] < c->domain.x0 - slack || high[0] > x1 + slack)
-        bt_refuse(p->r, "%s %d, x %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge the domain", p->noun, (int)i,
-                  low[0], high[0], c->domain.x0, x1);
+        bt_refuse(p->r,
+                  "%s %d, x %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
+                  "the domain",
+                  p->noun, (int)i, low[0], high[0], c->domain.x0, x1);
     else if (low[1] < c->domain.y0 - slack || high[1] > y1 + slack)
-        bt_refuse(p->r, "%s %d, y %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge the domain", p->noun, (int)i,
-                  low[1], high[1], c->domain.y0, y1);
+        bt_refuse(p->r,
+                  "%s %d, y %g to %g m, is outside the domain, %g to %g m; take it out, move the outlines, or enlarge "
+                  "the domain",
+                  p->noun, (int)i, low[1], high[1], c->domain.y0, y1);
 }
 
 /// Ready for pairs of floes of f, wherever in the domain they lie.
-static void begin_places(place *p, bt_yard *y, const bt_case *c, const bt_field *f)
+static void begin_places(place *p, bt_region *y, const bt_case *c, const bt_field *f)
 {
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
     bt_errors ignored = {0}; // no room for ice is told by the reader
-    bt_yard_init(y, &whole, 0, &ignored);
+    bt_region_init(y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
     double size = 0;
@@ -188,22 +198,24 @@ static void begin_places(place *p, bt_yard *y, const bt_case *c, const bt_field 
     }
 }
 
-static void check_pairs(place *p, const bt_yard *y)
+static void check_pairs(place *p, const bt_region *y)
 {
     bt_field_visit_pairs(y, p->f, p->outline, 1, visit, p);
     if (p->overlapping <= 1) return;
     // A line of its own, whatever has been told one by one.
-    bt_errors_add(p->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", p->r->path, (long long)p->overlapping, p->noun, p->deepest);
+    bt_errors_add(p->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", p->r->path, (long long)p->overlapping,
+                  p->noun, p->deepest);
 }
 
 /// Floes in the towed body or a floe given by hand.
-static void check_obstacles(const place *p, const bt_yard *y)
+static void check_obstacles(const place *p, const bt_region *y)
 {
     const bt_field *f = p->f;
     for (bt_idx i = 0; i < f->n; i++) {
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
-        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++) radius = bt_max(radius, hypot(p->outline[2 * k], p->outline[2 * k + 1]));
-        bt_yard_wrap(y, &x, &z);
+        for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
+            radius = bt_max(radius, hypot(p->outline[2 * k], p->outline[2 * k + 1]));
+        bt_region_wrap(y, &x, &z);
         for (int o = 0; o < y->n_obstacles; o++) {
             const bt_obstacle *b = &y->obstacles[o];
             if (hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
@@ -211,8 +223,10 @@ static void check_obstacles(const place *p, const bt_yard *y)
             for (int k = 0; k < b->n; k++) rel.v[2 * k] = b->v[2 * k] - b->x, rel.v[2 * k + 1] = b->v[2 * k + 1] - b->y;
             const double depth = depth_in(p, i, rel.n, rel.v, b->x - x, b->y - z);
             if (depth > p->allowed)
-                bt_refuse(p->r, "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it out, or move the body", p->noun, (int)i,
-                          depth, p->allowed);
+                bt_refuse(p->r,
+                          "%s %d lies %.3g m deep in the towed body or a floe given by hand (allowed: %.3g m); take it "
+                          "out, or move the body",
+                          p->noun, (int)i, depth, p->allowed);
         }
     }
 }
@@ -221,7 +235,7 @@ static void check_places(const bt_case *c, const bt_field *f, const char *noun, 
 {
     double *outline = bt_field_outlines(f);
     place p = {.f = f, .outline = outline, .noun = noun, .r = r};
-    bt_yard y;
+    bt_region y;
     for (bt_idx i = 0; i < f->n; i++) check_bounds(c, &p, i);
     begin_places(&p, &y, c, f);
     check_pairs(&p, &y);
@@ -229,9 +243,15 @@ static void check_places(const bt_case *c, const bt_field *f, const char *noun, 
     for (bt_idx i = 0; i < f->n; i++) free(p.parts[i]);
     free(p.parts);
     free(outline);
-    bt_yard_free(&y);
+    bt_region_free(&y);
 }
 
-void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r) { check_places(c, f, noun, false, r); }
+void bt_field_check_apart(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+{
+    check_places(c, f, noun, false, r);
+}
 
-void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r) { check_places(c, f, noun, true, r); }
+void bt_field_check_places(const bt_case *c, const bt_field *f, const char *noun, bt_refusals *r)
+{
+    check_places(c, f, noun, true, r);
+}

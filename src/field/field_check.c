@@ -15,7 +15,8 @@ static void depth_of_pair(void *context, bt_idx i, bt_idx j, double dx, double d
 {
     depth_search *s = context;
     const int64_t *o = s->f->offsets;
-    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]), s->outline + 2 * o[j], dx, dy);
+    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]),
+                             s->outline + 2 * o[j], dx, dy);
     s->deepest = bt_max(s->deepest, -a.gap);
 }
 
@@ -25,9 +26,9 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_yard y;
+    bt_region y;
     bt_errors ignored = {0};
-    bt_yard_init(&y, &whole, 0, &ignored);
+    bt_region_init(&y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
     double *outline = bt_field_outlines(f);
@@ -44,7 +45,7 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
             if (c->domain.sides == BT_BOUND_WALL)
                 s.deepest = bt_max(s.deepest, bt_max(y.y0 - (z + v[2 * k + 1]), z + v[2 * k + 1] - y.y1));
         }
-        bt_yard_wrap(&y, &x, &z);
+        bt_region_wrap(&y, &x, &z);
         for (int o = 0; o < y.n_obstacles; o++) {
             const bt_obstacle *b = &y.obstacles[o];
             double dx = b->x - x, dy = b->y - z, reach = radius + b->radius, rel[2 * BT_MAX_VERTICES];
@@ -54,6 +55,6 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
         }
     }
     free(outline);
-    bt_yard_free(&y);
+    bt_region_free(&y);
     return s.deepest;
 }

@@ -8,9 +8,10 @@
 //     /floes/area       [n]     m², optional when read
 //     /floes            attributes ice_area m² (what concentration refers to), concentration, n_floes
 //     /case             the resolved case the field was made from
-// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a seal (seal.h): of such a file
-// any damage is refused before HDF5, which crashes on some, reads a byte. A file without one, made by h5py say, is let through to the
-// checks of its values; what damage does to HDF5 itself it cannot be kept from.
+// A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a
+// checksum (checksum.h): of such a file any damage is refused before HDF5, which crashes on some, reads a byte. A file
+// without one, made by h5py say, is let through to the checks of its values; what damage does to HDF5 itself it cannot
+// be kept from.
 #include <errno.h>
 #include <hdf5.h>
 #include <math.h>
@@ -27,7 +28,7 @@
 #include "base/h5util.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 // ---- write ----
 
@@ -66,7 +67,7 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         free(text);
         bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h);
-        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_FIELD, err);
+        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_FIELD, err);
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
@@ -83,7 +84,8 @@ typedef struct reader {
     bt_refusals r;
 } reader;
 
-// Whole dataset of doubles or 64-bit integers with `width` columns (0: rank 1); NULL after a refusal. *rows: its length.
+// Whole dataset of doubles or 64-bit integers with `width` columns (0: rank 1); NULL after a refusal. *rows: its
+// length.
 static void *read_dataset(reader *r, const char *name, bool integers, hsize_t width, hsize_t most, hsize_t *rows)
 {
     if (r->r.status != BT_OK) return NULL;
@@ -99,9 +101,12 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
     int rank = H5Sget_simple_extent_dims(space, dims, NULL), wanted = width ? 2 : 1;
     bool counts = class == H5T_INTEGER, numbers = counts || class == H5T_FLOAT;
     if (integers ? !counts : !numbers) {
-        bt_refuse(&r->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers", integers ? "int64" : "float64");
+        bt_refuse(&r->r, "dataset %s: holds no %s; store it as %s", name, integers ? "integers" : "numbers",
+                  integers ? "int64" : "float64");
     } else if (rank != wanted || (width && dims[1] != width)) {
-        if (width) bt_refuse(&r->r, "dataset %s: must have two dimensions, the second of %llu", name, (unsigned long long)width);
+        if (width)
+            bt_refuse(&r->r, "dataset %s: must have two dimensions, the second of %llu", name,
+                      (unsigned long long)width);
         else bt_refuse(&r->r, "dataset %s: must have one dimension", name);
     } else if (dims[0] > most) {
         bt_refuse(&r->r, "dataset %s: %llu rows are more than %llu; the file is damaged or too large", name,
@@ -109,7 +114,8 @@ static void *read_dataset(reader *r, const char *name, bool integers, hsize_t wi
     } else {
         *rows = dims[0];
         data = bt_alloc((size_t)(dims[0] * (width ? width : 1)) + 1, 8);
-        if (dims[0] > 0 && H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
+        if (dims[0] > 0 &&
+            H5Dread(d, integers ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) < 0)
             bt_refuse(&r->r, "dataset %s: cannot be read: the file is cut off or damaged; write it anew", name);
     }
     H5Tclose(type);
@@ -146,13 +152,16 @@ static void check_offsets(reader *r, const int64_t *offsets, hsize_t n, hsize_t 
     for (hsize_t i = 0; i < n && r->r.status == BT_OK; i++) {
         int64_t a = offsets[i], b = offsets[i + 1];
         if (a < 0 || b <= a || (hsize_t)b > n_vertices)
-            bt_refuse(&r->r, "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
-                   (unsigned long long)i, (long long)a, (long long)b, (unsigned long long)n_vertices);
+            bt_refuse(&r->r,
+                      "floe %llu: offsets %lld to %lld are refused: they must rise and stay within the %llu vertices",
+                      (unsigned long long)i, (long long)a, (long long)b, (unsigned long long)n_vertices);
         else if (b - a > BT_MAX_VERTICES)
-            bt_refuse(&r->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a), BT_MAX_VERTICES);
+            bt_refuse(&r->r, "floe %llu: has %lld vertices, more than %d", (unsigned long long)i, (long long)(b - a),
+                      BT_MAX_VERTICES);
     }
     if (r->r.status == BT_OK && (hsize_t)offsets[n] != n_vertices)
-        bt_refuse(&r->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld", (unsigned long long)n_vertices, (long long)offsets[n]);
+        bt_refuse(&r->r, "dataset /floes/vertices: has %llu rows, the offsets end at %lld",
+                  (unsigned long long)n_vertices, (long long)offsets[n]);
 }
 
 static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *stored_area)
@@ -179,7 +188,8 @@ static void check_floe(reader *r, const bt_field *f, bt_idx i, const double *sto
 static void same_length(reader *r, const char *name, hsize_t rows, hsize_t n)
 {
     if (r->r.status == BT_OK && rows != n)
-        bt_refuse(&r->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows, (unsigned long long)n);
+        bt_refuse(&r->r, "dataset %s: has %llu rows for %llu floes", name, (unsigned long long)rows,
+                  (unsigned long long)n);
 }
 
 static void read_floes(reader *r, bt_field *f)
@@ -187,7 +197,8 @@ static void read_floes(reader *r, bt_field *f)
     hsize_t n_offsets = 0, n_vertices = 0, n_pose = 0, n_thickness = 0, n_area = 0;
     bt_field_free(f);
     f->offsets = read_dataset(r, "/floes/offsets", true, 0, BT_MOST_FLOES + 1, &n_offsets);
-    if (r->r.status == BT_OK && n_offsets < 1) bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
+    if (r->r.status == BT_OK && n_offsets < 1)
+        bt_refuse(&r->r, "dataset /floes/offsets: is empty; even a field without floes has the entry 0");
     hsize_t n = n_offsets ? n_offsets - 1 : 0;
     f->vertices = read_dataset(r, "/floes/vertices", false, 2, BT_MAX_VERTICES * n, &n_vertices);
     check_offsets(r, f->offsets, n, n_vertices);
@@ -245,12 +256,15 @@ static void take_hulls(bt_field *f)
     *f = g;
 }
 
-bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err) { return bt_field_read_as(f, path, BT_NONCONVEX_REFUSE, err); }
+bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
+{
+    return bt_field_read_as(f, path, BT_NONCONVEX_REFUSE, err);
+}
 
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     bool bare;
-    const bt_status sealed = bt_seal_check(path, BT_SEAL_FIELD, &bare, err);
+    const bt_status sealed = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
     if (sealed != BT_OK) return sealed;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     if (H5Fis_hdf5(path) <= 0) {

@@ -3,9 +3,9 @@
 //
 // Floes are drawn from the size law until their areas fill concentration × ice area; a common factor (near 1) makes it
 // exact. Cells (tessellation, sawn strips) fill the region in the same proportions. A floe is its cell scaled about the
-// centroid, so cells prove that floes do not overlap before the shake; after it, separating axes do. Regular polygons do not
-// fill their cells: they grow from where they fit, in stages between shakes (after Lubachevsky & Stillinger 1990, J. Stat.
-// Phys. 60).
+// centroid, so cells prove that floes do not overlap before the shake; after it, separating axes do. Regular polygons
+// do not fill their cells: they grow from where they fit, in stages between shakes (after Lubachevsky & Stillinger
+// 1990, J. Stat. Phys. 60).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,18 +29,23 @@ static bt_status cannot_pack(const bt_case *c, double reached, bt_errors *err)
 {
     static const char *const names[] = {[BT_ICE_VORONOI] = "voronoi floes", [BT_ICE_RECTANGLES] = "rectangles",
                                         [BT_ICE_POLYGONS] = "regular polygons"};
-    bt_errors_add(err, "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
-                  "ice.shape, size or region", path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
+    bt_errors_add(
+        err,
+        "%s: ice.concentration: cannot pack %s to %g in this region; ask for at most about %.2f, or choose another "
+        "ice.shape, size or region",
+        path_of(c), names[c->ice.shape], c->ice.concentration, floor(reached * 99) / 100);
     return BT_ERR_CASE;
 }
 
 // Target areas of all floes, m²; [*n], caller frees.
-static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n, bt_errors *err)
+static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted, double **target, bt_idx *n,
+                              bt_errors *err)
 {
     double expected = wanted / bt_sizes_mean_area(s);
     if (expected > BT_MOST_FLOES) {
-        bt_errors_add(err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
-                      path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
+        bt_errors_add(
+            err, "%s: ice.size: %g m makes about %.3g floes, more than %d; ask for larger floes or a smaller region",
+            path_of(c), bt_sizes_mean(s), expected, BT_MOST_FLOES);
         return BT_ERR_CASE;
     }
     size_t cap = 64;
@@ -56,8 +61,11 @@ static bt_status draw_targets(const bt_case *c, const bt_sizes *s, double wanted
         if (sum >= wanted) break;
     }
     if (sum > 2 * wanted) {
-        bt_errors_add(err, "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
-                      "a larger region, or ice.concentration: 0", path_of(c), bt_sizes_mean(s), wanted);
+        bt_errors_add(
+            err,
+            "%s: ice.size: one floe of %g m is larger than all the ice asked for (%g m²); ask for smaller floes, "
+            "a larger region, or ice.concentration: 0",
+            path_of(c), bt_sizes_mean(s), wanted);
         free(*target);
         return BT_ERR_CASE;
     }
@@ -72,7 +80,7 @@ static double total_area(const bt_field *f)
     return sum;
 }
 
-static double mean_gap(const bt_yard *y, const bt_field *f, double *size)
+static double mean_gap(const bt_region *y, const bt_field *f, double *size)
 {
     double d = 0, area = total_area(f);
     for (bt_idx i = 0; i < f->n; i++) d += 2 * sqrt(f->area[i] / BT_PI) / f->n;
@@ -84,30 +92,30 @@ static double mean_gap(const bt_yard *y, const bt_field *f, double *size)
 }
 
 // Cells of the case's kind. wanted: area of all floes, m².
-static bt_cells make_cells(const bt_case *c, const bt_yard *y, bt_idx n, const double *target, double wanted)
+static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n, const double *target, double wanted)
 {
-    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_cells_tessellate(y, n, target, c->ice.seed);
+    if (c->ice.shape != BT_ICE_RECTANGLES) return bt_tessellation_tessellate(y, n, target, c->ice.seed);
     double aspect = c->ice.aspect > 0 ? bt_max(c->ice.aspect, 1 / c->ice.aspect) : 1;
     // Around an obstacle rectangles stay rectangles, unless that wastes too much water.
     for (int effort = 0;; effort++) {
-        bt_cells cells = bt_cells_saw(y, n, target, aspect, c->ice.seed, effort);
+        bt_tessellation cells = bt_tessellation_saw(y, n, target, aspect, c->ice.seed, effort);
         double fill = 0;
         for (bt_idx i = 0; i < cells.n; i++) fill += bt_shape_moments(cells.nv[i], cells.v[i]).area;
         if (y->n_obstacles == 0 || effort == 2 || fill > 1.003 * wanted) return cells;
-        bt_cells_free(&cells);
+        bt_tessellation_free(&cells);
     }
 }
 
 // One floe a cell, each its cell shrunk to its target area; what does not fit is made up by all.
-static bt_status floes_from_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
-                                  bt_errors *err)
+static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
+                                  bt_field *f, bt_errors *err)
 {
     double *room = bt_alloc((size_t)cells->n, sizeof *room);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
         bt_idx k = f->n;
         bt_field_add(f, cells->nv[i], cells->v[i], 0, 0, 0, 0);
-        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         double s = sqrt(cells->target[i] / f->area[k]);
         bt_field_scale(f, k, s);
         room[k] = (1 - 1e-6) / s;
@@ -132,8 +140,8 @@ static double fit_into(int nc, const double *cell, double x, double y, int n, co
 }
 
 // Regular polygons where they fit in their cells, then grown between shakes until every one has its target area.
-static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_cells *cells, double wanted, bt_field *f,
-                                   bt_errors *err)
+static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
+                                   bt_field *f, bt_errors *err)
 {
     int sides = (int)c->ice.sides;
     if (c->ice.sides < 3 || c->ice.sides > 32) {
@@ -155,14 +163,14 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
         bt_shape_regular(sides, goal[k], v);
         double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, cos(yaw), sin(yaw));
         bt_field_add(f, sides, v, m.cx, m.cy, yaw, 0);
-        bt_yard_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
+        bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         bt_field_scale(f, k, bt_min(1, 0.999 * t));
     }
     bt_status status = BT_OK;
     double best_area = 0, best_least = 0;
     int idle = 0;
     for (int stage = 1; status == BT_OK; stage++) {
-        bt_field_room(y, f, 2, room);
+        bt_field_growth(y, f, 2, room);
         double least = 1; // part of its goal that the smallest floe has
         for (bt_idx i = 0; i < f->n; i++) {
             if (room[i] < 1) bt_field_scale(f, i, TOUCH * room[i]);
@@ -180,8 +188,8 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
         }
         double size, gap = mean_gap(y, f, &size);
         for (bt_idx i = 0; i < f->n; i++) {
-            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so that
-            // grown floes do not trap it.
+            // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so
+            // that grown floes do not trap it.
             bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (room[i] - 1))));
         }
         status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
@@ -192,23 +200,25 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_yard *y, const bt_
 }
 
 // Take out what overlap the shake has left, and bring the area back to what was asked.
-static bt_status settle(const bt_case *c, const bt_yard *y, bt_field *f, double wanted, bt_errors *err)
+static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, double wanted, bt_errors *err)
 {
     double *room = bt_alloc((size_t)f->n, sizeof *room);
-    bt_field_room(y, f, 1.2, room);
+    bt_field_growth(y, f, 1.2, room);
     bt_status status = BT_OK;
     for (bt_idx i = 0; i < f->n && status == BT_OK; i++) {
         room[i] *= TOUCH;
         if (room[i] > 0.9) continue;
-        bt_errors_add(err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
-                      path_of(c), (long long)i);
+        bt_errors_add(
+            err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
+            path_of(c), (long long)i);
         status = BT_ERR_NUMERIC;
     }
     if (status == BT_OK) {
         double reached = bt_field_fit(f, room, wanted);
         if (reached < 0.995 * wanted) {
-            bt_errors_add(err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
-                          path_of(c), reached / y->ice_area, wanted / y->ice_area);
+            bt_errors_add(
+                err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
+                path_of(c), reached / y->ice_area, wanted / y->ice_area);
             status = BT_ERR_NUMERIC;
         }
     }
@@ -232,17 +242,17 @@ static void set_thickness(const bt_case *c, bt_field *f)
     for (bt_idx i = 0; i < f->n; i++) f->thickness[i] = bt_field_thickness(c, i);
 }
 
-static bt_status make(const bt_case *c, const bt_yard *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
+static bt_status make(const bt_case *c, const bt_region *y, const bt_sizes *sizes, bt_field *f, bt_errors *err)
 {
     double wanted = c->ice.concentration * y->ice_area, *target;
     bt_idx n;
     bt_status status = draw_targets(c, sizes, wanted, &target, &n, err);
     if (status != BT_OK) return status;
-    bt_cells cells = make_cells(c, y, n, target, wanted);
+    bt_tessellation cells = make_cells(c, y, n, target, wanted);
     free(target);
     status = c->ice.shape == BT_ICE_POLYGONS ? polygons_in_cells(c, y, &cells, wanted, f, err)
                                              : floes_from_cells(c, y, &cells, wanted, f, err);
-    bt_cells_free(&cells);
+    bt_tessellation_free(&cells);
     if (status != BT_OK) return status;
     bt_field_sort(f, y);
     double size, gap = mean_gap(y, f, &size);
@@ -262,12 +272,12 @@ bt_status bt_field_generate(const bt_case *c, bt_field *f, bt_errors *err)
     bt_sizes sizes;
     bt_status status = bt_sizes_init(&sizes, c, err);
     if (status != BT_OK) return status;
-    bt_yard y;
-    status = bt_yard_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
+    bt_region y;
+    status = bt_region_init(&y, c, CLEARANCE * bt_sizes_mean(&sizes), err);
     if (status == BT_OK && c->ice.concentration > 0) status = make(c, &y, &sizes, f, err);
     f->ice_area = y.ice_area;
     f->concentration = y.ice_area > 0 ? total_area(f) / y.ice_area : 0;
-    bt_yard_free(&y);
+    bt_region_free(&y);
     if (status != BT_OK) {
         bt_field_free(f);
         bt_field_init(f);

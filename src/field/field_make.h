@@ -16,20 +16,20 @@ typedef struct bt_obstacle {
 } bt_obstacle;
 
 /// The ice region and what lies in it.
-typedef struct bt_yard {
+typedef struct bt_region {
     double x0, x1, y0, y1;         ///< ice region, m
     bool periodic_x, periodic_y;   ///< the region is the whole of a periodic direction
     double clearance;              ///< water kept between made floes and obstacles, m
     int n_obstacles;               ///< towed body and floes given by hand, with their periodic images
     bt_obstacle *obstacles;
     double ice_area;               ///< region less the obstacles, m²
-} bt_yard;
+} bt_region;
 
 /// Region, obstacles and ice area of a case. clearance: m. Errors: BT_ERR_CASE.
-bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err);
-void bt_yard_free(bt_yard *y);
+bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err);
+void bt_region_free(bt_region *y);
 /// Bring a point into the region along its periodic directions.
-void bt_yard_wrap(const bt_yard *y, double *px, double *py);
+void bt_region_wrap(const bt_region *y, double *px, double *py);
 
 /// Size law with its derived constants; diameters are of the circle of equal area, m.
 typedef struct bt_sizes {
@@ -43,51 +43,53 @@ double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id); ///< diameter
 double bt_sizes_mean(const bt_sizes *s);      ///< E[d], m
 double bt_sizes_mean_area(const bt_sizes *s); ///< (π/4) E[d²], m²
 
-#define BT_CELL_VERTICES 12 ///< most vertices of a made floe
+#define BT_TESSELLATION_VERTICES 12 ///< most vertices of a made floe
 
 /// Convex cells, each holding one floe; n = 0 vertices: no floe.
-typedef struct bt_cells {
+typedef struct bt_tessellation {
     bt_idx n;
     int *nv;         ///< [n]
-    double (*v)[2 * BT_CELL_VERTICES]; ///< [n] domain coordinates, m
+    double (*v)[2 * BT_TESSELLATION_VERTICES]; ///< [n] domain coordinates, m
     double *target;  ///< [n] area asked for, m²
-} bt_cells;
+} bt_tessellation;
 
-bt_cells bt_cells_create(bt_idx n);
-void bt_cells_free(bt_cells *c);
+bt_tessellation bt_tessellation_create(bt_idx n);
+void bt_tessellation_free(bt_tessellation *c);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
-bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, int64_t seed);
-/// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside obstacles: 0 keeps
-/// rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
-bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort);
+bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed);
+/// Rectangles sawn from strips along x with areas target[n] × a common factor. effort to fill the water beside
+/// obstacles: 0 keeps rectangles, 1 cuts them along the obstacle, 2 makes small pieces too.
+bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed,
+                                    int effort);
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
-int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed);
+int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed);
 /// Remove short edges and vertices beyond BT_CELL_VERTICES inwards; returns the new count.
-int bt_cell_clean(int n, double *v, double shortest);
+int bt_tessellation_clean(int n, double *v, double shortest);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.
 double *bt_field_outlines(const bt_field *f);
 
-/// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy) points
-/// from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair search.
+/// Calls visit for each pair of floes i, j whose bounding boxes, scaled by `limit` about the centroids, meet; (dx, dy)
+/// points from i to (an image of) j. A pair across a periodic edge comes twice. Independent of the contact code's pair
+/// search.
 typedef void bt_pair_visit(void *context, bt_idx i, bt_idx j, double dx, double dy);
-void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
-                          void *context);
+void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit,
+                          bt_pair_visit *visit, void *context);
 
-/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time, without
-/// touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
-void bt_field_room(const bt_yard *y, const bt_field *f, double limit, double *room);
+/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time,
+/// without touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
+void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room);
 
 /// Scale floe i about its centroid.
 void bt_field_scale(bt_field *f, bt_idx i, double s);
 /// Scale floes by common factors λ <= room so that Σ area = wanted; returns the area reached.
 double bt_field_fit(bt_field *f, const double *room, double wanted);
 /// Sort floes along a Morton curve.
-void bt_field_sort(bt_field *f, const bt_yard *y);
+void bt_field_sort(bt_field *f, const bt_region *y);
 
 /// Move floes about by free flight and elastic collisions over `length` metres of mean path, in steps of `stride` m.
-bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double length, double stride, int64_t stage,
+bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
                          bt_errors *err);
 
 #endif

@@ -3,12 +3,12 @@
 //
 // The project's own contact dynamics without water, friction or loss (e = 1), in closed walls (or periodic), around the
 // fixed obstacles: the hard-particle gas, whose states at given concentration are all equally likely, so the field is
-// random without being any particular construction. Every floe starts with the same energy in each of its freedoms, in a
-// random direction: speed v with v² ∝ 1/area, spin v/(√2 radius of gyration); collisions make the velocities Maxwellian. Equal
-// speeds instead would soon hand the energy of large floes to small ones, which then outrun the step. Units: v = 1 m/s for the
-// floe of median area, mass = area.
-// A step moves a floe by `stride`, the whole shake by `length` on average. Collisions need not be solved to the last digit:
-// a few sweeps do, and what overlap that leaves is pushed out as it comes, and at rest at the end.
+// random without being any particular construction. Every floe starts with the same energy in each of its freedoms, in
+// a random direction: speed v with v² ∝ 1/area, spin v/(√2 radius of gyration); collisions make the velocities
+// Maxwellian. Equal speeds instead would soon hand the energy of large floes to small ones, which then outrun the step.
+// Units: v = 1 m/s for the floe of median area, mass = area.
+// A step moves a floe by `stride`, the whole shake by `length` on average. Collisions need not be solved to the last
+// digit: a few sweeps do, and what overlap that leaves is pushed out as it comes, and at rest at the end.
 #include <math.h>
 #include <omp.h>
 #include <stdlib.h>
@@ -19,13 +19,20 @@
 #include "base/rng.h"
 
 enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
-static const double LARGE = 4; // floes of more than this many mean diameters are in no tile: tiles fit the rest
+static const double LARGE = 4; // floes of more than this many mean diameters are in no cell: cells fit the rest
 
 static void add_static(bt_world *w, int n, double *v)
 {
     bt_moments m = bt_shape_centre(n, v);
-    bt_world_add(w, &(bt_body_def){.motion = BT_STATIC, .large = true, .n_vertices = n, .vertices = v, .x = m.cx, .y = m.cy,
-                                   .mass = 1, .inertia = 1, .restitution = 1});
+    bt_world_add(w, &(bt_body_def){.motion = BT_STATIC,
+                                   .large = true,
+                                   .n_vertices = n,
+                                   .vertices = v,
+                                   .x = m.cx,
+                                   .y = m.cy,
+                                   .mass = 1,
+                                   .inertia = 1,
+                                   .restitution = 1});
 }
 
 static void add_box(bt_world *w, double x0, double x1, double y0, double y1)
@@ -34,9 +41,10 @@ static void add_box(bt_world *w, double x0, double x1, double y0, double y1)
     add_static(w, 4, v);
 }
 
-static void add_surroundings(bt_world *w, const bt_yard *y, double thick)
+static void add_surroundings(bt_world *w, const bt_region *y, double thick)
 {
-    // Walls reach past the corners, and past a periodic edge: a floe that lies across it meets the nearest image of the wall.
+    // Walls reach past the corners, and past a periodic edge: a floe that lies across it meets the nearest image of the
+    // wall.
     if (!y->periodic_x) {
         add_box(w, y->x0 - thick, y->x0, y->y0 - thick, y->y1 + thick);
         add_box(w, y->x1, y->x1 + thick, y->y0 - thick, y->y1 + thick);
@@ -48,7 +56,8 @@ static void add_surroundings(bt_world *w, const bt_yard *y, double thick)
     for (int k = 0; k < y->n_obstacles; k++) {
         // The world makes its own periodic images: only the one at home is a body.
         const bt_obstacle *o = &y->obstacles[k];
-        if ((y->periodic_x && (o->x < y->x0 || o->x >= y->x1)) || (y->periodic_y && (o->y < y->y0 || o->y >= y->y1))) continue;
+        if ((y->periodic_x && (o->x < y->x0 || o->x >= y->x1)) || (y->periodic_y && (o->y < y->y0 || o->y >= y->y1)))
+            continue;
         double v[2 * BT_MAX_VERTICES];
         memcpy(v, o->v, 2 * (size_t)o->n * sizeof *v);
         add_static(w, o->n, v);
@@ -61,7 +70,7 @@ static int ascending(const void *a, const void *b)
     return (*p > *q) - (*p < *q);
 }
 
-bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double length, double stride, int64_t stage,
+bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
                          bt_errors *err)
 {
     if (f->n < 1 || !(length > 0) || !(stride > 0)) return BT_OK;
@@ -88,18 +97,28 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         const double *v = f->vertices + 2 * f->offsets[i];
         bt_moments m = bt_shape_moments(nv, v);
         bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_SHAKE, stage << 32 | i);
-        double speed = sqrt(median / m.area), heading = 2 * BT_PI * bt_rng_uniform(&r), spin = bt_rng_uniform(&r) < 0.5 ? -1 : 1;
+        double speed = sqrt(median / m.area), heading = 2 * BT_PI * bt_rng_uniform(&r),
+               spin = bt_rng_uniform(&r) < 0.5 ? -1 : 1;
         bt_world_add(w, &(bt_body_def){
-            .motion = BT_DYNAMIC, .large = f->area[i] > LARGE * LARGE * BT_PI / 4 * size * size, .n_vertices = nv, .vertices = v,
-            .x = f->pose[3 * i], .y = f->pose[3 * i + 1], .yaw = f->pose[3 * i + 2],
-            .vx = speed * cos(heading), .vy = speed * sin(heading), .yaw_rate = spin * speed * sqrt(m.area / m.polar / 2),
-            .mass = m.area, .inertia = m.polar, .restitution = 1,
-        });
+                            .motion = BT_DYNAMIC,
+                            .large = f->area[i] > LARGE * LARGE * BT_PI / 4 * size * size,
+                            .n_vertices = nv,
+                            .vertices = v,
+                            .x = f->pose[3 * i],
+                            .y = f->pose[3 * i + 1],
+                            .yaw = f->pose[3 * i + 2],
+                            .vx = speed * cos(heading),
+                            .vy = speed * sin(heading),
+                            .yaw_rate = spin * speed * sqrt(m.area / m.polar / 2),
+                            .mass = m.area,
+                            .inertia = m.polar,
+                            .restitution = 1,
+                        });
     }
     add_surroundings(w, y, bt_max(4 * largest, size));
 
-    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a busy
-    // machine. The result does not depend on their number.
+    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a
+    // busy machine. The result does not depend on their number.
     const int threads = omp_get_max_threads();
     if (f->n < FEW) omp_set_num_threads(1);
     double energy = 0;
@@ -122,7 +141,8 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
         for (bt_idx i = 0; i < f->n; i++) {
             const bt_idx at = bt_world_index(w, i);
             w->bodies.vel[at] = (bt_vel){0};
-            w->bodies.stirred[at] = 1; // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
+            // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
+            w->bodies.disturbed[at] = 1;
         }
         bt_world_step(w);
         if (w->stats.overlap <= 3 * par.slop) break;
@@ -132,15 +152,18 @@ bt_status bt_field_shake(const bt_case *c, const bt_yard *y, bt_field *f, double
     for (bt_idx i = 0; i < f->n; i++) {
         const bt_pose *p = &w->bodies.pose[bt_world_index(w, i)];
         if (!isfinite(p->x) || !isfinite(p->y) || !isfinite(p->yaw)) {
-            bt_errors_add(err, "%s: ice field: floe %lld left the numbers while the field was shaken; report this case with its seed, "
-                          "and use ice.shake: 0 meanwhile", c->path ? c->path : "case", (long long)i);
+            bt_errors_add(
+                err,
+                "%s: ice field: floe %lld left the numbers while the field was shaken; report this case with its seed, "
+                "and use ice.shake: 0 meanwhile",
+                c->path ? c->path : "case", (long long)i);
             status = BT_ERR_NUMERIC;
             break;
         }
         f->pose[3 * i] = p->x;
         f->pose[3 * i + 1] = p->y;
         f->pose[3 * i + 2] = remainder(p->yaw, 2 * BT_PI);
-        bt_yard_wrap(y, &f->pose[3 * i], &f->pose[3 * i + 1]);
+        bt_region_wrap(y, &f->pose[3 * i], &f->pose[3 * i + 1]);
     }
     bt_world_free(w);
     return status;

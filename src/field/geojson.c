@@ -67,7 +67,8 @@ static const char *name_of(const json_t *feature, size_t index, char out[96])
     const json_t *id = json_object_get(feature, "id");
     if (!id) id = json_object_get(json_object_get(feature, "properties"), "id");
     if (json_is_string(id)) snprintf(out, 96, "feature %zu (id %.60s)", index, json_string_value(id));
-    else if (json_is_integer(id)) snprintf(out, 96, "feature %zu (id %" JSON_INTEGER_FORMAT ")", index, json_integer_value(id));
+    else if (json_is_integer(id))
+        snprintf(out, 96, "feature %zu (id %" JSON_INTEGER_FORMAT ")", index, json_integer_value(id));
     else snprintf(out, 96, "feature %zu", index);
     return out;
 }
@@ -146,7 +147,8 @@ static survey look_over(bt_features *features, double lon)
         const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
         for (size_t k = 0; ring && k < json_array_size(ring); k++) {
             const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
-            if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon); // others are told with their feature
+            // others are told with their feature
+            if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon);
         }
     }
     return b;
@@ -444,14 +446,14 @@ static void choose_coordinates(reader *s, const json_t *root)
 
 static void set_concentration(reader *s)
 {
-    bt_yard y;
-    const bt_status status = bt_yard_init(&y, s->c, 0, s->r.err);
+    bt_region y;
+    const bt_status status = bt_region_init(&y, s->c, 0, s->r.err);
     if (status != BT_OK) s->r.status = status;
     double sum = 0;
     for (bt_idx i = 0; i < s->f->n; i++) sum += s->f->area[i];
     s->f->ice_area = y.ice_area;
     s->f->concentration = status == BT_OK ? sum / y.ice_area : 0;
-    bt_yard_free(&y);
+    bt_region_free(&y);
 }
 
 /// What the floes are together: far too small or large, they are in other units.
@@ -477,11 +479,13 @@ static void read_features(reader *s, bt_features *features)
     const json_t *root = features->root, *mark = json_object_get(root, "bergtow");
     const char *type = json_string_value(json_object_get(root, "type"));
     if (!type || strcmp(type, "FeatureCollection") || !features->listed) {
-        bt_refuse(&s->r, "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
+        bt_refuse(&s->r,
+                  "is not a GeoJSON FeatureCollection; write {\"type\": \"FeatureCollection\", \"features\": [...]}");
         return;
     }
     if (features->n == 0 || features->n > BT_MOST_FLOES) {
-        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n, BT_MOST_FLOES);
+        bt_refuse(&s->r, "has %zu features; give 1 to %d (open water: ice.concentration: 0)", features->n,
+                  BT_MOST_FLOES);
         return;
     }
     choose_coordinates(s, root);
@@ -549,8 +553,10 @@ static void write_floe(FILE *out, const map *m, bt_idx i)
     const double *p = f->pose + 3 * (size_t)i, c = cos(p[2]), s = sin(p[2]);
     const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
     const bool mirrored = m->c->domain.frame == BT_FRAME_GEOGRAPHIC; // anticlockwise on the map [RFC 7946, 3.1.6]
-    fprintf(out, "%s\n{\"type\":\"Feature\",\"id\":%d,\"properties\":{\"thickness\":%.17g},\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[", i ? "," : "", (int)i,
-            f->thickness[i]);
+    fprintf(out,
+            "%s\n{\"type\":\"Feature\",\"id\":%d,\"properties\":{\"thickness\":%.17g},\"geometry\":{\"type\":"
+            "\"Polygon\",\"coordinates\":[[",
+            i ? "," : "", (int)i, f->thickness[i]);
     for (int64_t k = 0; k <= n; k++) { // the first once more: a ring is closed
         const double *v = f->vertices + 2 * (first + (mirrored ? (2 * n - 1 - k) % n : k % n));
         if (k) fputc(',', out);
@@ -592,7 +598,8 @@ bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const cha
     for (bt_idx i = 0; i < f->n; i++) write_floe(out, &m, i);
     fprintf(out, "\n]}\n");
     const bool whole = fclose(out) == 0;
-    const bt_status status = whole ? bt_file_write(path, text, err) : bt_file_fail(path, "write the outlines", ENOMEM, err);
+    const bt_status status =
+        whole ? bt_file_write(path, text, err) : bt_file_fail(path, "write the outlines", ENOMEM, err);
     free(text);
     return status;
 }

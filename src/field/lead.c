@@ -36,8 +36,11 @@ static strip make_strip(const bt_lead *l)
         const double *p = l->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = hypot(dx, dy);
         if (length > 0) {
             const double ax = 0.5 * dx, ay = 0.5 * dy, bx = -half * dy / length, by = half * dx / length;
-            s.parts[s.n++] = (part){.n = 4, .v = {-ax - bx, -ay - by, ax - bx, ay - by, ax + bx, ay + by, bx - ax, by - ay},
-                                    .x = p[0] + ax, .y = p[1] + ay, .radius = hypot(0.5 * length, half)};
+            s.parts[s.n++] = (part){.n = 4,
+                                    .v = {-ax - bx, -ay - by, ax - bx, ay - by, ax + bx, ay + by, bx - ax, by - ay},
+                                    .x = p[0] + ax,
+                                    .y = p[1] + ay,
+                                    .radius = hypot(0.5 * length, half)};
         }
         if (i == 0) continue;
         part *joint = &s.parts[s.n++];
@@ -76,13 +79,14 @@ static bool overlaps(const strip *s, int n, const double *v, double radius, doub
     return false;
 }
 
-/// Unit vector of the axis of the largest second moment of area about the centroid: along the longer extent. The second moments of
-/// triangle (0, p, q) of area a are a/12 (p p + q q + (p+q)(p+q)).
+/// Unit vector of the axis of the largest second moment of area about the centroid: along the longer extent. The second
+/// moments of triangle (0, p, q) of area a are a/12 (p p + q q + (p+q)(p+q)).
 static void long_axis(int n, const double *v, double axis[2])
 {
     double xx = 0, yy = 0, xy = 0;
     for (int i = 0; i < n; i++) {
-        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0), a = p[0] * q[1] - p[1] * q[0], sx = p[0] + q[0], sy = p[1] + q[1];
+        const double *p = v + 2 * i, *q = v + 2 * (i + 1 < n ? i + 1 : 0), a = p[0] * q[1] - p[1] * q[0],
+                     sx = p[0] + q[0], sy = p[1] + q[1];
         xx += a * (p[0] * p[0] + q[0] * q[0] + sx * sx);
         yy += a * (p[1] * p[1] + q[1] * q[1] + sy * sy);
         xy += a * (p[0] * p[1] + q[0] * q[1] + sx * sy);
@@ -115,7 +119,8 @@ typedef struct {
     bt_field *out;
 } saw;
 
-/// Cut the polygon v (frame of the floe, room for ROOM vertices) until its pieces are small enough, and add them to the field.
+/// Cut the polygon v (frame of the floe, room for ROOM vertices) until its pieces are small enough, and add them to the
+/// field.
 static void cut(const saw *k, int n, const double *v)
 {
     double own[2 * ROOM], world[2 * ROOM], half[2 * ROOM], axis[2];
@@ -143,8 +148,15 @@ static void cut(const saw *k, int n, const double *v)
 static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
 {
     const double *pose = f->pose + 3 * (size_t)i, size = s->l->floe_size;
-    const saw k = {.s = s, .largest = BT_PI / 4 * size * size, .x = pose[0], .y = pose[1], .c = cos(pose[2]), .sine = sin(pose[2]),
-                   .yaw = pose[2], .thickness = f->thickness[i], .out = out};
+    const saw k = {.s = s,
+                   .largest = BT_PI / 4 * size * size,
+                   .x = pose[0],
+                   .y = pose[1],
+                   .c = cos(pose[2]),
+                   .sine = sin(pose[2]),
+                   .yaw = pose[2],
+                   .thickness = f->thickness[i],
+                   .out = out};
     const bt_idx first = out->n;
     cut(&k, (int)(f->offsets[i + 1] - f->offsets[i]), f->vertices + 2 * f->offsets[i]);
     double area = 0;
@@ -178,7 +190,8 @@ static void copy(const bt_field *f, bt_idx i, bt_field *out)
 {
     const int64_t n = f->offsets[i + 1] - f->offsets[i], at = out->offsets[out->n];
     const bt_idx k = out->n;
-    bt_field_add(out, (int)n, f->vertices + 2 * f->offsets[i], f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1], f->pose[3 * (size_t)i + 2], f->thickness[i]);
+    bt_field_add(out, (int)n, f->vertices + 2 * f->offsets[i], f->pose[3 * (size_t)i], f->pose[3 * (size_t)i + 1],
+                 f->pose[3 * (size_t)i + 2], f->thickness[i]);
     // As it was, to the bit: adding has centred it once more.
     memcpy(out->vertices + 2 * at, f->vertices + 2 * f->offsets[i], 2 * (size_t)n * sizeof *f->vertices);
     memcpy(out->pose + 3 * (size_t)k, f->pose + 3 * (size_t)i, 3 * sizeof *f->pose);
@@ -187,17 +200,25 @@ static void copy(const bt_field *f, bt_idx i, bt_field *out)
 
 bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_errors *err)
 {
-    *st = (bt_lead_stats){.mode = l->mode, .width = l->width, .concentration_before = f->concentration, .concentration_after = f->concentration};
-    for (int i = 0; i + 1 < l->n; i++) st->length += hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
+    *st = (bt_lead_stats){.mode = l->mode,
+                          .width = l->width,
+                          .concentration_before = f->concentration,
+                          .concentration_after = f->concentration};
+    for (int i = 0; i + 1 < l->n; i++)
+        st->length += hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
     if (l->mode == BT_LEAD_NONE || f->n == 0) return BT_OK;
     strip s = make_strip(l);
     uint8_t *taken = bt_alloc((size_t)f->n, sizeof *taken);
     mark(&s, f, taken, st);
-    // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger than allowed is cut.
-    const double most = l->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * l->floe_size * l->floe_size) : 0;
+    // A cut through the centroid leaves at least 4/9 of the area on each side (Winternitz), and only what is larger
+    // than allowed is cut.
+    const double most =
+        l->mode == BT_LEAD_MANAGED ? 2.25 * st->area_taken / (BT_PI / 4 * l->floe_size * l->floe_size) : 0;
     bt_status status = BT_OK;
     if (most > BT_MOST_FLOES) {
-        bt_errors_add(err, "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, or a narrower or shorter lead",
+        bt_errors_add(err,
+                      "%s: lead.floe_size: %g m makes up to %.3g pieces, at most %d are simulated; take larger pieces, "
+                      "or a narrower or shorter lead",
                       l->name, l->floe_size, most, BT_MOST_FLOES);
         status = BT_ERR_CASE;
     }
@@ -225,7 +246,8 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
     return status;
 }
 
-/// From the body through the way-points (corners are not rounded), after the last straight on, lead.length in all. Returns the number of points.
+/// From the body through the way-points (corners are not rounded), after the last straight on, lead.length in all.
+/// Returns the number of points.
 static int planned_path(const bt_case *c, double *path)
 {
     double left = c->lead.length, ux = cos(c->tow.direction), uy = sin(c->tow.direction);
@@ -233,7 +255,8 @@ static int planned_path(const bt_case *c, double *path)
     path[0] = c->body.x;
     path[1] = c->body.y;
     for (int k = 0; k < c->tow.n_waypoints && left > 0; k++) {
-        const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1], far = hypot(dx, dy);
+        const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1],
+                     far = hypot(dx, dy);
         if (far == 0) continue;
         ux = dx / far, uy = dy / far;
         const double leg = bt_min(far, left);
@@ -253,7 +276,9 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
     *s = (bt_lead_stats){0};
     if (c->lead.mode == BT_LEAD_NONE) return BT_OK;
     if (f->outlines.split > 0) {
-        bt_errors_add(err, "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set ice.nonconvex to hull, or draw the lead in the file",
+        bt_errors_add(err,
+                      "%s: lead.mode: %lld floes of the field are not convex, and a lead cuts convex ones; set "
+                      "ice.nonconvex to hull, or draw the lead in the file",
                       c->path ? c->path : "case", (long long)f->outlines.split);
         return BT_ERR_CASE;
     }
@@ -280,7 +305,8 @@ bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_error
 void bt_lead_stats_print(const bt_lead_stats *s)
 {
     if (s->mode == BT_LEAD_NONE) return;
-    printf("  lead                %.4g m wide, %.4g m long: %lld floes (%.4g m2) ", s->width, s->length, (long long)s->taken, s->area_taken);
+    printf("  lead                %.4g m wide, %.4g m long: %lld floes (%.4g m2) ", s->width, s->length,
+           (long long)s->taken, s->area_taken);
     if (s->mode == BT_LEAD_CHANNEL) printf("removed");
     else printf("cut into %lld pieces of %.3g m", (long long)s->pieces, s->mean_piece);
     printf("; concentration %.4g, was %.4g\n", s->concentration_after, s->concentration_before);

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Ice management: the lead that a vessel has opened ahead of the towed body, cut into the ice field before the run.
 //
-// The lead is a strip of a width about a polyline, with round joints and square ends. It takes the floes that overlap it, whole ones:
+// The lead is a strip of a width about a polyline, with round joints and square ends. It takes the floes that overlap
+//   it, whole ones:
 //   channel   they are gone
-//   managed   they are cut by straight cuts through the centroid, across their longer extent (the axis of their largest second
-//             moment), until no piece that overlaps the strip has more than the area of a disc of the given diameter. Pieces
-//             that come to lie outside the strip stay as large as they are
-// Why whole floes, and not along the strip's edges: a ship breaks a floe or pushes it away, and does not saw it along its own side.
-// A cut takes a slit of 1e-4 of the piece diameter, so that pieces do not overlap by rounding (assumed); edges shorter than 1 % of a piece are
-// cut off. Pieces are thicker than their floe by what that has cost: mass is kept. Floes given by hand are left as they are.
-// That ice which was there lies elsewhere (under the ice, at the sides of the lead) is not modelled.
+//   managed   they are cut by straight cuts through the centroid, across their longer extent (the axis of their largest
+//             second moment), until no piece that overlaps the strip has more than the area of a disc of the given
+//             diameter. Pieces that come to lie outside the strip stay as large as they are
+// Why whole floes, and not along the strip's edges: a ship breaks a floe or pushes it away, and does not saw it along
+// its own side. A cut takes a slit of 1e-4 of the piece diameter, so that pieces do not overlap by rounding (assumed);
+// edges shorter than 1 % of a piece are cut off. Pieces are thicker than their floe by what that has cost: mass is
+// kept. Floes given by hand are left as they are. That ice which was there lies elsewhere (under the ice, at the sides
+// of the lead) is not modelled.
 #ifndef BERGTOW_LEAD_H
 #define BERGTOW_LEAD_H
 
@@ -38,11 +40,13 @@ typedef struct bt_lead_stats {
     double concentration_before, concentration_after; ///< of the ice region
 } bt_lead_stats;
 
-/// Cut the lead into a field: floes keep their order, pieces stand in the place of their floe. ice_area of the field stays,
-/// its concentration is renewed. Errors: BT_ERR_CASE (more pieces than can be simulated; the field is left as it was).
+/// Cut the lead into a field: floes keep their order, pieces stand in the place of their floe. ice_area of the field
+/// stays, its concentration is renewed. Errors: BT_ERR_CASE (more pieces than can be simulated; the field is left as it
+/// was).
 bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *s, bt_errors *err);
 
-/// The lead of a case, along the planned path of the body; without one (lead.mode none) nothing is done. Errors as above.
+/// The lead of a case, along the planned path of the body; without one (lead.mode none) nothing is done. Errors as
+/// above.
 bt_status bt_lead_open(const bt_case *c, bt_field *f, bt_lead_stats *s, bt_errors *err);
 
 /// One line on stdout, as in the summary; nothing without a lead.

@@ -11,7 +11,8 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 
-// --- a scan over brackets and strings: it never refuses what is JSON, and need not refuse what is none -----------------------
+// --- a scan over brackets and strings: it never refuses what is JSON, and need not refuse what is none
+// -----------------------
 
 /// A stretch of text that is being gone through; p == NULL: it is not what was looked for.
 typedef struct scan { const char *p, *end; } scan;
@@ -91,8 +92,8 @@ enum { MOST_DIGITS = 19 }; // of a number, and of a power of ten, that 64 bits h
 /// w · 10^−k as the nearest double, k up to MOST_DIGITS. False: this needs more bits.
 static bool nearest(uint64_t w, int k, double *x)
 {
-    // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the number itself. By strtod, reading
-    // a number of 17 digits takes twice the instructions.
+    // The quotient in units of 2⁻⁶⁴, its last bit set where there is a rest: with 55 bits and more it is rounded as the
+    // number itself. By strtod, reading a number of 17 digits takes twice the instructions.
     uint64_t power = 1;
     for (int i = 0; i < k; i++) power *= 10;
     const bt_uint128 units = (bt_uint128)w << 64, q = units / power;
@@ -182,10 +183,12 @@ const json_t *bt_features_at(bt_features *f, size_t i)
     if (!f->span) return json_array_get(json_object_get(f->root, "features"), i);
     const bt_feature_span *s = &f->span[i];
     const bool cut = s->cut_end > s->cut;
-    const size_t before = (cut ? s->cut : s->end) - s->begin, after = cut ? s->end - s->cut_end : 0, n = before + after + (cut ? 4 : 0);
+    const size_t before = (cut ? s->cut : s->end) - s->begin, after = cut ? s->end - s->cut_end : 0,
+                 n = before + after + (cut ? 4 : 0);
     const char *head = f->text + s->begin, *tail = f->text + s->cut_end;
     // Features of one program differ in their coordinates, and often in nothing else.
-    if (f->parsed && n == f->n_lean && !memcmp(f->lean, head, before) && (!cut || (!memcmp(f->lean + before, "null", 4) && !memcmp(f->lean + before + 4, tail, after))))
+    if (f->parsed && n == f->n_lean && !memcmp(f->lean, head, before) &&
+        (!cut || (!memcmp(f->lean + before, "null", 4) && !memcmp(f->lean + before + 4, tail, after))))
         return f->parsed;
     if (n > f->cap_lean) f->lean = bt_realloc(f->lean, f->cap_lean = 2 * n, 1);
     f->n_lean = n;
@@ -219,7 +222,8 @@ static void cut_ring(bt_features *f, bt_feature_span *s)
         if (!take_ring(f, &c, kinds[k].depth)) continue;
         s->cut = (uint32_t)(begin - f->text);
         s->cut_end = (uint32_t)(c.p - f->text);
-        const char *type = json_string_value(json_object_get(json_object_get(bt_features_at(f, f->n - 1), "geometry"), "type"));
+        const char *type =
+            json_string_value(json_object_get(json_object_get(bt_features_at(f, f->n - 1), "geometry"), "type"));
         if (type && !strcmp(type, kinds[k].type)) return;
         break;
     }
@@ -235,7 +239,8 @@ static bool add_feature(bt_features *f, scan *s)
     if (!s->p) return false;
     if (f->n == f->cap) f->span = bt_realloc(f->span, f->cap = f->cap ? f->cap + f->cap / 2 : 256, sizeof *f->span);
     bt_feature_span *span = &f->span[f->n++];
-    *span = (bt_feature_span){.begin = (uint32_t)(begin - f->text), .end = (uint32_t)(s->p - f->text), .vertex = f->n_vertices};
+    *span = (bt_feature_span){
+        .begin = (uint32_t)(begin - f->text), .end = (uint32_t)(s->p - f->text), .vertex = f->n_vertices};
     cut_ring(f, span);
     return bt_features_at(f, f->n - 1) != NULL;
 }
@@ -269,13 +274,17 @@ static bool split(bt_features *f)
 bt_status bt_features_open(bt_features *f, const char *path, bt_errors *err)
 {
     *f = (bt_features){0};
-    bt_status status = bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &f->text, &f->size, err);
+    bt_status status =
+        bt_file_read_to(path, "a GeoJSON file of outlines", BT_MOST_OUTLINE_BYTES, &f->text, &f->size, err);
     if (status != BT_OK) return status;
     // What a hostile file could make of it is known before: a tree takes far more room than the text.
     int64_t lists = 0;
     for (size_t i = 0; i < f->size; i++) lists += f->text[i] == '[';
     if (lists > BT_MOST_LISTS) {
-        bt_errors_add(err, "%s: holds %" PRId64 " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files", path, lists, BT_MOST_LISTS);
+        bt_errors_add(err,
+                      "%s: holds %" PRId64
+                      " lists (vertices), at most %d are read; simplify the outlines, or cut them into several files",
+                      path, lists, BT_MOST_LISTS);
         return BT_ERR_CASE;
     }
     json_error_t why;

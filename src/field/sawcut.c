@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Rectangular cells as sawn in an ice basin: long strips along x, cross-cut at random lengths.
 //
-// n floes that share a strip of width b and length L have the cells A_i, so b = Σ A_i / L and lengths A_i / b; their mean
-// aspect L/(n b) falls as n grows, and the strip closes when it has come down to the one asked for. Every cell area is as asked, so
-// strips fill the region exactly. Floes are dealt to strips by size with some noise: for a narrow size law that is a random
-// order, for a wide one it keeps large floes out of narrow strips, where they would be needles. Strips are then
-// shuffled, and the floes within each. In a periodic direction a strip starts at a random place.
+// n floes that share a strip of width b and length L have the cells A_i, so b = Σ A_i / L and lengths A_i / b; their
+// mean aspect L/(n b) falls as n grows, and the strip closes when it has come down to the one asked for. Every cell
+// area is as asked, so strips fill the region exactly. Floes are dealt to strips by size with some noise: for a narrow
+// size law that is a random order, for a wide one it keeps large floes out of narrow strips, where they would be
+// needles. Strips are then shuffled, and the floes within each. In a periodic direction a strip starts at a random
+// place.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,8 +16,8 @@
 
 static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order of dealing
 
-// In a rectangular cell, the largest rectangle with the proportions nearest to the aspect that the floe can have: a floe of
-// the area a becomes √(a aspect) long unless the cell is shorter, or narrower than a over that.
+// In a rectangular cell, the largest rectangle with the proportions nearest to the aspect that the floe can have: a
+// floe of the area a becomes √(a aspect) long unless the cell is shorter, or narrower than a over that.
 static void shape_piece(double *v, double area, double aspect)
 {
     double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
@@ -33,13 +34,13 @@ static void shape_piece(double *v, double area, double aspect)
     memcpy(v, (double[8]){cx - hx, cy - hy, cx + hx, cy - hy, cx + hx, cy + hy, cx - hx, cy + hy}, 8 * sizeof *v);
 }
 
-static void add_cell(bt_cells *c, const bt_yard *y, double x0, double x1, double y0, double y1, double target, double aspect,
-                     int effort, int halved)
+static void add_cell(bt_tessellation *c, const bt_region *y, double x0, double x1, double y0, double y1, double target,
+                     double aspect, int effort, int halved)
 {
-    double v[2 * 8 * BT_CELL_VERTICES];
+    double v[2 * 8 * BT_TESSELLATION_VERTICES];
     memcpy(v, (double[8]){x0, y0, x1, y0, x1, y1, x0, y1}, 8 * sizeof *v);
-    int n = bt_cell_clear(y, 4, v, effort == 0);
-    if (n >= 3) n = bt_cell_clean(n, v, 0);
+    int n = bt_tessellation_clear(y, 4, v, effort == 0);
+    if (n >= 3) n = bt_tessellation_clean(n, v, 0);
     double whole = (x1 - x0) * (y1 - y0), left = n >= 3 ? bt_shape_moments(n, v).area : 0;
     // Halves waste less water beside an obstacle.
     if (left < (effort < 2 ? 0.65 : 0.85) * whole && halved < (effort < 2 ? 2 : 4)) {
@@ -79,8 +80,8 @@ static int by_key(const void *a, const void *b)
     return (p->id > q->id) - (p->id < q->id);
 }
 
-// Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips; *last: width
-// of the last strip over the width due to it.
+// Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips;
+// *last: width of the last strip over the width due to it.
 static bt_idx deal(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
 {
     bt_idx n_strips = 0;
@@ -104,9 +105,10 @@ static bt_idx deal(bt_idx n, const piece *p, double share, double aspect, double
     return n_strips;
 }
 
-bt_cells bt_cells_saw(const bt_yard *y, bt_idx n, const double *target, double aspect, int64_t seed, int effort)
+bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *target, double aspect, int64_t seed,
+                                    int effort)
 {
-    bt_cells c = {0};
+    bt_tessellation c = {0};
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
     piece *p = bt_alloc((size_t)n, sizeof *p), *strip = bt_alloc((size_t)n, sizeof *strip);
     for (bt_idx i = 0; i < n; i++) {

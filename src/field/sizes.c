@@ -40,8 +40,10 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
                     .min = c->ice.size_min, .max = c->ice.size_max, .exponent = c->ice.size_exponent};
     if (s->law == BT_SIZE_POWER) {
         if (!(s->min > 0 && s->max > s->min && s->exponent > 0)) {
-            bt_errors_add(err, "%s: ice.size_law: power needs 0 < ice.size_min < ice.size_max and ice.size_exponent > 0, "
-                          "got %g m, %g m and %g", path, s->min, s->max, s->exponent);
+            bt_errors_add(err,
+                          "%s: ice.size_law: power needs 0 < ice.size_min < ice.size_max and ice.size_exponent > 0, "
+                          "got %g m, %g m and %g",
+                          path, s->min, s->max, s->exponent);
             return BT_ERR_CASE;
         }
         return BT_OK;
@@ -56,8 +58,9 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
     s->mu = log(s->mean) - s->sigma * s->sigma / 2;
     if (s->min <= 0 && s->max <= 0) return BT_OK;
     if ((s->min > 0 && s->mean <= s->min) || (s->max > 0 && s->mean >= s->max)) {
-        bt_errors_add(err, "%s: ice.size: %g m is not between ice.size_min %g m and ice.size_max %g m; move the limits apart",
-                      path, s->mean, s->min, s->max);
+        bt_errors_add(
+            err, "%s: ice.size: %g m is not between ice.size_min %g m and ice.size_max %g m; move the limits apart",
+            path, s->mean, s->min, s->max);
         return BT_ERR_CASE;
     }
     double low = s->mu - 3 * s->sigma, high = s->mu + 3 * s->sigma;
@@ -67,8 +70,10 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
     }
     double mean = lognormal_moment(s, s->mu, 1);
     if (!(fabs(mean - s->mean) < 1e-6 * s->mean)) {
-        bt_errors_add(err, "%s: ice.size: no lognormal law cut at %g..%g m has the mean %g m and spread %g; move the limits apart",
-                      path, s->min, s->max, s->mean, s->spread);
+        bt_errors_add(
+            err,
+            "%s: ice.size: no lognormal law cut at %g..%g m has the mean %g m and spread %g; move the limits apart",
+            path, s->min, s->max, s->mean, s->spread);
         return BT_ERR_CASE;
     }
     return BT_OK;

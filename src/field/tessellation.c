@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Power (Laguerre) diagram of weighted seeds whose cells have given areas: broken ice before it is moved apart.
 //
-// The cell of seed p_i with weight w_i is { x : |x − p_i|² − w_i <= |x − p_j|² − w_j for all j }. With x measured from p_i
-// and D = p_j − p_i, each j gives the half-plane D·x <= (|D|² + w_i − w_j)/2. Neighbours are met in rings of a grid. All
-// seeds not yet met are at a distance >= d, their lines at >= (d² − Δ)/(2d) from p_i with Δ = max w − w_i >= 0, which
-// grows with d; so once (d² − Δ) >= 2 d R, R the farthest vertex of the cell so far, no later seed can cut and the cell is
-// exact. Periodic directions begin from ± half a period, the line to the seed's own image; other images are met by
-// rings that go round.
+// The cell of seed p_i with weight w_i is { x : |x − p_i|² − w_i <= |x − p_j|² − w_j for all j }. With x measured from
+// p_i and D = p_j − p_i, each j gives the half-plane D·x <= (|D|² + w_i − w_j)/2. Neighbours are met in rings of a
+// grid. All seeds not yet met are at a distance >= d, their lines at >= (d² − Δ)/(2d) from p_i with Δ = max w − w_i >=
+// 0, which grows with d; so once (d² − Δ) >= 2 d R, R the farthest vertex of the cell so far, no later seed can cut and
+// the cell is exact. Periodic directions begin from ± half a period, the line to the seed's own image; other images are
+// met by rings that go round.
 //
-// Areas. Weights move by Δw_i = ω (A_i* − A_i)/π: for a round cell w = r² and A = π r². It is a damped Jacobi step on the
-// concave dual of semi-discrete optimal transport (Aurenhammer, Hoffmann & Aronov 1998, Algorithmica 20), whose gradient
-// is A* − A. A few Lloyd moves (seed to centroid) first take out the needles of a random diagram; many would give the
-// honeycomb of a foam, which broken ice is not.
+// Areas. Weights move by Δw_i = ω (A_i* − A_i)/π: for a round cell w = r² and A = π r². It is a damped Jacobi step on
+// the concave dual of semi-discrete optimal transport (Aurenhammer, Hoffmann & Aronov 1998, Algorithmica 20), whose
+// gradient is A* − A. A few Lloyd moves (seed to centroid) first take out the needles of a random diagram; many would
+// give the honeycomb of a foam, which broken ice is not.
 //
 // Rejected: Qhull (one diagram of all seeds: no periodic direction, no cells of obstacles, more memory, a dependency).
 #include <math.h>
@@ -27,13 +27,14 @@ enum {
     ROUNDS = 24,    // weight updates, the Lloyd moves among them
     TRIES = 24,     // candidate places of a seed
 };
-static const double SPACING = 0.66; // discs of this part of the cell's radius do not overlap at the start: disorder of the ice
+// discs of this part of the cell's radius do not overlap at the start: disorder of the ice
+static const double SPACING = 0.66;
 static const double STEP = 0.9;     // ω
 static const double SHORT_EDGE = 0.07; // shortest edge kept / diameter of equal area
 static const double SLIVER = 0.16;     // least inradius / radius of equal area
 
 typedef struct diagram {
-    const bt_yard *yard;
+    const bt_region *yard;
     bt_idx n;
     double *p;        // [n][2] seeds
     double *w;        // [n] weights, m²
@@ -44,21 +45,21 @@ typedef struct diagram {
     bt_idx *member;   // [n]
 } diagram;
 
-bt_cells bt_cells_create(bt_idx n)
+bt_tessellation bt_tessellation_create(bt_idx n)
 {
-    bt_cells c = {.n = n};
+    bt_tessellation c = {.n = n};
     c.nv = bt_alloc((size_t)n, sizeof *c.nv);
     c.v = bt_alloc((size_t)n, sizeof *c.v);
     c.target = bt_alloc((size_t)n, sizeof *c.target);
     return c;
 }
 
-void bt_cells_free(bt_cells *c)
+void bt_tessellation_free(bt_tessellation *c)
 {
     free(c->nv);
     free(c->v);
     free(c->target);
-    *c = (bt_cells){0};
+    *c = (bt_tessellation){0};
 }
 
 static bt_idx bin_of(const diagram *g, double x, double y)
@@ -123,7 +124,7 @@ static int cut_by_bin(const diagram *g, bt_idx i, int n, double *v, double *r, b
 // The cell of seed i relative to its seed; returns its number of vertices.
 static int power_cell(const diagram *g, bt_idx i, double *v)
 {
-    const bt_yard *y = g->yard;
+    const bt_region *y = g->yard;
     double px = g->p[2 * i], py = g->p[2 * i + 1], lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     double x0 = y->periodic_x ? -lx / 2 : y->x0 - px, x1 = y->periodic_x ? lx / 2 : y->x1 - px;
     double y0 = y->periodic_y ? -ly / 2 : y->y0 - py, y1 = y->periodic_y ? ly / 2 : y->y1 - py;
@@ -162,7 +163,7 @@ static int ice_cell(const diagram *g, bt_idx i, double *v)
         v[2 * k] += g->p[2 * i];
         v[2 * k + 1] += g->p[2 * i + 1];
     }
-    return n >= 3 ? bt_cell_clear(g->yard, n, v, false) : 0;
+    return n >= 3 ? bt_tessellation_clear(g->yard, n, v, false) : 0;
 }
 
 // ---- seeds ----
@@ -178,14 +179,14 @@ typedef struct discs {
 
 // Walk over the bins of the square of half side r about (x, y); (sx, sy) is the period's shift of the bin.
 typedef struct bin_walk {
-    const bt_yard *yard;
+    const bt_region *yard;
     const discs *dd;
     int ix0, ix1, iy1, ix, iy;
     size_t bin;
     double sx, sy;
 } bin_walk;
 
-static bin_walk walk_bins(const bt_yard *yard, const discs *dd, double x, double y, double r)
+static bin_walk walk_bins(const bt_region *yard, const discs *dd, double x, double y, double r)
 {
     bin_walk w = {.yard = yard, .dd = dd};
     w.ix0 = (int)floor((x - r - yard->x0) / dd->bx), w.ix1 = (int)floor((x + r - yard->x0) / dd->bx);
@@ -202,7 +203,8 @@ static bool next_bin(bin_walk *w)
             w->iy++;
         }
         if (w->iy > w->iy1) return false;
-        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny); // turns round the period
+        // turns round the period
+        int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny);
         if ((tx && !w->yard->periodic_x) || (ty && !w->yard->periodic_y)) continue;
         w->bin = (size_t)(w->iy - ty * w->dd->ny) * (size_t)w->dd->nx + (size_t)(w->ix - tx * w->dd->nx);
         w->sx = tx * (w->yard->x1 - w->yard->x0);
@@ -212,8 +214,8 @@ static bool next_bin(bin_walk *w)
 }
 
 // How deep, relative to their size, a disc at (x, y) lies in others, in walls and in obstacles; <= 0: free.
-static double crowding(const bt_yard *yard, const discs *dd, const double *p, const double *radius, double x, double y,
-                       double r)
+static double crowding(const bt_region *yard, const discs *dd, const double *p, const double *radius, double x,
+                       double y, double r)
 {
     double worst = -1;
     if (!yard->periodic_x) worst = bt_max(worst, 1 - bt_min(x - yard->x0, yard->x1 - x) / (SPACING * r));
@@ -248,7 +250,7 @@ static int larger_first(const void *a, const void *b)
 }
 
 // Random places, large cells first, each the freest of a few candidates (sequential addition, then best of TRIES).
-static void place_seeds(const bt_yard *y, bt_idx n, const double *radius, int64_t seed, double *p)
+static void place_seeds(const bt_region *y, bt_idx n, const double *radius, int64_t seed, double *p)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0, mean = 0;
     by_size *order = bt_alloc((size_t)n, sizeof *order);
@@ -293,9 +295,9 @@ static void place_seeds(const bt_yard *y, bt_idx n, const double *radius, int64_
 
 // ---- areas ----
 
-bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, int64_t seed)
+bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed)
 {
-    bt_cells cells = bt_cells_create(n);
+    bt_tessellation cells = bt_tessellation_create(n);
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
     for (bt_idx i = 0; i < n; i++) wanted += target[i];
     double share = y->ice_area / wanted; // cells fill the region
@@ -337,7 +339,7 @@ bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, i
             if (round >= LLOYD) continue;
             g.p[2 * i] = next[2 * i];
             g.p[2 * i + 1] = next[2 * i + 1];
-            bt_yard_wrap(y, &g.p[2 * i], &g.p[2 * i + 1]);
+            bt_region_wrap(y, &g.p[2 * i], &g.p[2 * i + 1]);
         }
     }
     sort_into_bins(&g);
@@ -347,7 +349,7 @@ bt_cells bt_cells_tessellate(const bt_yard *y, bt_idx n, const double *target, i
         int m = ice_cell(&g, i, v);
         if (m < 3) continue;
         double full = bt_shape_moments(m, v).area;
-        m = bt_cell_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI));
+        m = bt_tessellation_clean(m, v, SHORT_EDGE * 2 * sqrt(full / BT_PI));
         bt_moments mo = bt_shape_moments(m, v);
         if (mo.inradius < SLIVER * sqrt(mo.area / BT_PI) || mo.area < 0.1 * target[i] * share) continue;
         cells.nv[i] = m;

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bergtow/forces.h"
+#include "force/load.h"
 
 /// Force on a body at velocity u, N; its derivative; the sum of the magnitudes of its parts.
 typedef struct {
@@ -27,9 +27,9 @@ static void extent_across(const bt_bodies *b, bt_idx i, const double v[2], doubl
 }
 
 /// skin |v| v + form |v × D| v, v = ref − u.
-static void add_drag(const bt_bodies *b, bt_idx i, double skin, double form, const double ref[2], const double u[2], balance *a)
+static void add_stream(const bt_bodies *b, bt_idx i, const bt_stream *in, const double u[2], balance *a)
 {
-    const double v[2] = {ref[0] - u[0], ref[1] - u[1]}, s = hypot(v[0], v[1]);
+    const double skin = in->skin, form = in->form, v[2] = {in->u - u[0], in->v - u[1]}, s = hypot(v[0], v[1]);
     if (s == 0) return;
     double d[2];
     extent_across(b, i, v, d);
@@ -43,22 +43,35 @@ static void add_drag(const bt_bodies *b, bt_idx i, double skin, double form, con
     a->scale += g * s;
 }
 
+/// Explicit and linear forces. An explicit force counts as constant: one that falls with the velocity slows Newton's
+/// method down.
+static void add_rest(const bt_load *l, const double u[2], balance *a)
+{
+    const double f[2] = {l->fx + l->jx - l->g * u[0], l->fy + l->jy - l->g * u[1]};
+    for (int r = 0; r < 2; r++) {
+        a->f[r] += f[r];
+        a->df[r][r] -= l->g;
+    }
+    a->scale += hypot(l->fx, l->fy) + hypot(l->jx, l->jy) + l->g * hypot(u[0], u[1]);
+}
+
 static balance balance_at(const bt_world *w, bt_idx i, const double u[2])
 {
-    const bt_params *p = &w->par;
     const bt_bodies *b = &w->bodies;
-    const bt_drag *d = &b->drag[i];
-    const bt_turning r = bt_forces_turning(p, b->share[i]);
-    const double rate = b->mass[i] / p->dt, water[2] = {p->water_u, p->water_v}, air[2] = {p->air_u, p->air_v};
+    const double dt = w->par.dt, rate = b->mass[i] / dt;
+    bt_load l;
+    bt_forces_load(w, i, &(bt_vel){.x = u[0], .y = u[1]}, &l);
+    bt_turning r = BT_TURNING_NONE;
+    bt_turning_set(&r, b->share[i] * l.turn * dt);
     // U' − U without the cancellation of the whole velocities.
-    const double x = u[0] - p->balance_u, y = u[1] - p->balance_v;
+    const double x = u[0] - l.about_x, y = u[1] - l.about_y;
     balance a = {
-        .f = {rate * ((r.c - 1) * x - r.s * y + r.vx), rate * (r.s * x + (r.c - 1) * y + r.vy)},
+        .f = {rate * ((r.c - 1) * x - r.s * y + l.gain_x), rate * (r.s * x + (r.c - 1) * y + l.gain_y)},
         .df = {{rate * (r.c - 1), -rate * r.s}, {rate * r.s, rate * (r.c - 1)}},
     };
-    a.scale = rate * (fabs(r.s) * hypot(x, y) + hypot(r.vx, r.vy));
-    add_drag(b, i, d->water_skin, d->water_form, water, u, &a);
-    add_drag(b, i, d->air_skin, d->air_form, air, u, &a);
+    a.scale = rate * (fabs(r.s) * hypot(x, y) + hypot(l.gain_x, l.gain_y));
+    for (int k = 0; k < l.n_streams; k++) add_stream(b, i, &l.stream[k], u, &a);
+    add_rest(&l, u, &a);
     return a;
 }
 
@@ -77,21 +90,26 @@ static balance held_balance(const bt_world *w, bt_idx i, const bool hold[2], con
 bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u[2])
 {
     enum { MAX_STEPS = 100, MAX_HALVINGS = 40 };
-    const bt_drag *d = &w->bodies.drag[i];
-    const double width = 2 * w->bodies.radius[i], drag = d->water_skin + d->air_skin + (d->water_form + d->air_form) * width;
-    u[0] = hold[0] || drag == 0 ? 0 : w->par.water_u;
-    u[1] = hold[1] || drag == 0 ? 0 : w->par.water_v;
-    if (drag == 0) return true;
+    bt_load l;
+    bt_forces_load(w, i, &(bt_vel){0}, &l);
+    double skin = 0, form = 0;
+    for (int k = 0; k < l.n_streams; k++) skin += l.stream[k].skin, form += l.stream[k].form;
+    const double drag = skin + form * (2 * w->bodies.radius[i]);
+    const bool drifts = drag > 0 || l.g > 0;
+    u[0] = hold[0] || !drifts ? 0 : w->par.water_u;
+    u[1] = hold[1] || !drifts ? 0 : w->par.water_v;
+    if (!drifts) return true;
     balance a = held_balance(w, i, hold, u);
     double force = hypot(a.f[0], a.f[1]);
     if (force == 0) return true;
-    const double first = sqrt(force / drag) / force;
+    const double first = drag > 0 ? sqrt(force / drag) / force : 1 / l.g;
     for (int k = 0; k < 2; k++) u[k] += first * a.f[k];
     a = held_balance(w, i, hold, u);
     force = hypot(a.f[0], a.f[1]);
     for (int step = 0; step < MAX_STEPS && force > 0; step++) {
         const double det = a.df[0][0] * a.df[1][1] - a.df[0][1] * a.df[1][0];
-        const double by[2] = {-(a.df[1][1] * a.f[0] - a.df[0][1] * a.f[1]) / det, -(a.df[0][0] * a.f[1] - a.df[1][0] * a.f[0]) / det};
+        const double by[2] = {-(a.df[1][1] * a.f[0] - a.df[0][1] * a.f[1]) / det,
+                              -(a.df[0][0] * a.f[1] - a.df[1][0] * a.f[0]) / det};
         if (!isfinite(by[0]) || !isfinite(by[1])) break;
         double share = 1, next = INFINITY, to[2] = {0, 0};
         balance there = a;

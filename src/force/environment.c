@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "base/table.h"
 
 /// One of the two fluids.
@@ -37,7 +37,10 @@ static flow flow_of(const bt_case *c, bool water)
     };
 }
 
-static bool changes(const flow *f) { return f->table.n > 0 || f->e1[0] != 0 || f->e1[1] != 0 || f->e2[0] != 0 || f->e2[1] != 0; }
+static bool changes(const flow *f)
+{
+    return f->table.n > 0 || f->e1[0] != 0 || f->e1[1] != 0 || f->e2[0] != 0 || f->e2[1] != 0;
+}
 
 static void velocity(const flow *f, double t, double v[2])
 {
@@ -112,14 +115,15 @@ void bt_environment_begin(bt_world *w)
         velocity(&e->water, w->step > 0 ? ((double)w->step - 0.5) * p->dt : 0, balance);
         for (int k = 0; k < 2; k++) tilt[k] = (water[k] - balance[k]) / p->dt;
     }
-    const bool same = water[0] == p->water_u && water[1] == p->water_v && air[0] == p->air_u && air[1] == p->air_v && tilt[0] == p->tilt_ax && tilt[1] == p->tilt_ay;
+    const bool same = water[0] == p->water_u && water[1] == p->water_v && air[0] == p->air_u && air[1] == p->air_v &&
+                      tilt[0] == p->tilt_ax && tilt[1] == p->tilt_ay;
     p->water_u = water[0], p->water_v = water[1];
     p->air_u = air[0], p->air_v = air[1];
     p->balance_u = balance[0], p->balance_v = balance[1];
     p->tilt_ax = tilt[0], p->tilt_ay = tilt[1];
     if (same) return;
-    bt_tiles_wake_all(w->tiles);
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NO;
+    bt_cells_wake_all(w->cells);
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_AWAKE;
 }
 
 void bt_environment_advance(bt_world *w)

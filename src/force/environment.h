@@ -8,20 +8,22 @@
 // current turns from x towards y where b > 0.
 //
 // A step takes the velocity of its middle, U(t + Δt/2), for all forces. Why: floes that follow the water move by
-// Δt U_w in the step, which is the water's own displacement to second order (exact for a constant and on a straight piece of a table);
-// forces in the series are means over the step anyway. Rejected: the end of the step, in the manner of the implicit drag; a floe's
-// path is then off by Δt/2 (U_w(T) − U_w(0)).
+// Δt U_w in the step, which is the water's own displacement to second order (exact for a constant and on a straight
+// piece of a table); forces in the series are means over the step anyway. Rejected: the end of the step, in the manner
+// of the implicit drag; a floe's path is then off by Δt/2 (U_w(T) − U_w(0)).
 //
 // Sea-surface tilt, for a body that takes the place of water (model: −m g ∇η, m without added mass: forces.h):
-//     geostrophic   −g∇η = f k×U_w at that time: balances Coriolis on the current, and nothing accelerates the body with the water but drag
-//     dynamic       −g∇η = dU_w/dt + f k×U_w: the tilt that a current without friction, uniform in space, has; dU_w/dt moves
-//                   the added mass, too. A body that moves with the water goes on doing so without drag. dU_w/dt is taken from the middle of the last step (from
-//                   t = 0 in the first) to the middle of this one, and Coriolis acts about the current of the last step: so it is
-//                   exact in the scheme of forces.h, U' = U_b + R (U1 − U_b) + Δt (−g∇η)
+//     geostrophic   −g∇η = f k×U_w at that time: balances Coriolis on the current, and nothing accelerates the body
+//     with the water but drag
+//     dynamic       −g∇η = dU_w/dt + f k×U_w: the tilt that a current without friction, uniform in space, has; dU_w/dt
+//                   moves the added mass, too. A body that moves with the water goes on doing so without drag. dU_w/dt
+//                   is taken from the middle of the last step (from t = 0 in the first) to the middle of this one, and
+//                   Coriolis acts about the current of the last step: so it is exact in the scheme of forces.h, U' =
+//                   U_b + R (U1 − U_b) + Δt (−g∇η)
 //
-// Rest. A floe is at rest when it has the water's velocity of that step (tiles.h). When water, wind or balance differ from those of the
-// step before, no tile rests: every body is looked at and feels the forces again. Tiles move along with the water:
-// by its displacement since t = 0, the sum of Δt U_w over the steps, which every rank forms alike.
+// Rest. A floe is at rest when it has the water's velocity of that step (cells.h). When water, wind or balance differ
+// from those of the step before, no cell rests: every body is looked at and feels the forces again. Cells move along
+// with the water: by its displacement since t = 0, the sum of Δt U_w over the steps, which every rank forms alike.
 #ifndef BERGTOW_ENVIRONMENT_H
 #define BERGTOW_ENVIRONMENT_H
 
@@ -34,8 +36,8 @@ typedef struct bt_environment bt_environment;
 bt_environment *bt_environment_create(const bt_case *c);
 void bt_environment_free(bt_environment *e);
 
-/// At the start of a step: water, wind, balance and tilt of its middle into w->par; wakes what rested when they changed. Does nothing
-/// without an environment.
+/// At the start of a step: water, wind, balance and tilt of its middle into w->par; wakes what rested when they
+/// changed. Does nothing without an environment.
 void bt_environment_begin(bt_world *w);
 
 /// At the end of a step: displacement of the water, w->drift_x, w->drift_y.

@@ -5,8 +5,10 @@
 
 /// Two convex polygons by separating axes over all edge normals n, D from centroid to centroid, h support functions.
 typedef struct bt_apart {
-    double gap;       ///< max n·D − h_a(n) − h_b(−n): distance if > 0 along the best edge normal, depth of overlap if < 0, m
-    double both;      ///< factor by which both can be scaled about their centroids until they touch: max n·D/(h_a + h_b)
+    /// max n·D − h_a(n) − h_b(−n): distance if > 0 along the best edge normal, depth of overlap if < 0, m
+    double gap;
+    /// factor by which both can be scaled about their centroids until they touch: max n·D/(h_a + h_b)
+    double both;
     double first;     ///< the same when only the first is scaled: max (n·D − h_b)/h_a
 } bt_apart;
 

@@ -9,7 +9,10 @@
 static const double NEAR = 1e-9;   // lengths below this part of the extent are rounding (as in bt_shape_fault)
 static const double SLIVER = 1e-9; // a part of less than this part of the area is left out: nothing can lean on it
 
-static double cross(const double *o, const double *p, const double *q) { return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]); }
+static double cross(const double *o, const double *p, const double *q)
+{
+    return (p[0] - o[0]) * (q[1] - o[1]) - (p[1] - o[1]) * (q[0] - o[0]);
+}
 
 static double extent_of(int n, const double *v)
 {
@@ -21,7 +24,8 @@ static double extent_of(int n, const double *v)
     return n > 0 ? hypot(x1 - x0, y1 - y0) : 0;
 }
 
-/// Is q between p and r on a straight line, or on one of them? A spike, where the line turns back, is not: it is a fault.
+/// Is q between p and r on a straight line, or on one of them? A spike, where the line turns back, is not: it is a
+/// fault.
 static bool idle(const double *p, const double *q, const double *r, double tiny)
 {
     const double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
@@ -57,7 +61,10 @@ double bt_outline_area2(int n, const double *v)
 static bool between(double a, double b, double x) { return bt_min(a, b) <= x && x <= bt_max(a, b); }
 
 /// Does c, on the line through a and b, lie on the segment?
-static bool on_segment(const double *a, const double *b, const double *c) { return between(a[0], b[0], c[0]) && between(a[1], b[1], c[1]); }
+static bool on_segment(const double *a, const double *b, const double *c)
+{
+    return between(a[0], b[0], c[0]) && between(a[1], b[1], c[1]);
+}
 
 /// Do the closed segments ab and cd have a point in common?
 static bool meet(const double *a, const double *b, const double *c, const double *d)
@@ -65,9 +72,10 @@ static bool meet(const double *a, const double *b, const double *c, const double
     if (bt_max(a[0], b[0]) < bt_min(c[0], d[0]) || bt_max(c[0], d[0]) < bt_min(a[0], b[0])) return false;
     if (bt_max(a[1], b[1]) < bt_min(c[1], d[1]) || bt_max(c[1], d[1]) < bt_min(a[1], b[1])) return false;
     const double c_ab = cross(a, b, c), d_ab = cross(a, b, d), a_cd = cross(c, d, a), b_cd = cross(c, d, b);
-    if (((c_ab > 0 && d_ab < 0) || (c_ab < 0 && d_ab > 0)) && ((a_cd > 0 && b_cd < 0) || (a_cd < 0 && b_cd > 0))) return true;
-    return (c_ab == 0 && on_segment(a, b, c)) || (d_ab == 0 && on_segment(a, b, d)) || (a_cd == 0 && on_segment(c, d, a)) ||
-           (b_cd == 0 && on_segment(c, d, b));
+    if (((c_ab > 0 && d_ab < 0) || (c_ab < 0 && d_ab > 0)) && ((a_cd > 0 && b_cd < 0) || (a_cd < 0 && b_cd > 0)))
+        return true;
+    return (c_ab == 0 && on_segment(a, b, c)) || (d_ab == 0 && on_segment(a, b, d)) ||
+           (a_cd == 0 && on_segment(c, d, a)) || (b_cd == 0 && on_segment(c, d, b));
 }
 
 bool bt_outline_crosses(int n, const double *v)
@@ -79,7 +87,9 @@ bool bt_outline_crosses(int n, const double *v)
             if (j == i + 1 || (i == 0 && j == n - 1)) { // neighbours share a vertex; a spike lies back on itself
                 const double *p = j == i + 1 ? a : b, *q = j == i + 1 ? b : a, *r = j == i + 1 ? d : c;
                 const bool back = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]) > 0;
-                if (back && fabs(cross(q, p, r)) <= NEAR * hypot(p[0] - q[0], p[1] - q[1]) * hypot(r[0] - q[0], r[1] - q[1])) return true;
+                if (back &&
+                    fabs(cross(q, p, r)) <= NEAR * hypot(p[0] - q[0], p[1] - q[1]) * hypot(r[0] - q[0], r[1] - q[1]))
+                    return true;
                 continue;
             }
             if (meet(a, b, c, d)) return true;
@@ -128,7 +138,8 @@ static double ear_quality(int m, const int *loop, int i, const double *v)
         const double *p = v + 2 * loop[k];
         if (cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0) return -1;
     }
-    const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]), ca = hypot(a[0] - c[0], a[1] - c[1]);
+    const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]),
+                 ca = hypot(a[0] - c[0], a[1] - c[1]);
     const double longest = bt_max(ab, bt_max(bc, ca));
     return area2 / (longest * longest);
 }
@@ -146,7 +157,8 @@ static bool join(ring *a, const ring *b, const double *v)
             const int p = a->at[i], q = next_of(a, i);
             if (b->at[j] != q || next_of(b, j) != p) continue;
             const int i1 = i + 1 < a->n ? i + 1 : 0, j1 = j + 1 < b->n ? j + 1 : 0;
-            const int after_p = next_of(b, j1), before_q = before_of(b, j), before_p = before_of(a, i), after_q = next_of(a, i1);
+            const int after_p = next_of(b, j1), before_q = before_of(b, j), before_p = before_of(a, i),
+                      after_q = next_of(a, i1);
             if (!left_turn(v + 2 * before_p, v + 2 * p, v + 2 * after_p)) return false;
             if (!left_turn(v + 2 * before_q, v + 2 * q, v + 2 * after_q)) return false;
             // a from q round to p, then what b has between p and q.
@@ -223,8 +235,10 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     on_ellipsoid(lon, lat, p);
     on_ellipsoid(lon0, lat0, o);
     const double dx = p[0] - o[0], dy = p[1] - o[1], dz = p[2] - o[2];
-    const double e = cos(lon0) * dy - sin(lon0) * dx, n = cos(lat0) * dz - sin(lat0) * (cos(lon0) * dx + sin(lon0) * dy);
-    const double s = sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s); // √(M N), mean curvature there
+    const double e = cos(lon0) * dy - sin(lon0) * dx,
+                 n = cos(lat0) * dz - sin(lat0) * (cos(lon0) * dx + sin(lon0) * dy);
+    // √(M N), mean curvature there
+    const double s = sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s);
     const double level = hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
     const double stretch = level > 0 ? chord * (1 + chord * chord / (24 * radius * radius)) / level : 0;
     *east = e * stretch;

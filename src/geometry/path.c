@@ -14,7 +14,9 @@ static void add_leg(bt_path *p, bt_leg leg)
 
 bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200])
 {
-    *p = (bt_path){.leg = bt_alloc(2 * (size_t)n + 1, sizeof *p->leg), .mark = bt_alloc((size_t)n + 1, sizeof *p->mark), .n_marks = n};
+    *p = (bt_path){.leg = bt_alloc(2 * (size_t)n + 1, sizeof *p->leg),
+                   .mark = bt_alloc((size_t)n + 1, sizeof *p->mark),
+                   .n_marks = n};
     double tx = 1, ty = 0, used = 0; // of the leg at hand: tangent, and what the corner behind has taken of it
     for (int k = 0; k < n; k++) {
         const double px = points[2 * k], py = points[2 * k + 1], far = hypot(px - x, py - y);
@@ -33,7 +35,9 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
             if (radius > 0 && angle != 0) cut = fabs(angle) < BT_PI - 1e-6 ? radius * tan(0.5 * fabs(angle)) : INFINITY;
         }
         if (used + cut > far) {
-            snprintf(why, 200, "the course change of %.4g deg at way-point %d leaves no room for a turn of radius %.4g m on a leg of %.4g m; lower tow.turn_radius or move the way-point",
+            snprintf(why, 200,
+                     "the course change of %.4g deg at way-point %d leaves no room for a turn of radius %.4g m on a "
+                     "leg of %.4g m; lower tow.turn_radius or move the way-point",
                      fabs(angle) * 180 / BT_PI, k + 1, radius, far);
             bt_path_free(p);
             return false;
@@ -42,7 +46,12 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
         p->mark[k] = p->leg[p->n - 1].way + p->leg[p->n - 1].length;
         if (cut > 0) {
             const double arc = radius * fabs(angle);
-            add_leg(p, (bt_leg){.length = arc, .x = px - cut * tx, .y = py - cut * ty, .tx = tx, .ty = ty, .turn = copysign(1 / radius, angle)});
+            add_leg(p, (bt_leg){.length = arc,
+                                .x = px - cut * tx,
+                                .y = py - cut * ty,
+                                .tx = tx,
+                                .ty = ty,
+                                .turn = copysign(1 / radius, angle)});
             p->mark[k] += 0.5 * arc;
         }
         used = cut;

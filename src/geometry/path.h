@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A path in the plane by its length: straight legs through way-points, corners sharp or rounded by arcs.
 //
-// A corner of angle δ between two legs is rounded by an arc of radius R that touches both at R tan(δ/2) from the way-point. The leg after
-// the last way-point has no end.
+// A corner of angle δ between two legs is rounded by an arc of radius R that touches both at R tan(δ/2) from the
+// way-point. The leg after the last way-point has no end.
 #ifndef BERGTOW_PATH_H
 #define BERGTOW_PATH_H
 
@@ -13,7 +13,7 @@ typedef struct bt_leg {
     double way;      ///< length of path before it, m
     double length;   ///< m; the last is endless
     double x, y;     ///< where it starts, m
-    double tx, ty;   ///< unit tangent there
+    double tx, ty;   ///< contact tangent there
     double turn;     ///< curvature, 1/m, positive from +x towards +y; 0 = straight
 } bt_leg;
 
@@ -24,14 +24,15 @@ typedef struct bt_path {
     int n_marks;
 } bt_path;
 
-/// From (x, y) through points [n][2] with corners of this radius (0 = sharp). False, with the reason in why, when two points coincide, a
-/// rounded corner has no room on its legs, or turns back on itself.
+/// From (x, y) through points [n][2] with corners of this radius (0 = sharp). False, with the reason in why, when two
+/// points coincide, a rounded corner has no room on its legs, or turns back on itself.
 bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200]);
 
-/// Position and unit tangent after `way` m of it (before the start: on the straight line backwards).
+/// Position and contact tangent after `way` m of it (before the start: on the straight line backwards).
 void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2]);
 
-/// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the tangent.
+/// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the
+/// tangent.
 double bt_path_near(const bt_path *p, double way, double x, double y);
 
 void bt_path_free(bt_path *p);

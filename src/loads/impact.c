@@ -8,9 +8,10 @@
 #include <string.h>
 
 #include "partition/domain.h"
-#include "loads/touch.h"
+#include "loads/body_contacts.h"
 
-#define TURNED 1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
+#define TURNED                                                                                                         \
+    1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
 
 bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w)
 {
@@ -62,7 +63,9 @@ void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
 void bt_impact_describe(const bt_impact_rule *r, char out[160])
 {
     if (r->conversion == BT_IMPACT_CRUSHING)
-        snprintf(out, 160, "crushing of %s%g deg at %g kPa", r->real_corner ? "the real corner, without one of " : "a corner of ", r->corner_angle * 180 / BT_PI, r->pressure / 1e3);
+        snprintf(out, 160, "crushing of %s%g deg at %g kPa",
+                 r->real_corner ? "the real corner, without one of " : "a corner of ", r->corner_angle * 180 / BT_PI,
+                 r->pressure / 1e3);
     else snprintf(out, 160, "half-sine of %g s", r->duration);
 }
 
@@ -70,15 +73,18 @@ void bt_impact_describe(const bt_impact_rule *r, char out[160])
 
 static void close_event(bt_impacts *m, const bt_impact_open *o)
 {
-    if (m->n_closed == m->cap_closed) m->closed = bt_realloc(m->closed, (size_t)(m->cap_closed = m->cap_closed ? 2 * m->cap_closed : 64), sizeof *m->closed);
+    if (m->n_closed == m->cap_closed)
+        m->closed =
+            bt_realloc(m->closed, (size_t)(m->cap_closed = m->cap_closed ? 2 * m->cap_closed : 64), sizeof *m->closed);
     bt_impact *e = &m->closed[m->n_closed++];
     *e = o->so_far;
     e->panel = bt_panels_at(&m->panels, e->x, e->y);
     bt_impact_convert(&m->rule, e);
 }
 
-/// Touches t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that may go on.
-static bool follow(const bt_impacts *m, bt_touch *t, int64_t n, double time, bt_impact_open *o, bool *begun)
+/// Touches t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that
+/// may go on.
+static bool follow(const bt_impacts *m, bt_body_contact *t, int64_t n, double time, bt_impact_open *o, bool *begun)
 {
     double sum = 0, approach = 0, rest = 0;
     int64_t most = 0;
@@ -144,8 +150,9 @@ static void add_loads(bt_impacts *m, double c, double s)
     double hit[2] = {0, 0};
     m->largest_push = 0;
     for (int64_t i = 0; i < m->n_touch; i++) {
-        const bt_touch *t = &m->touch[i];
-        const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx, part = t->collision / t->normal;
+        const bt_body_contact *t = &m->touch[i];
+        const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx,
+                     part = t->collision / t->normal;
         hit[0] += part * fx, hit[1] += part * fy;
         m->largest_push = bt_max(m->largest_push, (t->normal - t->collision) / m->dt);
         for (int k = 0; k < 2; k++) {
@@ -164,7 +171,7 @@ void bt_impacts_take(bt_world *w)
     if (!m) return;
     const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
     free(m->touch);
-    m->touch = bt_touch_collect(w, m, &m->n_touch);
+    m->touch = bt_body_contacts_collect(w, m, &m->n_touch);
     m->n_closed = 0;
     follow_events(m, (double)(w->step + 1) * w->par.dt);
     bt_panels_clear(&m->panels);

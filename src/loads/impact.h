@@ -1,35 +1,39 @@
 // SPDX-License-Identifier: MIT
 // Loads on the towed body: contact impulses of a step told apart into pushes and collisions, and collisions as forces.
 //
-// A step gives impulses. What they mean as forces depends on how long they act, which a rigid contact does not say [Y: Yulmetov & Løset
-// 2017, section 2.2 begins so; formulas derived here]:
+// A step gives impulses. What they mean as forces depends on how long they act, which a rigid contact does not say [Y:
+// Yulmetov & Løset 2017, section 2.2 begins so; formulas derived here]:
 //
 //   push        a contact that has been closed before: F = λ / Δt
-//   collision   a contact whose approach the step cuts: λ_c acts for the time of a collision T_c, which is not that of a step
+//   collision   a contact whose approach the step cuts: λ_c acts for the time of a collision T_c, which is not that of
+//   a step
 //
-// Telling them apart. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ + M_b⁻¹)·n including
-// rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse alone changes the normal velocity by λ (W + ρ W_nt). From an
-// approach v1 < 0 at the start of the step to v2 at its end the collision takes
+// Telling them apart. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ +
+// M_b⁻¹)·n including rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse alone changes the normal
+// velocity by λ (W + ρ W_nt). From an approach v1 < 0 at the start of the step to v2 at its end the collision takes
 //     λ_c = min(λ, (v2 − v1) / (W + ρ W_nt)),      λ − λ_c is push,      m_e = 1/W.
-// M is the mass with added mass, without the drag of the step. For one floe that hits by itself this is all of λ; a floe held against the
-// hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points each by itself, λ_i against (v2 − v1)_i / W_ii;
-// a square hit flush then shows 4/5 of its momentum, since the points share it.
-// A blow that comes through a floe already against the hull has no approach there: it is push, and as sharp as Δt makes it.
-// Approaches below a least speed count as push: a contact that has converged to the tolerance still creeps, and one that slides over a corner
-// of the hull meets a new normal every step.
+// M is the mass with added mass, without the drag of the step. For one floe that hits by itself this is all of λ; a
+// floe held against the hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points each by
+// itself, λ_i against (v2 − v1)_i / W_ii; a square hit flush then shows 4/5 of its momentum, since the points share it.
+// A blow that comes through a floe already against the hull has no approach there: it is push, and as sharp as Δt makes
+// it. Approaches below a least speed count as push: a contact that has converged to the tolerance still creeps, and one
+// that slides over a corner of the hull meets a new normal every step.
 //
-// Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step takes the rest. So a collision
-// goes on into the next step if the last one left a rest of approach above the solver's tolerance and it is this that is cut; impulses add up.
+// Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step takes the
+// rest. So a collision goes on into the next step if the last one left a rest of approach above the solver's tolerance
+// and it is this that is cut; impulses add up.
 //
 // Force of a collision with impulse λ, approach v_n and effective mass m_e; every peak names which:
 //   duration    T_c given:                       mean λ / T_c,  peak (π/2) λ / T_c of a half-sine
 //   crushing    a corner of angle φ is crushed at pressure p over thickness h: F = k x, k = 2 p h tan(φ/2), so
-//               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then; the rebound, if any, has no part in it
+//               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then; the rebound, if any, has
+//               no part in it
 // In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
 //
 // What is counted of them, and from when: src/output/impact_count.h, src/loads/panel_blocks.h.
 //
-// On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all that follows.
+// On several ranks every rank finds the contacts that it owns; rank 0 gathers them, in the order of ids, and has all
+// that follows.
 #ifndef BERGTOW_IMPACT_H
 #define BERGTOW_IMPACT_H
 
@@ -38,7 +42,7 @@
 #include "bergtow/world.h"
 
 /// One manifold on the towed body in one step. Numbers only, so that ranks can hand it on as a row.
-typedef struct bt_touch {
+typedef struct bt_body_contact {
     double gid;           ///< of the other body
     double x, y;          ///< pressure centre, m, body frame
     double nx, ny;        ///< direction of the normal force on the towed body, body frame; the tangent is (−ny, nx)
@@ -50,7 +54,7 @@ typedef struct bt_touch {
     double thickness;     ///< of the ice that is crushed, m
     double corner;        ///< interior angle of the corner in contact, rad; NaN if it has none
     double px[2], py[2], point[2]; ///< contact points, m, body frame, and the normal impulse of each, N s
-} bt_touch;
+} bt_body_contact;
 
 /// A collision.
 typedef struct bt_impact {
@@ -92,7 +96,7 @@ typedef struct bt_impacts {
     double body_height;   ///< thickness of the towed body, for contacts with walls, m
     bt_panels panels;
     // the last step
-    bt_touch *touch;      ///< [n_touch] by gid
+    bt_body_contact *touch;      ///< [n_touch] by gid
     int64_t n_touch;
     bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
     int64_t n_closed, cap_closed;

@@ -6,7 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double *vertex(const bt_panels *p, int i) { return p->outline + 2 * (i < p->n_vertices ? i : i - p->n_vertices); }
+static const double *vertex(const bt_panels *p, int i)
+{
+    return p->outline + 2 * (i < p->n_vertices ? i : i - p->n_vertices);
+}
 
 /// Length along the waterline of the point nearest to (x, y), m.
 static double nearest(const bt_panels *p, double x, double y)
@@ -25,7 +28,8 @@ static double nearest(const bt_panels *p, double x, double y)
     return at;
 }
 
-/// Where the ray along +x leaves the waterline: the centroid is inside and the outline convex, so one edge crosses it upwards.
+/// Where the ray along +x leaves the waterline: the centroid is inside and the outline convex, so one edge crosses it
+/// upwards.
 static double bow_of(const bt_panels *p)
 {
     for (int i = 0; i < p->n_vertices; i++) {
@@ -76,7 +80,8 @@ void bt_panels_point(const bt_panels *p, double s, double xy[2], double normal[2
     at -= around * floor(at / around);
     int i = 0;
     while (i < p->n_vertices - 1 && p->arc[i + 1] <= at) i++;
-    const double *a = vertex(p, i), *b = vertex(p, i + 1), length = p->arc[i + 1] - p->arc[i], t = (at - p->arc[i]) / length;
+    const double *a = vertex(p, i), *b = vertex(p, i + 1), length = p->arc[i + 1] - p->arc[i],
+                 t = (at - p->arc[i]) / length;
     xy[0] = a[0] + t * (b[0] - a[0]);
     xy[1] = a[1] + t * (b[1] - a[1]);
     if (!normal) return;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Panels of the hull: the waterline of the towed body cut into pieces of equal length, and the contact load on each.
 //
-// The waterline is walked in the order of its vertices (from the body's own +x towards +y). Panel 0 is centred where the body's x axis leaves
-// it, so that a tow along that axis presses on panel 0 and its neighbours. A contact point belongs to the panel of the nearest point of the
-// waterline. The load of a step is impulse / Δt, whatever the contact was: a push, a collision, or both. Vectors are in the body's frame.
+// The waterline is walked in the order of its vertices (from the body's own +x towards +y). Panel 0 is centred where
+// the body's x axis leaves it, so that a tow along that axis presses on panel 0 and its neighbours. A contact point
+// belongs to the panel of the nearest point of the waterline. The load of a step is impulse / Δt, whatever the contact
+// was: a push, a collision, or both. Vectors are in the body's frame.
 #ifndef BERGTOW_PANEL_H
 #define BERGTOW_PANEL_H
 
@@ -30,7 +31,8 @@ void bt_panels_free(bt_panels *p);
 /// Panel of the point (x, y), m, body frame.
 int bt_panels_at(const bt_panels *p, double x, double y);
 
-/// The point of the waterline at panel coordinate s (panel k reaches from s = k to k + 1), m; normal: outward there (or NULL).
+/// The point of the waterline at panel coordinate s (panel k reaches from s = k to k + 1), m; normal: outward there (or
+/// NULL).
 void bt_panels_point(const bt_panels *p, double s, double xy[2], double normal[2]);
 
 /// Begin a step: no load.

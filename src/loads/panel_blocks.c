@@ -28,7 +28,10 @@ int64_t bt_panel_blocks_rows(const bt_panel_blocks *b, int64_t steps) { return b
 
 static bt_panel_loads *row(const bt_panel_blocks *b, int64_t block) { return b->load + block * b->n; }
 
-static void clear(bt_panel_blocks *b, int64_t from, int64_t to) { memset(row(b, from), 0, (size_t)((to - from) * b->n) * sizeof *b->load); }
+static void clear(bt_panel_blocks *b, int64_t from, int64_t to)
+{
+    memset(row(b, from), 0, (size_t)((to - from) * b->n) * sizeof *b->load);
+}
 
 /// Room for so many blocks at least; what is new bears no load.
 static void reserve(bt_panel_blocks *b, int64_t blocks)
@@ -80,12 +83,14 @@ void bt_panel_blocks_add(bt_panel_blocks *b, const bt_panel *panel, bool early)
         reserve(b, blocks_after(b->steps));
     }
     bt_panel_loads *to = row(b, early ? 0 : blocks_after(b->steps) - 1);
-    for (int k = 0; k < b->n; k++) add(&to[k], &(bt_panel_loads){panel[k].fx, panel[k].fy, panel[k].normal, panel[k].normal});
+    for (int k = 0; k < b->n; k++)
+        add(&to[k], &(bt_panel_loads){panel[k].fx, panel[k].fy, panel[k].normal, panel[k].normal});
 }
 
 void bt_panel_blocks_reduce(const bt_panel_blocks *b, int64_t first, bt_panel_loads *before, bt_panel_loads *within)
 {
-    const int64_t blocks = blocks_after(b->steps), start = first < b->steps ? 1 + first / bt_stats_start_step(b->steps) : blocks;
+    const int64_t blocks = blocks_after(b->steps),
+                  start = first < b->steps ? 1 + first / bt_stats_start_step(b->steps) : blocks;
     memset(before, 0, (size_t)b->n * sizeof *before);
     memset(within, 0, (size_t)b->n * sizeof *within);
     for (int64_t i = 0; i < blocks; i++)

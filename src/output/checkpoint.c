@@ -9,18 +9,19 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 
 bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
 {
-    char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE), *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = NULL;
+    char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE),
+         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = NULL;
     if (asprintf(&part, "%s.tmp", path) < 0) abort();
     bt_status status = bt_snapshot_write(s, part, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // One that has been damaged meanwhile must not take the place of a sound one.
         bt_errors unheard = {0};
-        const bool sound = bt_seal_check(path, BT_SEAL_CHECKPOINT, NULL, &unheard) == BT_OK;
+        const bool sound = bt_checksum_check(path, BT_CHECKSUM_CHECKPOINT, NULL, &unheard) == BT_OK;
         status = bt_file_rename(path, sound ? before : damaged, err);
         bt_errors_free(&unheard);
     }
@@ -50,7 +51,9 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
         bt_errors unheard = {0};
         const bt_status other = bt_snapshot_read(s, before, first ? &unheard : &why);
         if (other == BT_OK) {
-            if (asprintf(said, "%s; %s is taken, step %" PRId64, first ? why.text[0] : "the last checkpoint is missing", before, bt_snapshot_int(s, "world/step")) < 0) abort();
+            if (asprintf(said, "%s; %s is taken, step %" PRId64, first ? why.text[0] : "the last checkpoint is missing",
+                         before, bt_snapshot_int(s, "world/step")) < 0)
+                abort();
             free(*path);
             *path = before;
             before = NULL;
@@ -60,7 +63,8 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
         }
         bt_errors_free(&unheard);
     }
-    if (status != BT_OK && !first && !second) bt_errors_add(err, "%s: holds no checkpoint; give the folder of a run that was stopped", dir);
+    if (status != BT_OK && !first && !second)
+        bt_errors_add(err, "%s: holds no checkpoint; give the folder of a run that was stopped", dir);
     if (status != BT_OK)
         for (size_t k = 0; k < why.n; k++) bt_errors_add(err, "%s", why.text[k]);
     if (status == BT_OK) s->err = err, s->faulty = false;
@@ -69,7 +73,10 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
     return status;
 }
 
-bool bt_checkpoint_there(const char *dir) { return bt_file_there(dir, BT_CHECKPOINT_FILE) || bt_file_there(dir, BT_CHECKPOINT_BEFORE); }
+bool bt_checkpoint_there(const char *dir)
+{
+    return bt_file_there(dir, BT_CHECKPOINT_FILE) || bt_file_there(dir, BT_CHECKPOINT_BEFORE);
+}
 
 void bt_checkpoint_remove(const char *dir)
 {
@@ -84,12 +91,14 @@ void bt_checkpoint_remove(const char *dir)
 /// Dimensions and kind of an array, and its numbers where they are few.
 static void print_item(const bt_item *i)
 {
-    static const char *const kinds[BT_ITEM_TYPES] = {[BT_ITEM_F64] = "float64", [BT_ITEM_I64] = "int64", [BT_ITEM_I32] = "int32", [BT_ITEM_U32] = "uint32",
-                                                     [BT_ITEM_U16] = "uint16", [BT_ITEM_U8] = "uint8", [BT_ITEM_TEXT] = "text"};
+    static const char *const kinds[BT_ITEM_TYPES] = {
+        [BT_ITEM_F64] = "float64", [BT_ITEM_I64] = "int64", [BT_ITEM_I32] = "int32", [BT_ITEM_U32] = "uint32",
+        [BT_ITEM_U16] = "uint16",  [BT_ITEM_U8] = "uint8",  [BT_ITEM_TEXT] = "text"};
     printf("%-28s %-8s", i->name, kinds[i->type]);
     if (i->type == BT_ITEM_TEXT) {
         putchar(' ');
-        for (const unsigned char *c = i->data; *c && c < (const unsigned char *)i->data + 60; c++) putchar(*c == '\n' || (*c >= 0x20 && *c != 0x7F) ? *c : '?');
+        for (const unsigned char *c = i->data; *c && c < (const unsigned char *)i->data + 60; c++)
+            putchar(*c == '\n' || (*c >= 0x20 && *c != 0x7F) ? *c : '?');
         if (strlen(i->data) > 60) printf(" ...");
     } else if (i->n * i->width > 6 || i->n == 0) {
         printf(" [%" PRId64 "][%d]", i->n, i->width);

@@ -49,9 +49,9 @@ static void couple(const row *r, int sr, const row *q, int sq, bt_inv inv, doubl
 }
 
 /// Sheets that lie on each other: rows along x and y, after the points of the pair.
-static row sheets_of(const bt_world *w, const bt_tile *t, bt_idx j)
+static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
 {
-    const bt_unit *u = &t->units[j];
+    const bt_contact *u = &t->contacts[j];
     return (row){.gid_a = w->bodies.gid[u->a],
                  .gid_b = w->bodies.gid[u->b],
                  .point = 2,
@@ -72,16 +72,16 @@ static row sheets_of(const bt_world *w, const bt_tile *t, bt_idx j)
 /// Normal and tangential row of every contact point, in the order of the gids.
 static row *rows_of(const bt_world *w, int *n)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     int64_t most = 0;
-    for (bt_idx k = 0; k < ts->n; k++) most += ts->tile[k].n_points + ts->tile[k].n_units;
+    for (bt_idx k = 0; k < ts->n; k++) most += ts->cell[k].n_points + ts->cell[k].n_contacts;
     row *rows = bt_alloc((size_t)most, sizeof *rows);
     *n = 0;
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
-            const bt_unit *u = &ts->tile[k].units[j];
+        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
+            const bt_contact *u = &ts->cell[k].contacts[j];
             const double total = u->ln[0] + u->ln[1];
-            if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->tile[k], j);
+            if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->cell[k], j);
             for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
                 rows[(*n)++] =
                     (row){.gid_a = w->bodies.gid[u->a],
@@ -100,7 +100,7 @@ static row *rows_of(const bt_world *w, int *n)
                           .ln = u->ln[i],
                           .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
                           .disc = NAN,
-                          .bound = ts->tile[k].limits ? bt_limit_bound(&ts->tile[k].limits[j], u, i, w->bodies.vel)
+                          .bound = ts->cell[k].limits ? bt_limit_bound(&ts->cell[k].limits[j], u, i, w->bodies.vel)
                                                       : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);

@@ -94,8 +94,10 @@ void bt_estimates_print(const bt_estimate_input *in, double simulated, const cha
         if (e.compares && isfinite(ratio)) printf(" %-9.3g", ratio);
         else if (!isnan(simulated)) printf(" %-9s", "-");
         printf(" %s%s", e.valid || k == BT_EST_SHIPS ? "" : "not valid: ", e.note);
-        if (isfinite(e.force) && e.low != e.high) printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
+        if (isfinite(e.force) && e.low != e.high)
+            printf("; %s to %s", bt_force_text(low, e.low), bt_force_text(high, e.high));
         printf("\n");
-        if (full) printf("%s  = %s\n%s  %s\n", indent, bt_estimate_kinds[k].formula, indent, bt_estimate_kinds[k].source);
+        if (full)
+            printf("%s  = %s\n%s  %s\n", indent, bt_estimate_kinds[k].formula, indent, bt_estimate_kinds[k].source);
     }
 }

@@ -9,8 +9,9 @@
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
 //     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc about
-//                                                  0 that both components of a contact lie in (mu is 0; NaN: it is
-//                                                  no such contact); where contacts and bodies are
+//     0 that both
+//                                                  components of a contact lie in (mu is 0), NaN = it is no such
+//                                                  contact; where contacts and bodies are
 // A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 

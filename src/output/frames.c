@@ -22,7 +22,8 @@ static void write_copy(bt_slab *s, int64_t first, int64_t n, const void *rows)
 
 typedef struct outlines { bt_slab vertices, offsets, thickness, area, topology; } outlines;
 
-static outlines create_outlines(bt_h5 *h, const char *group, const char *height, const char *topology, int64_t n, int64_t n_vertices)
+static outlines create_outlines(bt_h5 *h, const char *group, const char *height, const char *topology, int64_t n,
+                                int64_t n_vertices)
 {
     char path[64];
 #define NAMED(name) (snprintf(path, sizeof path, "%s/%s", group, name), path)
@@ -44,7 +45,8 @@ static outlines create_outlines(bt_h5 *h, const char *group, const char *height,
 static void describe(bt_h5 *h, const bt_record_bodies *b)
 {
     const int64_t towed = b->towed < 0 ? -1 : b->towed - b->n_floes;
-    bt_h5_attr_text(h, "/floes/vertices", "description", "x, y in the frame of the floe, anticlockwise about its centroid");
+    bt_h5_attr_text(h, "/floes/vertices", "description",
+                    "x, y in the frame of the floe, anticlockwise about its centroid");
     bt_h5_attr_text(h, "/floes/offsets", "description", "floe i has the vertices offsets[i] up to offsets[i + 1]");
     bt_h5_attr_text(h, "/bodies/height", "description", "draft + sail of the towed body, 0 for walls");
     bt_h5_write_names(h, "/bodies/names", (hsize_t)(b->n_bodies - b->n_floes), b->names);
@@ -52,8 +54,10 @@ static void describe(bt_h5 *h, const bt_record_bodies *b)
     bt_h5_attr_text(h, "/bodies/towed", "description", "which of these bodies is towed, -1 = none");
 }
 
-/// Bodies from .. from + n of the block b to rows first .. first + n of the datasets; `before`: vertices of the rows before.
-static void write_outlines(outlines *o, const bt_record_bodies *b, int64_t from, int64_t n, int64_t first, int64_t before, char *buffer)
+/// Bodies from .. from + n of the block b to rows first .. first + n of the datasets; `before`: vertices of the rows
+/// before.
+static void write_outlines(outlines *o, const bt_record_bodies *b, int64_t from, int64_t n, int64_t first,
+                           int64_t before, char *buffer)
 {
     const int64_t *offsets = b->offsets + from, v0 = offsets[0];
     write_copy(&o->vertices, before, offsets[n] - v0, b->vertices + 2 * (v0 - b->offsets[0]));
@@ -90,7 +94,8 @@ static void write_bodies(bt_frames *f, const bt_record_bodies *b)
     if (bt_slab_share(f->comm, all, N) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
         // An empty block of floes still has the 0 of the offsets to write if nobody is before it.
-        if (f->own_floes > 0 || (last && f->n_floes == 0)) write_outlines(&o[0], b, 0, f->own_floes, f->first, f->vertices_before, buffer);
+        if (f->own_floes > 0 || (last && f->n_floes == 0))
+            write_outlines(&o[0], b, 0, f->own_floes, f->first, f->vertices_before, buffer);
         if (last) write_outlines(&o[1], b, f->own_floes, f->own_others, 0, 0, buffer);
         free(buffer);
     }
@@ -167,7 +172,8 @@ static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_fram
 }
 
 /// All vertices of bodies from .. from + n of the block in the world frame; `local`: vertices of the block before them.
-static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt_frame_row *row, int64_t from, int64_t n, int64_t local, char *buffer)
+static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt_frame_row *row, int64_t from,
+                         int64_t n, int64_t local, char *buffer)
 {
     bt_rows r = bt_rows_from(s, first, buffer);
     const float *p = f->vertices + 2 * local;

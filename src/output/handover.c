@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Bodies from the ranks that hold them to the ranks that record them.
 //
-// The world lies on the ranks as the computation wants it; result.h5 has the bodies in the order of their ids. Each body is sent
-// once, by the rank that speaks for it, to the rank whose block of ids holds it (bt_record_blocks). Lost and doubled bodies show here.
+// The world lies on the ranks as the computation wants it; result.h5 has the bodies in the order of their ids. Each
+// body is sent once, by the rank that speaks for it, to the rank whose block of ids holds it (bt_record_blocks). Lost
+// and doubled bodies show here.
 #include "output/handover.h"
 
 #include <math.h>
@@ -21,7 +22,8 @@ typedef struct list {
 
 static list make_list(const bt_comm *c, const bt_world *w, const bt_roster *roster)
 {
-    list l = {.gid = bt_alloc((size_t)w->bodies.n, sizeof *l.gid), .body = bt_alloc((size_t)w->bodies.n, sizeof *l.body),
+    list l = {.gid = bt_alloc((size_t)w->bodies.n, sizeof *l.gid),
+              .body = bt_alloc((size_t)w->bodies.n, sizeof *l.body),
               .first = bt_alloc((size_t)c->size + 1, sizeof *l.first)};
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (!bt_domain_owns(w, i)) continue;
@@ -49,11 +51,13 @@ static int most_vertices(const bt_comm *c, const bt_bodies *b)
 }
 
 /// Vertices in portions: rows as long as the longest outline would take several times the memory of the outlines.
-static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const list *l, const int64_t *offsets, double *vertices, bt_errors *err)
+static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const list *l, const int64_t *offsets,
+                                    double *vertices, bt_errors *err)
 {
     enum { PORTION = 4 };
     const int most = most_vertices(c, b);
-    double (*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows), (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
+    double(*rows)[PORTION][2] = bt_alloc((size_t)l->n, sizeof *rows),
+    (*block)[PORTION][2] = bt_alloc((size_t)l->count, sizeof *block);
     bt_status status = BT_OK;
     for (int from = 0; from < most && status == BT_OK; from += PORTION) {
         for (bt_idx i = 0; i < l->n; i++)
@@ -77,7 +81,8 @@ static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const 
     return status;
 }
 
-bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out, bt_errors *err)
+bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out,
+                             bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;
     list l = make_list(c, w, roster);
@@ -101,8 +106,14 @@ bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roste
     double *vertices = bt_alloc(2 * (size_t)offsets[l.count], sizeof *vertices);
     if (status == BT_OK) status = hand_over_vertices(c, b, &l, offsets, vertices, err);
     free_list(&l);
-    *out = (bt_record_bodies){.n_floes = roster->n_floes, .n_bodies = (bt_idx)b->n_global, .offsets = offsets, .vertices = vertices, .thickness = thickness,
-                              .area = area, .names = roster->names, .towed = (bt_idx)w->towed};
+    *out = (bt_record_bodies){.n_floes = roster->n_floes,
+                              .n_bodies = (bt_idx)b->n_global,
+                              .offsets = offsets,
+                              .vertices = vertices,
+                              .thickness = thickness,
+                              .area = area,
+                              .names = roster->names,
+                              .towed = (bt_idx)w->towed};
     if (status != BT_OK) bt_handover_free(out);
     return status;
 }
@@ -116,7 +127,8 @@ void bt_handover_free(bt_record_bodies *b)
     *b = (bt_record_bodies){0};
 }
 
-bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out, bt_errors *err)
+bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out,
+                            bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;
     double *force = bt_alloc((size_t)b->n, sizeof *force);

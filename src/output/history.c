@@ -4,6 +4,7 @@
 #include "case/cost.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /// Work of the contacts above this fraction of the kinetic energy is no rounding.
@@ -38,11 +39,17 @@ double bt_history_largest(const double *x, int64_t from, int64_t to)
     return most;
 }
 
-void bt_history_init(bt_history *h) { *h = (bt_history){0}; }
+void bt_history_name(int k, char name[80])
+{
+    if (k < BT_N_COLUMNS) snprintf(name, 80, "%s", bt_history_columns[k].name);
+    else snprintf(name, 80, "history/%s_force", bt_force_series_of[bt_law_series(k - BT_N_COLUMNS)].name);
+}
+
+void bt_history_init(bt_history *h) { *h = (bt_history){.n_laws = bt_n_law_series()}; }
 
 void bt_history_free(bt_history *h)
 {
-    for (int k = 0; k < BT_N_COLUMNS; k++) free(h->column[k]);
+    for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) free(*bt_history_column(h, k));
     bt_history_init(h);
 }
 
@@ -50,11 +57,14 @@ void bt_history_add(bt_history *h, const bt_sample *s)
 {
     if (h->n == h->cap) {
         h->cap = h->cap ? 2 * h->cap : 1024;
-        for (int k = 0; k < BT_N_COLUMNS; k++)
-            h->column[k] = bt_realloc(h->column[k], (size_t)h->cap, sizeof(double));
+        for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) {
+            double **x = bt_history_column(h, k);
+            *x = bt_realloc(*x, (size_t)h->cap, sizeof(double));
+        }
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
         h->column[k][h->n] = *(const double *)(const void *)((const char *)s + bt_history_columns[k].offset);
+    for (int k = 0; k < h->n_laws; k++) h->law[k][h->n] = s->law_force[k];
     h->n++;
     h->sum_contacts += s->contacts;
     h->sum_sweeps += s->sweeps;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Collisions as numbers for scripts and readers: how many, the largest, how often a peak is exceeded.
 //
-// Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times: at the rate k/T. The table takes the ranks
-// 1, 2, 5, 10, ...; nothing is fitted and nothing between ranks is made up. A rate near 1/T rests on one peak.
+// Exceedance. Of n peaks in the time T, largest first, F_k is reached or exceeded k times: at the rate k/T. The table
+// takes the ranks 1, 2, 5, 10, ...; nothing is fitted and nothing between ranks is made up. A rate near 1/T rests on
+// one peak.
 #include "output/impact_report.h"
 #include "base/units.h"
 
@@ -82,18 +83,21 @@ void bt_impacts_print(const bt_impact_count *c)
 {
     if (!c || !(c->hours > 0)) return;
     char a[32], b[32];
-    printf("  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n", (long long)c->n, c->start,
-           (double)c->n / c->hours, bt_force_text(a, c->collision_resistance), bt_force_text(b, c->push_resistance));
+    printf(
+        "  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n",
+        (long long)c->n, c->start, (double)c->n / c->hours, bt_force_text(a, c->collision_resistance),
+        bt_force_text(b, c->push_resistance));
     if (c->n > 0) {
         printf("    peaks (%s)", c->conversion);
         double *peaks = sorted(c);
         // A few of the ranks: the largest, then tenfold.
         for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
-            printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]), (double)rank_of(k) / c->hours);
+            printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]),
+                   (double)rank_of(k) / c->hours);
         printf("; largest push %s\n", bt_force_text(a, c->largest_push));
         free(peaks);
     }
     if (c->n_all > c->n)
-        printf("    start             %lld before the window, the largest peak %s, the largest push %s\n", (long long)(c->n_all - c->n),
-               bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
+        printf("    start             %lld before the window, the largest peak %s, the largest push %s\n",
+               (long long)(c->n_all - c->n), bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
 }

@@ -31,7 +31,8 @@ static const struct {
     ROW("duration", duration, false, "s", "conversion duration: of the collision; crushing: time from touch to peak"),
 #undef ROW
 };
-_Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS && sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
+_Static_assert(sizeof columns / sizeof *columns == BT_IMPACT_COLUMNS &&
+                   sizeof(bt_impact) == BT_IMPACT_COLUMNS * sizeof(double),
                "every number of a collision has its column");
 
 /// Numbers x[n] of column k into rows[n].
@@ -50,12 +51,15 @@ static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
 {
     bt_h5 *h = s->h;
     const hsize_t n = (hsize_t)p->n;
-    double *start = bt_alloc(2 * (size_t)p->n + 2, sizeof *start), *middle = bt_alloc(2 * (size_t)p->n, sizeof *middle), *normal = bt_alloc(2 * (size_t)p->n, sizeof *normal);
+    double *start = bt_alloc(2 * (size_t)p->n + 2, sizeof *start), *middle = bt_alloc(2 * (size_t)p->n, sizeof *middle),
+           *normal = bt_alloc(2 * (size_t)p->n, sizeof *normal);
     for (int k = 0; k <= p->n; k++) bt_panels_point(p, k, start + 2 * k, NULL);
     for (int k = 0; k < p->n; k++) bt_panels_point(p, k + 0.5, middle + 2 * k, normal + 2 * k);
     bt_h5_group(h, "/panels");
     bt_h5_attr_double(h, "/panels", "length", p->arc[p->n_vertices] / p->n);
-    bt_h5_attr_text(h, "/panels", "description", "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the body's own x axis");
+    bt_h5_attr_text(h, "/panels", "description",
+                    "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the "
+                    "body's own x axis");
     bt_h5_write(h, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
     describe(h, "/panels/ends", "m", "panel k reaches from point k to k + 1, frame of the towed body");
     bt_h5_write(h, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
@@ -68,13 +72,17 @@ static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
     if (!series) return;
     s->force = bt_h5_growing(h, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n}, false);
     s->normal = bt_h5_growing(h, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
-    describe(h, "/panels/force", "N", "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry of /series");
-    describe(h, "/panels/load", "N", "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
+    describe(h, "/panels/force", "N",
+             "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry "
+             "of /series");
+    describe(h, "/panels/load", "N",
+             "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
 }
 
 void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, const bt_case *c)
 {
-    *s = (bt_impact_store){.h = h, .from = m, .earliest = bt_case_earliest_window(c), .force = -1, .normal = -1, .n_panels = m->panels.n};
+    *s = (bt_impact_store){
+        .h = h, .from = m, .earliest = bt_case_earliest_window(c), .force = -1, .normal = -1, .n_panels = m->panels.n};
     bt_panel_blocks_init(&s->blocks, s->n_panels);
     bt_h5_group(h, "/impacts");
     char text[160], path[64];
@@ -83,7 +91,8 @@ void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, c
     bt_h5_attr_text(h, "/impacts", "description", "collisions with the towed body in the order in which they ended");
     for (int k = 0; k < BT_IMPACT_COLUMNS; k++) {
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
-        s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){CHUNK, 1}, false);
+        s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
+                                     (hsize_t[]){CHUNK, 1}, false);
         describe(h, path, columns[k].units, columns[k].description);
     }
     s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
@@ -158,7 +167,8 @@ void bt_impact_store_write(bt_impact_store *s)
     write_rows(s);
     if (s->n_samples > 0) {
         bt_h5_append(s->h, s->force, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->forces);
-        bt_h5_append(s->h, s->normal, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples, s->normals);
+        bt_h5_append(s->h, s->normal, H5T_NATIVE_DOUBLE, (hsize_t)s->samples_written, (hsize_t)s->n_samples,
+                     s->normals);
     }
     s->samples_written += s->n_samples;
     s->n_samples = 0;
@@ -201,7 +211,8 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
     bt_h5_attr_double(h, "/panels", "from", w->start);
     bt_h5_attr_int(h, "/panels", "steps", w->n);
     bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
-    describe(h, "/panels/mean_force", "N", "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
+    describe(h, "/panels/mean_force", "N",
+             "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
     const struct { const char *path, *text; } of_normals[] = {
         {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
         {"/panels/max_load", "largest sum of the normal forces in a step of the window, impulse / dt"},
@@ -222,7 +233,10 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
 
 static const bt_state_row state_rows[] = {
 #define STATE(member) {#member, BT_ITEM_I64, 1, offsetof(bt_impact_store, member)}
-    STATE(written), STATE(n_merged), STATE(samples_written), {"panel_steps", BT_ITEM_I64, 1, offsetof(bt_impact_store, blocks.steps)},
+    STATE(written),
+    STATE(n_merged),
+    STATE(samples_written),
+    {"panel_steps", BT_ITEM_I64, 1, offsetof(bt_impact_store, blocks.steps)},
 #undef STATE
 };
 enum { N_STATE = sizeof state_rows / sizeof *state_rows, LOADS_WIDTH = sizeof(bt_panel_loads) / sizeof(double) };
@@ -232,7 +246,8 @@ void bt_impact_store_save(const bt_impact_store *s, bt_snapshot *to)
     if (!s->h) return;
     bt_snapshot_add_rows(to, "collisions", state_rows, N_STATE, s);
     bt_snapshot_add(to, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
-    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps), LOADS_WIDTH, s->blocks.load);
+    bt_snapshot_add(to, "collisions/panel_blocks", BT_ITEM_F64, bt_panel_blocks_rows(&s->blocks, s->blocks.steps),
+                    LOADS_WIDTH, s->blocks.load);
 }
 
 /// Can the rows that are kept be counted?
@@ -263,7 +278,10 @@ static void load_rows(bt_impact_store *s, bt_h5_reader *old, int64_t n)
         if (old->status == BT_OK && rows_sound(s)) {
             write_rows(s);
         } else if (old->status == BT_OK) {
-            bt_errors_add(old->err, "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is damaged: restore it", old->path);
+            bt_errors_add(old->err,
+                          "%s: /impacts holds a collision on no panel of this body, or one that is not finite; it is "
+                          "damaged: restore it",
+                          old->path);
             old->status = BT_ERR_CASE;
         }
     }
@@ -285,8 +303,11 @@ static void load_blocks(bt_impact_store *s, bt_snapshot *from, int64_t steps)
     bool finite = true;
     for (int64_t k = 0; k < rows * LOADS_WIDTH; k++) finite = finite && isfinite(load[k]);
     bt_snapshot_want(from, finite, "collisions/panel_blocks", -1, "is not finite");
-    bt_snapshot_want(from, steps == late_steps(s, bt_snapshot_int(from, "world/step")), "collisions/panel_steps", -1, "does not fit the number of steps");
-    if (!from->faulty) bt_snapshot_want(from, rows == bt_panel_blocks_rows(&s->blocks, steps), "collisions/panel_blocks", -1, "does not fit the number of steps");
+    bt_snapshot_want(from, steps == late_steps(s, bt_snapshot_int(from, "world/step")), "collisions/panel_steps", -1,
+                     "does not fit the number of steps");
+    if (!from->faulty)
+        bt_snapshot_want(from, rows == bt_panel_blocks_rows(&s->blocks, steps), "collisions/panel_blocks", -1,
+                         "does not fit the number of steps");
     if (from->faulty) free(load);
     else bt_panel_blocks_restore(&s->blocks, steps, (bt_panel_loads *)(void *)load);
 }
@@ -298,9 +319,12 @@ void bt_impact_store_load(bt_impact_store *s, bt_snapshot *from, bt_h5_reader *o
     bt_snapshot_take_rows(from, "collisions", state_rows, N_STATE, &then);
     bt_snapshot_take(from, "collisions/sum", BT_ITEM_F64, s->n_panels, 3, s->sum);
     const int64_t there = bt_h5_size(old, "/impacts/time", 0), entries = bt_snapshot_int(from, "record/entries");
-    bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1, "is not the number of steps in the entry under way");
-    bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1, "is not a number of collisions that result.h5 has");
-    bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1, "is not the number of entries");
+    bt_snapshot_want(from, then.n_merged == bt_snapshot_int(from, "record/merged_steps"), "collisions/n_merged", -1,
+                     "is not the number of steps in the entry under way");
+    bt_snapshot_want(from, then.written >= 0 && then.written <= there, "collisions/written", -1,
+                     "is not a number of collisions that result.h5 has");
+    bt_snapshot_want(from, then.samples_written == (s->force >= 0 ? entries : 0), "collisions/samples_written", -1,
+                     "is not the number of entries");
     load_blocks(s, from, then.blocks.steps);
     if (from->faulty || old->status != BT_OK) return;
     s->n_merged = then.n_merged;

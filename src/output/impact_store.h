@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Collisions and panel loads in result.h5: /impacts row by row as they end, /panels (private to the recorder). On rank 0.
+// Collisions and panel loads in result.h5: /impacts row by row as they end, /panels (private to the recorder). On rank
+// 0.
 #ifndef BT_IMPACT_STORE_H
 #define BT_IMPACT_STORE_H
 

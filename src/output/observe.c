@@ -2,7 +2,8 @@
 // Forces on the towed body and balances of one step.
 //
 // Momentum balance of the towed body, along the tow direction d:
-//     J_tow = M ΔU·d + (J_ice + J_drag + J_Coriolis + J_tilt)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt)
+//     J_tow = M ΔU·d + (J_ice + Σ J_law)·(−d)      (tow = inertia + ice resistance + drag + Coriolis + tilt + … of the
+//     table of force laws)
 // On a line J_tow is the line's own impulse, so the balance is a check. Under a prescribed velocity J_tow is what
 // the balance leaves; the check is then the resistance found without the rows of the body: from the
 // momentum that everything else has gained (ice_resistance_budget).
@@ -14,7 +15,7 @@
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
 #include "partition/domain.h"
@@ -22,15 +23,15 @@
 
 enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
 
-/// One tile's share of the sums over contacts and floes.
-static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
+/// One cell's share of the sums over contacts and floes.
+static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_tile *tile = &w->tiles->tile[k];
+    const bt_cell *cell = &w->cells->cell[k];
     const bt_idx towed = bt_world_towed(w);
     const double dx = w->tow ? w->tow->ux : 0, dy = w->tow ? w->tow->uy : 0;
     const bool prescribed = towed >= 0 && b->motion[towed] != BT_DYNAMIC;
-    for (bt_idx i = tile->first; i < tile->end; i++) {
+    for (bt_idx i = cell->first; i < cell->end; i++) {
         if (b->motion[i] != BT_DYNAMIC || i == towed) continue;
         const bt_vel *v = &b->vel[i];
         if (v->x * v->x + v->y * v->y > slow2) bt_sum_add(&t->sum[MOVING], 1);
@@ -38,8 +39,8 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
         if (prescribed && (ux != 0 || uy != 0)) bt_sum_add(&t->sum[BUDGET], -(ux * dx + uy * dy) / b->inv[i].m);
     }
     if (towed < 0) return;
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_unit *u = &tile->units[j];
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
         const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
@@ -49,7 +50,8 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
             const double *arm = is_b ? u->rbn : u->ran;
             bt_sum_add(&t->sum[ICE_X], sign * jx);
             bt_sum_add(&t->sum[ICE_Y], sign * jy);
-            bt_sum_add(&t->sum[ICE_TURN], sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
+            bt_sum_add(&t->sum[ICE_TURN],
+                       sign * (u->ln[0] * arm[0] + u->ln[1] * arm[1] + u->lt * (is_b ? u->rbt : u->rat)));
             bt_sum_add(&t->sum[TOUCHING], (u->ln[0] > 0) + (u->ln[1] > 0));
         } else if (prescribed) { // impulses that came from the other bodies of infinite mass
             const double sign = (b->inv[u->a].m == 0) - (b->inv[u->b].m == 0);
@@ -58,17 +60,19 @@ static void observe_tile(const bt_world *w, bt_idx k, double slow2, bt_totals *t
     }
 }
 
-static bt_totals observe_tiles(const bt_world *w, double slow2)
+static bt_totals observe_cells(const bt_world *w, double slow2)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     bt_totals all = {.n_sums = N_SEEN};
-#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
     {
         bt_totals t = {.n_sums = N_SEEN};
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx j = 0; j < ts->n_busy; j++) {
             const bt_idx k = ts->busy[j];
-            if (ts->tile[k].own && (k == ts->n - 1 || bt_tiles_moves(ts, k) || ts->tile[k].n_units > 0 || !ts->still)) observe_tile(w, k, slow2, &t);
+            if (ts->cell[k].own &&
+                (k == ts->n - 1 || bt_cells_moves(ts, k) || ts->cell[k].n_contacts > 0 || !ts->still))
+                observe_cell(w, k, slow2, &t);
         }
 #pragma omp critical
         bt_totals_merge(&all, &t);
@@ -118,23 +122,40 @@ static void observe_line(const bt_tow *tow, bt_sample *s)
     s->vessel_line = s->tow_force; // both along the course
 }
 
+/// Force of a series on the towed body against the tow direction, N.
+static double force_against(const bt_world *w, int series)
+{
+    const bt_impulse *j = &w->forces->series[series];
+    return 0.0 - (j->x * w->tow->ux + j->y * w->tow->uy) / w->par.dt; // 0 − x, for no −0 in open water
+}
+
+/// What holds the body back beside ice and inertia, in the order of the table: water, air, Coriolis, tilt, ….
+static double add_forces(const bt_world *w, double sum)
+{
+    for (int k = 0; k < w->forces->n_series; k++)
+        if (!bt_force_series_of[k].part) sum += force_against(w, k);
+    return sum;
+}
+
 static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
 {
     const bt_bodies *b = &w->bodies;
     const bt_idx t = bt_world_towed(w);
     const bt_tow *tow = w->tow;
     const double dt = w->par.dt, dx = tow->ux, dy = tow->uy;
-    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]), bt_sum_value(&seen->sum[ICE_TURN])};
-    const bt_external e = bt_forces_external(w, t);
+    const double ice[3] = {bt_sum_value(&seen->sum[ICE_X]), bt_sum_value(&seen->sum[ICE_Y]),
+                           bt_sum_value(&seen->sum[ICE_TURN])};
     s->ice_force_x = ice[0] / dt;
     s->ice_force_y = ice[1] / dt;
     s->ice_moment = ice[2] / dt;
-    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt; // 0 − x, for no −0 in open water
+    s->ice_resistance = 0.0 - (ice[0] * dx + ice[1] * dy) / dt;
     s->ice_resistance_budget = -budget_impulse(w, seen, dx, dy) / dt;
-    s->drag_force = 0.0 - (e.drag[0] * dx + e.drag[1] * dy) / dt;
-    s->coriolis_force = 0.0 - (e.coriolis[0] * dx + e.coriolis[1] * dy) / dt;
-    s->tilt_force = 0.0 - (e.tilt[0] * dx + e.tilt[1] * dy) / dt;
-    s->inertia_force = b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
+    s->drag_force = force_against(w, bt_force_series_find("drag"));
+    s->coriolis_force = force_against(w, bt_force_series_find("coriolis"));
+    s->tilt_force = force_against(w, bt_force_series_find("tilt"));
+    for (int k = 0; k < bt_n_law_series(); k++) s->law_force[k] = force_against(w, bt_law_series(k));
+    s->inertia_force =
+        b->mass[t] * ((b->vel[t].x - b->vel_start[t].x) * dx + (b->vel[t].y - b->vel_start[t].y) * dy) / dt;
     s->body_x = tow->travel_x;
     s->body_y = tow->travel_y;
     s->body_yaw = b->pose[t].yaw;
@@ -144,7 +165,7 @@ static void observe_body(const bt_world *w, const bt_totals *seen, bt_sample *s)
     if (bt_tow_has_line(tow)) {
         observe_line(tow, s);
     } else if (tow->mode == BT_TOW_SPEED) {
-        s->tow_force = s->ice_resistance + s->drag_force + s->coriolis_force + s->tilt_force + s->inertia_force;
+        s->tow_force = add_forces(w, s->ice_resistance) + s->inertia_force;
     } else {
         s->tow_force = 0;
     }
@@ -165,8 +186,10 @@ static void observe_impacts(const bt_world *w, bt_sample *s)
 unsigned bt_observe_applies(const bt_world *w)
 {
     const bool body = w->towed >= 0, line = body && bt_tow_has_line(w->tow);
-    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE | (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
-           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL | (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
+    return 1u << BT_APPLIES_ALWAYS | (unsigned)body << BT_APPLIES_BODY | (unsigned)line << BT_APPLIES_LINE |
+           (unsigned)(line && w->tow->n_branches > 1) << BT_APPLIES_BRIDLE |
+           (unsigned)(line && w->tow->mode == BT_TOW_THRUST) << BT_APPLIES_VESSEL |
+           (unsigned)(body && w->impacts && w->tow) << BT_APPLIES_IMPACTS |
            (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
 }
 
@@ -207,7 +230,7 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         .wind_y = w->par.air_v,
     };
     const double slow2 = 1e-4 * reference_speed * reference_speed;
-    const bt_totals seen = observe_tiles(w, slow2);
+    const bt_totals seen = observe_cells(w, slow2);
     s->moving = bt_sum_value(&seen.sum[MOVING]);
     const unsigned has = bt_observe_applies(w);
     if (has & 1u << BT_APPLIES_BODY) observe_body(w, &seen, s);
@@ -217,8 +240,9 @@ void bt_observe(const bt_world *w, double reference_speed, bt_sample *s)
         s->window_renewed = (double)w->window->renewed_now;
         s->window_waiting = (double)w->window->waiting;
     }
-    for (int k = 0; k < bt_n_series_fields; k++)
-        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
+    for (int k = 0; k < bt_n_series(); k++)
+        if (!(has & 1u << bt_series_fields[k].applies))
+            *(double *)(void *)((char *)s + bt_series_fields[k].offset) = NAN;
 }
 
 double bt_observe_ice_area(const bt_world *w)
@@ -234,9 +258,9 @@ double bt_observe_ice_area(const bt_world *w)
 void bt_observe_contact_force(const bt_world *w, double *force)
 {
     for (bt_idx i = 0; i < w->bodies.n; i++) force[i] = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-            const bt_unit *u = &w->tiles->tile[k].units[j];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+            const bt_contact *u = &w->cells->cell[k].contacts[j];
             if (u->n == 0) continue; // friction of sheets is spread over them
             const double f = (u->ln[0] + u->ln[1]) / w->par.dt;
             force[u->a] = bt_max(force[u->a], f);

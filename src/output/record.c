@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What a run leaves behind: result.h5 while it runs, case.resolved.yml before, summary.json and frames.xdmf after it.
 //
-// result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to then, so that a
-// calculation can be watched; killed within a flush, some series have its length and some that of the last, all rows whole (h5driver.c). Under its
-// final name, result.h5, stands only what is complete and sealed (seal.h): a copy of it at each checkpoint (record_resume.c), and at the end the
-// file itself (attribute "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and renamed.
+// result.part.h5 is what the run writes: after each flush all series have one length and the file is complete up to
+// then, so that a calculation can be watched; killed within a flush, some series have its length and some that of the
+// last, all rows whole (h5driver.c). Under its final name, result.h5, stands only what is complete and protected by a
+// checksum (checksum.h): a copy of it at each checkpoint (record_resume.c), and at the end the file itself (attribute
+// "complete" of the root: 0 until the run has closed it). The small text files are written under a temporary name and
+// renamed.
 #include "output/record.h"
 
 #include <math.h>
@@ -16,7 +18,7 @@
 #include "base/fileio.h"
 #include "base/provenance.h"
 #include "output/record_parts.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "output/xdmf.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
@@ -28,7 +30,7 @@ static void create_series(bt_record *r)
     bt_h5_group(&r->h5, "/series");
     const int64_t every = r->c->output.sample_every;
     bt_h5_attr_int(&r->h5, "/series", "steps_per_sample", every > 1 ? every : 1);
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         const bt_series_field *f = &bt_series_fields[k];
         char *name = bt_file_join("/series", f->name);
         r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
@@ -44,11 +46,13 @@ static void create_events(bt_record *r)
 {
     static const char *const names[4] = {"/events/time", "/events/kind", "/events/subject", "/events/value"};
     static const char *const units[4] = {"s", "", "", "see kind"};
-    static const char *const texts[4] = {"end of the step", "index into kind_names", "which branch (line_broken) or way-point (waypoint), from 1",
+    static const char *const texts[4] = {"end of the step", "index into kind_names",
+                                         "which branch (line_broken) or way-point (waypoint), from 1",
                                          "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"};
     bt_h5_group(&r->h5, "/events");
     for (int k = 0; k < 4; k++) {
-        r->events[k] = bt_h5_growing(&r->h5, names[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){64, 1}, false);
+        r->events[k] = bt_h5_growing(&r->h5, names[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
+                                     (hsize_t[]){64, 1}, false);
         bt_h5_attr_text(&r->h5, names[k], "units", units[k]);
         bt_h5_attr_text(&r->h5, names[k], "description", texts[k]);
     }
@@ -62,7 +66,9 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err)
     for (; r->n_events < e->n; r->n_events++) {
         const bt_event *v = &e->event[r->n_events];
         const void *const column[4] = {&v->time, &v->kind, &v->subject, &v->value};
-        for (int k = 0; k < 4; k++) bt_h5_append(&r->h5, r->events[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, (hsize_t)r->n_events, 1, column[k]);
+        for (int k = 0; k < 4; k++)
+            bt_h5_append(&r->h5, r->events[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, (hsize_t)r->n_events, 1,
+                         column[k]);
     }
     return r->h5.status;
 }
@@ -81,7 +87,7 @@ static void record_free(bt_record *r)
 /// Close datasets and file; returns the status of everything that went to the file.
 static bt_status close_file(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series_fields; k++)
+    for (int k = 0; k < bt_n_series(); k++)
         if (r->series[k] >= 0) H5Dclose(r->series[k]);
     for (int k = 0; k < 4; k++)
         if (r->events[k] >= 0) H5Dclose(r->events[k]);
@@ -103,7 +109,9 @@ bt_status bt_record_write_text(const bt_record *r, const char *name, const char 
 static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
 {
     bt_status status = bt_file_make_dir(r->dir, err);
-    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", "checkpoint.h5.tmp", BT_RESULT_FILE, "frames.xdmf", "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5", "stop"};
+    static const char *const stale[] = {
+        "summary.json",  BT_RESULT_FILE ".tmp",    "checkpoint.h5.tmp",     BT_RESULT_FILE, "frames.xdmf",
+        "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5",   "stop"};
     for (size_t k = 0; k < (fresh ? sizeof stale / sizeof *stale : 3) && status == BT_OK; k++) {
         char *path = bt_file_join(r->dir, stale[k]);
         status = bt_file_remove(path, err);
@@ -112,8 +120,8 @@ static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fres
     return status == BT_OK && fresh ? bt_record_write_text(r, "case.resolved.yml", resolved, err) : status;
 }
 
-static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bool fresh,
-                             bt_errors *err)
+static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c,
+                             const bt_record_bodies *b, const char *command_line, bool fresh, bt_errors *err)
 {
     *out = NULL;
     bt_record *r = bt_alloc(1, sizeof *r);
@@ -124,9 +132,9 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     r->towed = b->towed;
     r->last_flush = bt_clock();
     bt_history_init(&r->history);
-    r->buffer = bt_alloc((size_t)bt_n_series_fields * BT_RECORD_BUFFER, sizeof *r->buffer);
-    r->series = bt_alloc((size_t)bt_n_series_fields, sizeof *r->series);
-    for (int k = 0; k < bt_n_series_fields; k++) r->series[k] = -1;
+    r->buffer = bt_alloc((size_t)bt_n_series() * BT_RECORD_BUFFER, sizeof *r->buffer);
+    r->series = bt_alloc((size_t)bt_n_series(), sizeof *r->series);
+    for (int k = 0; k < bt_n_series(); k++) r->series[k] = -1;
     for (int k = 0; k < 4; k++) r->events[k] = -1;
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
@@ -160,12 +168,14 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     return BT_OK;
 }
 
-bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
+                         const bt_record_bodies *b, const char *command_line, bt_errors *err)
 {
     return open_record(r, comm, dir, c, b, command_line, true, err);
 }
 
-bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b, const char *command_line, bt_errors *err)
+bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
+                           const bt_record_bodies *b, const char *command_line, bt_errors *err)
 {
     return open_record(r, comm, dir, c, b, command_line, false, err);
 }
@@ -182,7 +192,7 @@ static double *member(bt_sample *s, int k) { return (double *)(void *)((char *)s
 
 void bt_record_flush(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series_fields; k++)
+    for (int k = 0; k < bt_n_series(); k++)
         bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, (hsize_t)r->written, (hsize_t)r->buffered,
                      r->buffer + (size_t)k * BT_RECORD_BUFFER);
     r->written += r->buffered;
@@ -195,7 +205,7 @@ void bt_record_flush(bt_record *r)
 /// Move the merged steps to the buffer as one entry.
 static void end_entry(bt_record *r)
 {
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         double value = *member(&r->merged, k);
         if (bt_series_fields[k].keep == BT_KEEP_MEAN) value /= (double)r->n_merged;
         r->buffer[(size_t)k * BT_RECORD_BUFFER + (size_t)r->buffered] = value;
@@ -211,7 +221,7 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
     r->h5.err = err;
     bt_history_add(&r->history, s);
     bt_impact_store_take(&r->impacts, s->time);
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         double *m = member(&r->merged, k);
         const double x = bt_sample_value(s, &bt_series_fields[k]);
         switch (r->n_merged ? bt_series_fields[k].keep : BT_KEEP_LAST) {
@@ -222,7 +232,8 @@ bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err)
         }
     }
     if (++r->n_merged >= r->c->output.sample_every) end_entry(r);
-    if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS)) bt_record_flush(r);
+    if (r->buffered == BT_RECORD_BUFFER || (r->buffered > 0 && bt_clock() - r->last_flush > FLUSH_SECONDS))
+        bt_record_flush(r);
     return r->h5.status;
 }
 
@@ -286,7 +297,7 @@ static bt_status write_summary(const bt_record *r, const bt_run_totals *t, bt_er
 static bt_status hand_in(const bt_record *r, bt_errors *err)
 {
     char *part = bt_file_join(r->dir, BT_RESULT_PART), *path = bt_file_join(r->dir, BT_RESULT_FILE);
-    bt_status status = bt_seal_write(part, BT_SEAL_RESULT, err);
+    bt_status status = bt_checksum_write(part, BT_CHECKSUM_RESULT, err);
     if (status == BT_OK) status = bt_file_rename(part, path, err);
     free(part);
     free(path);

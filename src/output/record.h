@@ -9,13 +9,14 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 #include "bergtow/event.h"
+#include "bergtow/forces.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "output/stall.h"
 
 /// One step as the recorder sees it. Forces on the towed body are means over the step (impulse / Δt). "Along" is the
 /// tow direction; resisting components are positive against it, so that
-/// tow = ice + drag + Coriolis + tilt + inertia.
+/// tow = ice + drag + Coriolis + tilt + other laws + inertia.
 typedef struct bt_sample {
     double time;            ///< s, end of the step
     double tow_force;       ///< N along
@@ -28,10 +29,12 @@ typedef struct bt_sample {
     double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
-    double line_tension, line_length, carriage_x, carriage_y; ///< N (the larger of two branches), m (the first), m, m (NaN without a line)
+    /// N (the larger of two branches), m (the first), m, m (NaN without a line)
+    double line_tension, line_length, carriage_x, carriage_y;
     double line_tension_1, line_tension_2; ///< N by branch; NaN without it
     double vessel_x, vessel_y, vessel_speed; ///< m, m, m/s along its course (NaN without a vessel)
-    double vessel_thrust, vessel_drag, vessel_inertia, vessel_line; ///< N along its course: thrust = drag + inertia + line
+    /// N along its course: thrust = drag + inertia + line
+    double vessel_thrust, vessel_drag, vessel_inertia, vessel_line;
     double current_x, current_y, wind_x, wind_y; ///< m/s, of the step (its middle, where they change)
     double contacts;        ///< contact points in the solver
     double contacts_body;   ///< of them on the towed body
@@ -40,7 +43,7 @@ typedef struct bt_sample {
     double unprojected;     ///< 1 if the position projection met its limit
     double residual;        ///< natural-map residual at the end of the step, max-norm, m/s
     double residual_rms;    ///< the same, root mean square over the rows, m/s
-    double active;          ///< floes in tiles whose contacts were looked at; the others rest
+    double active;          ///< floes in cells whose contacts were looked at; the others rest
     double unconverged;     ///< 1 if the limit of work came before the tolerance
     double overlap;         ///< deepest overlap found at the start of the step, m
     double momentum_residual; ///< |Σ M ΔU − external impulse| / momentum exchanged
@@ -52,7 +55,8 @@ typedef struct bt_sample {
     double collision_resistance; ///< N, the part of ice_resistance that collisions have (impact.h); the rest is push
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
-    double largest_push;    ///< largest force of a floe on the body that no collision explains, N; NaN as for the collisions
+    /// largest force of a floe on the body that no collision explains, N; NaN as for the collisions
+    double largest_push;
     double moving;          ///< floes faster than 1 % of the reference speed
     double crushing;        ///< contact points that crush (crush.h)
     double crushed_work;    ///< taken by them in the step, J
@@ -66,12 +70,23 @@ typedef struct bt_sample {
     double window_x;        ///< low end of the moving window, m (NaN, as the next two, where the domain stands still)
     double window_renewed;  ///< floes that were taken out behind and put in ahead at the start of the step
     double window_waiting;  ///< floes behind it whose place ahead is not free, when it last moved
+    double law_force[BT_MAX_FORCE_LAWS]; ///< N, of the other force laws against the tow direction: [bt_n_law_series()]
 } bt_sample;
 
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep; ///< how samples of several steps merge
 
-/// What a run must have for a number of its series to mean anything. Where it has not, the number is NaN, and nowhere else.
-typedef enum { BT_APPLIES_ALWAYS, BT_APPLIES_BODY, BT_APPLIES_LINE, BT_APPLIES_BRIDLE, BT_APPLIES_VESSEL, BT_APPLIES_IMPACTS, BT_APPLIES_WINDOW, BT_APPLIES_KINDS } bt_applies;
+/// What a run must have for a number of its series to mean anything. Where it has not, the number is NaN, and nowhere
+/// else.
+typedef enum {
+    BT_APPLIES_ALWAYS,
+    BT_APPLIES_BODY,
+    BT_APPLIES_LINE,
+    BT_APPLIES_BRIDLE,
+    BT_APPLIES_VESSEL,
+    BT_APPLIES_IMPACTS,
+    BT_APPLIES_WINDOW,
+    BT_APPLIES_KINDS
+} bt_applies;
 extern const char *const bt_applies_names[BT_APPLIES_KINDS]; ///< "with a tow line"
 
 typedef struct bt_series_field {
@@ -81,8 +96,15 @@ typedef struct bt_series_field {
     bt_applies applies;
 } bt_series_field;
 
-extern const bt_series_field bt_series_fields[];
-extern const int bt_n_series_fields;
+extern bt_series_field bt_series_fields[]; ///< [bt_n_series()]
+
+/// The number of series, those of force laws that have been registered since the last call included.
+int bt_n_series(void);
+
+/// Series of force laws beside drag, Coriolis and tilt, which have members of their own: how many, and the k-th as an
+/// index into bt_force_series_of.
+int bt_n_law_series(void);
+int bt_law_series(int k);
 
 /// A number of a sample by its field.
 static inline double bt_sample_value(const bt_sample *s, const bt_series_field *f)
@@ -95,7 +117,8 @@ static inline double bt_sample_value(const bt_sample *s, const bt_series_field *
 /// Larger than any quantity of a run, and small enough for the squares that the statistics sum up.
 #define BT_SAMPLE_MOST 1e100
 
-/// The first field that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the sample is sound.
+/// The first field that applies and is no number below BT_SAMPLE_MOST, or does not apply and is a number; NULL = the
+/// sample is sound.
 /// has: bit 1 << k for each bt_applies k of the run.
 const bt_series_field *bt_sample_fault(const bt_sample *s, unsigned has);
 
@@ -106,12 +129,12 @@ typedef struct bt_phases {
 
 struct bt_impacts;
 
-/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order of their
-/// ids; the other bodies are the last rank's. first: [size + 1].
+/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order
+/// of their ids; the other bodies are the last rank's. first: [size + 1].
 void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
 
-/// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes first,
-/// then (on the last rank) other bodies. Without MPI the block is everything.
+/// Bodies as the recorder needs them; the arrays belong to the caller, and hold the bodies of this rank's block: floes
+/// first, then (on the last rank) other bodies. Without MPI the block is everything.
 typedef struct bt_record_bodies {
     bt_idx n_floes, n_bodies;    ///< of all ranks; bodies = floes + hand-made fixed bodies + towed body + walls
     const int64_t *offsets;      ///< [bodies of the block + 1]
@@ -135,7 +158,8 @@ typedef struct bt_run_totals {
     int ranks, threads;
     double dt, wall_time;
     double mean_size;            ///< mean equivalent diameter of the floes, m
-    double mean_thickness, mean_radius; ///< weighted with area, of the field: for the estimates, m; 0 = as the case asks for
+    /// weighted with area, of the field: for the estimates, m; 0 = as the case asks for
+    double mean_thickness, mean_radius;
     double concentration;        ///< as made
     bt_lead_stats lead;          ///< what was cut into it then
     double ice_area;             ///< of all floes in the run, m²
@@ -150,38 +174,44 @@ typedef struct bt_run_totals {
     int64_t divisions, moved_floes;
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
-    double sweep_bytes_per_contact; ///< what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    /// what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    double sweep_bytes_per_contact;
     const bt_events *events;     ///< what happened, or NULL
     const char *stopped;         ///< why the run ended early, or NULL
 } bt_run_totals;
 
 typedef struct bt_record bt_record;
 
-/// Collective. Open dir (made if missing), write case.resolved.yml and result.part.h5 with case, provenance and bodies; what an earlier run has
-/// left in dir is removed. result.h5 is there once it is complete, see bt_record_publish. c and comm must stay valid until the record is closed; b is copied.
+/// Collective. Open dir (made if missing), write case.resolved.yml and result.part.h5 with case, provenance and bodies;
+/// what an earlier run has left in dir is removed. result.h5 is there once it is complete, see bt_record_publish. c and
+/// comm must stay valid until the record is closed; b is copied.
 /// Errors: BT_ERR_IO with path and remedy, on all ranks, the message on those that met it.
-bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
-                         const char *command_line, bt_errors *err);
+bt_status bt_record_open(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
+                         const bt_record_bodies *b, const char *command_line, bt_errors *err);
 
-/// Collective. The same for a run that goes on from a checkpoint in dir: nothing but its summary is removed. Then bt_record_load.
-bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c, const bt_record_bodies *b,
-                           const char *command_line, bt_errors *err);
+/// Collective. The same for a run that goes on from a checkpoint in dir: nothing but its summary is removed. Then
+/// bt_record_load.
+bt_status bt_record_reopen(bt_record **r, const bt_comm *comm, const char *dir, const bt_case *c,
+                           const bt_record_bodies *b, const char *command_line, bt_errors *err);
 
 struct bt_snapshot;
 
-/// Where the record stands, on rank 0; all it has taken is in the file then. n_frames: of those taken, how many belong to the run whatever
-/// its end is. The status is that of rank 0.
+/// Where the record stands, on rank 0; all it has taken is in the file then. n_frames: of those taken, how many belong
+/// to the run whatever its end is. The status is that of rank 0.
 bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, bt_errors *err);
 
-/// Collective. result.h5 and frames.xdmf as they are now: a sealed copy of the file under way, in place of what was there.
+/// Collective. result.h5 and frames.xdmf as they are now: a protected by a checksum copy of the file under way, in
+/// place of what was there.
 bt_status bt_record_publish(bt_record *r, bt_errors *err);
 
-/// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from result.h5, which may
-/// hold more by now; events from e. After bt_record_reopen and bt_record_watch_impacts. Errors: BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
+/// Collective. Go on where the record stood: series, frames, collisions and panel loads up to there are copied from
+/// result.h5, which may hold more by now; events from e. After bt_record_reopen and bt_record_watch_impacts. Errors:
+/// BT_ERR_CASE (result.h5 is damaged, or holds less), BT_ERR_IO.
 bt_status bt_record_load(bt_record *r, struct bt_snapshot *s, const bt_events *e, bt_errors *err);
 
-/// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left in m, which must stay
-/// valid until the record is closed. Before the first sample. The status is that of rank 0: agree on it.
+/// Store collisions and panel loads too (/impacts, /panels): every later bt_record_sample takes what the step has left
+/// in m, which must stay valid until the record is closed. Before the first sample. The status is that of rank 0: agree
+/// on it.
 bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_errors *err);
 
 /// Take one step's numbers. output.sample_every steps merge into one entry of the series by the table's rule; a rest at
@@ -191,29 +221,30 @@ bt_status bt_record_watch_impacts(bt_record *r, const struct bt_impacts *m, bt_e
 /// that of rank 0: agree on it.
 bt_status bt_record_sample(bt_record *r, const bt_sample *s, bt_errors *err);
 
-/// An overlap that no sample holds: that of the last state, m. After bt_record_save, whose state a further step goes on from and measures
-/// again. On rank 0.
+/// An overlap that no sample holds: that of the last state, m. After bt_record_save, whose state a further step goes on
+/// from and measures again. On rank 0.
 void bt_record_overlap(bt_record *r, double overlap);
 
-/// Write the events that came since the last call into /events (time, kind, subject, value; names of the kinds in kind_names). On rank 0, as
-/// for bt_record_sample.
+/// Write the events that came since the last call into /events (time, kind, subject, value; names of the kinds in
+/// kind_names). On rank 0, as for bt_record_sample.
 bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 
 /// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
 /// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies]; and
-/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/output/xdmf.c). The status is the same on all
-/// ranks.
+/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/output/xdmf.c). The status is
+/// the same on all ranks.
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err);
 
-/// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t = NULL closes a run
-/// that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no summary.
+/// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t =
+/// NULL closes a run that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no
+/// summary.
 bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
 /// Collective. Close and free a record that is of no use, and remove result.part.h5.
 void bt_record_abandon(bt_record *r);
 
-/// Print the end-of-run table (summary and phases) on stdout. On rank 0, after the last sample and before the record is closed with the same t.
-/// What cannot be written or read back is told in err, and is the status of bt_record_close.
+/// Print the end-of-run table (summary and phases) on stdout. On rank 0, after the last sample and before the record is
+/// closed with the same t. What cannot be written or read back is told in err, and is the status of bt_record_close.
 void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
 #endif

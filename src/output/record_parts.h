@@ -21,8 +21,8 @@ struct bt_record {
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
     // series
-    hid_t *series;         ///< [bt_n_series_fields]
-    double *buffer;        ///< [bt_n_series_fields][BT_RECORD_BUFFER]
+    hid_t *series;         ///< [bt_n_series()]
+    double *buffer;        ///< [bt_n_series()][BT_RECORD_BUFFER]
     int64_t written, buffered;
     bt_sample merged;      ///< of the steps of the present entry
     int64_t n_merged;

@@ -1,31 +1,52 @@
 // SPDX-License-Identifier: MIT
 // A record that is complete at every moment, and goes on after a stop without gap, overlap or difference.
 //
-// At a checkpoint the file under way is flushed and copied, and the copy takes the name result.h5. A run that goes on writes a new file and fills
-// it from result.h5 up to the counts of its checkpoint, frame by frame and through the functions that any frame goes through: so it may have
-// another number of ranks, whose files are laid out differently, and nothing that came after the checkpoint can be left over. The file that was
-// under way when a run was killed is not read: a kill within a write can leave it unreadable.
+// At a checkpoint the file under way is flushed and copied, and the copy takes the name result.h5. A run that goes on
+// writes a new file and fills it from result.h5 up to the counts of its checkpoint, frame by frame and through the
+// functions that any frame goes through: so it may have another number of ranks, whose files are laid out differently,
+// and nothing that came after the checkpoint can be left over. The file that was under way when a run was killed is not
+// read: a kill within a write can leave it unreadable.
 //
-// The copy costs a write of the whole file per checkpoint (nothing where the file system copies by reference). Rejected: to cut the file under
-// way back to the checkpoint's counts, which has to be readable for that; a file of its own for each piece between two checkpoints, which every reader would
-// have to join.
+// The copy costs a write of the whole file per checkpoint (nothing where the file system copies by reference).
+// Rejected: to cut the file under way back to the checkpoint's counts, which has to be readable for that; a file of its
+// own for each piece between two checkpoints, which every reader would have to join.
 #include <stdlib.h>
 #include <string.h>
 
 #include "base/fileio.h"
 #include "output/record_parts.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 #define HISTORY(type, member) {#member, BT_ITEM_##type, 1, offsetof(bt_history, member)}
 static const bt_state_row history_rows[] = {
-    HISTORY(F64, sum_contacts), HISTORY(F64, sum_sweeps), HISTORY(F64, sum_updates), HISTORY(F64, sum_moves), HISTORY(F64, contact_work), HISTORY(F64, max_overlap), HISTORY(F64, max_momentum_residual), HISTORY(F64, max_residual),
-    HISTORY(F64, crushed_work), HISTORY(F64, max_crushed_depth), HISTORY(F64, max_crushing), HISTORY(I64, crushing_steps), HISTORY(I64, unconverged), HISTORY(I64, unprojected),
-    HISTORY(I64, positive_work), HISTORY(I64, restitution_cut), HISTORY(I64, repeats), HISTORY(I64, outrun),
+    HISTORY(F64, sum_contacts),
+    HISTORY(F64, sum_sweeps),
+    HISTORY(F64, sum_updates),
+    HISTORY(F64, sum_moves),
+    HISTORY(F64, contact_work),
+    HISTORY(F64, max_overlap),
+    HISTORY(F64, max_momentum_residual),
+    HISTORY(F64, max_residual),
+    HISTORY(F64, crushed_work),
+    HISTORY(F64, max_crushed_depth),
+    HISTORY(F64, max_crushing),
+    HISTORY(I64, crushing_steps),
+    HISTORY(I64, unconverged),
+    HISTORY(I64, unprojected),
+    HISTORY(I64, positive_work),
+    HISTORY(I64, restitution_cut),
+    HISTORY(I64, repeats),
+    HISTORY(I64, outrun),
 };
 /// Not in checkpoints of before floes rafted.
 static const bt_state_row raft_rows[] = {
-    HISTORY(F64, rafting), HISTORY(F64, rafted_area), HISTORY(F64, rafted_energy), HISTORY(F64, max_rafted_area), HISTORY(F64, rafted_largest),
-    HISTORY(F64, raft_edge_work), HISTORY(F64, raft_friction_work),
+    HISTORY(F64, rafting),
+    HISTORY(F64, rafted_area),
+    HISTORY(F64, rafted_energy),
+    HISTORY(F64, max_rafted_area),
+    HISTORY(F64, rafted_largest),
+    HISTORY(F64, raft_edge_work),
+    HISTORY(F64, raft_friction_work),
 };
 enum { N_RAFT = sizeof raft_rows / sizeof *raft_rows };
 enum { N_HISTORY = sizeof history_rows / sizeof *history_rows };
@@ -38,13 +59,16 @@ bt_status bt_record_save(bt_record *r, int64_t n_frames, bt_snapshot *s, bt_erro
     bt_history *h = &r->history;
     bt_snapshot_add_rows(s, "history", history_rows, N_HISTORY, h);
     bt_snapshot_add_rows(s, "history", raft_rows, N_RAFT, h);
-    for (int k = 0; k < BT_N_COLUMNS; k++)
-        bt_snapshot_add(s, bt_history_columns[k].name, BT_ITEM_F64, h->n, 1, h->column[k]);
+    for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) {
+        char name[80];
+        bt_history_name(k, name);
+        bt_snapshot_add(s, name, BT_ITEM_F64, h->n, 1, *bt_history_column(h, k));
+    }
     bt_snapshot_add_int(s, "record/entries", r->written);
     bt_snapshot_add_int(s, "record/frames", n_frames);
     bt_snapshot_add_int(s, "record/merged_steps", r->n_merged);
     // Between two entries the sum is over: its last value would only make states that are alike look different.
-    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series_fields : 0, 1, &r->merged);
+    bt_snapshot_add(s, "record/merged", BT_ITEM_F64, r->n_merged > 0 ? bt_n_series() : 0, 1, &r->merged);
     bt_impact_store_save(&r->impacts, s);
     return r->h5.status;
 }
@@ -56,11 +80,12 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
     bt_status status = bt_comm_agree(r->comm, r->h5.status);
     if (status != BT_OK) return status;
     if (r->comm->rank == 0) {
-        char *part = bt_file_join(r->dir, BT_RESULT_PART), *copy = bt_file_join(r->dir, BT_RESULT_FILE ".tmp"), *path = bt_file_join(r->dir, BT_RESULT_FILE);
+        char *part = bt_file_join(r->dir, BT_RESULT_PART), *copy = bt_file_join(r->dir, BT_RESULT_FILE ".tmp"),
+             *path = bt_file_join(r->dir, BT_RESULT_FILE);
         bt_record_flush(r);
         status = r->h5.status;
         if (status == BT_OK) status = bt_file_copy(part, copy, err);
-        if (status == BT_OK) status = bt_seal_write(copy, BT_SEAL_RESULT, err);
+        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);
         if (status == BT_OK) status = bt_file_rename(copy, path, err);
         char *xdmf = bt_record_xdmf(r);
         if (status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
@@ -80,10 +105,13 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     bt_snapshot_take_rows(s, "history", history_rows, N_HISTORY, h);
     if (bt_snapshot_find(s, "history/rafting")) bt_snapshot_take_rows(s, "history", raft_rows, N_RAFT, h);
     h->n = h->cap = n;
-    for (int k = 0; k < BT_N_COLUMNS; k++) {
-        free(h->column[k]);
-        h->column[k] = bt_snapshot_copy(s, bt_history_columns[k].name, BT_ITEM_F64, 1, &n);
-        bt_snapshot_want(s, n == h->n, bt_history_columns[k].name, -1, "has not a value for each step");
+    for (int k = 0; k < BT_N_COLUMNS + h->n_laws; k++) {
+        double **x = bt_history_column(h, k);
+        char name[80];
+        bt_history_name(k, name);
+        free(*x);
+        *x = bt_snapshot_copy(s, name, BT_ITEM_F64, 1, &n);
+        bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
     }
     if (s->faulty) h->n = 0;
 }
@@ -92,7 +120,7 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
-    for (int k = 0; k < bt_n_series_fields && old->status == BT_OK; k++) {
+    for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series_fields[k].name);
         if (before && !bt_h5_there(old, name)) memset(x, 0, (size_t)n * sizeof *x);
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
@@ -109,8 +137,10 @@ static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bo
     double *x = bt_alloc((size_t)n_bodies, 3 * sizeof *x);
     bt_h5_read(old, "/frames/time", H5T_NATIVE_DOUBLE, k, 1, 1, time);
     bt_h5_read(old, "/frames/pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)n_floes, x);
-    bt_h5_read(old, "/frames/body_pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)(n_bodies - n_floes), x + 3 * (size_t)n_floes);
-    for (bt_idx i = 0; i < n_bodies; i++) rows[i] = (bt_frame_row){.x = x[3 * (size_t)i], .y = x[3 * (size_t)i + 1], .yaw = x[3 * (size_t)i + 2]};
+    bt_h5_read(old, "/frames/body_pose", H5T_NATIVE_DOUBLE, k, 1, 3 * (int64_t)(n_bodies - n_floes),
+               x + 3 * (size_t)n_floes);
+    for (bt_idx i = 0; i < n_bodies; i++)
+        rows[i] = (bt_frame_row){.x = x[3 * (size_t)i], .y = x[3 * (size_t)i + 1], .yaw = x[3 * (size_t)i + 2]};
     bt_h5_read(old, "/frames/contact_force", H5T_NATIVE_DOUBLE, k, 1, n_floes, x);
     for (bt_idx i = 0; i < n_floes; i++) rows[i].contact_force = x[i];
     bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, n_bodies, x);
@@ -126,7 +156,8 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
     int64_t *blocks = bt_alloc((size_t)r->comm->size + 1, sizeof *blocks);
     bt_record_blocks(r->comm, n_floes, n_bodies, blocks);
     const bt_idx mine = first ? n_bodies : 0;
-    bt_frame_row *rows = bt_alloc((size_t)mine, sizeof *rows), *block = bt_alloc((size_t)(blocks[r->comm->rank + 1] - blocks[r->comm->rank]), sizeof *block);
+    bt_frame_row *rows = bt_alloc((size_t)mine, sizeof *rows),
+                 *block = bt_alloc((size_t)(blocks[r->comm->rank + 1] - blocks[r->comm->rank]), sizeof *block);
     bt_gid *gid = bt_alloc((size_t)mine, sizeof *gid);
     for (bt_idx i = 0; i < mine; i++) gid[i] = i;
     bt_status status = BT_OK;
@@ -137,7 +168,8 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
         if (status != BT_OK) break;
         bt_comm_bcast(r->comm, &time, sizeof time);
         _Static_assert(sizeof *rows == 5 * sizeof(double), "a row is a line of doubles");
-        status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, 5, (const double *)(const void *)rows, (double *)(void *)block, err);
+        status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, 5, (const double *)(const void *)rows,
+                                     (double *)(void *)block, err);
         if (status == BT_OK) status = bt_frames_add(&r->frames, time, block);
     }
     free(blocks);
@@ -151,10 +183,14 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
 static void check_counts(bt_h5_reader *old, int64_t entries, int64_t frames, int64_t floes)
 {
     if (old->status != BT_OK) return;
-    const int64_t there = bt_h5_size(old, "/series/time", 0), pictures = bt_h5_size(old, "/frames/time", 0), width = bt_h5_size(old, "/frames/pose", 1);
+    const int64_t there = bt_h5_size(old, "/series/time", 0), pictures = bt_h5_size(old, "/frames/time", 0),
+                  width = bt_h5_size(old, "/frames/pose", 1);
     if (old->status != BT_OK || (there >= entries && pictures >= frames && width == floes)) return;
-    bt_errors_add(old->err, "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint counts on %lld, %lld and %lld: it is of another run, or older; restore it",
-                  old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries, (long long)frames, (long long)floes);
+    bt_errors_add(old->err,
+                  "%s: holds %lld entries and %lld frames of %lld floes, and the checkpoint counts on %lld, %lld and "
+                  "%lld: it is of another run, or older; restore it",
+                  old->path, (long long)there, (long long)pictures, (long long)width, (long long)entries,
+                  (long long)frames, (long long)floes);
     old->status = BT_ERR_CASE;
 }
 
@@ -162,22 +198,26 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
 {
     const bool first = r->comm->rank == 0;
     r->h5.err = err;
-    const int64_t entries = bt_snapshot_int(s, "record/entries"), frames = bt_snapshot_int(s, "record/frames"), step = bt_snapshot_int(s, "world/step");
+    const int64_t entries = bt_snapshot_int(s, "record/entries"), frames = bt_snapshot_int(s, "record/frames"),
+                  step = bt_snapshot_int(s, "world/step");
     const int64_t every = r->c->output.sample_every > 1 ? r->c->output.sample_every : 1;
     r->n_merged = bt_snapshot_int(s, "record/merged_steps");
-    bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1, "does not fit the number of steps");
-    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series_fields, 1, &r->merged);
+    bt_snapshot_want(s, entries == step / every && r->n_merged == step % every, "record/entries", -1,
+                     "does not fit the number of steps");
+    if (r->n_merged > 0) bt_snapshot_take(s, "record/merged", BT_ITEM_F64, bt_n_series(), 1, &r->merged);
     char *path = bt_file_join(r->dir, BT_RESULT_FILE);
     bt_h5_reader old = {.file = -1, .path = path, .err = err};
     if (first) {
         load_history(&r->history, s, step);
-        if (!s->faulty) bt_h5_open(&old, path, BT_SEAL_RESULT, err);
+        if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
         if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries, !bt_snapshot_find(s, "history/rafting"));
         bt_record_events(r, e, err);
     }
-    bt_status status = bt_comm_agree(r->comm, s->faulty ? BT_ERR_CASE : first && old.status != BT_OK ? old.status : r->h5.status);
+    bt_status status = bt_comm_agree(r->comm, s->faulty                      ? BT_ERR_CASE
+                                              : first && old.status != BT_OK ? old.status
+                                                                             : r->h5.status);
     if (status == BT_OK) status = load_frames(r, &old, frames, err);
     bt_h5_end(&old);
     if (status == BT_OK && first) bt_record_flush(r);

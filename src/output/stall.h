@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Has the towed body stood still while the tow asked for motion? The usual end of a jam in rigid contact.
 //
-// Time is cut into windows in which the tow asks for a path of one mean floe size. A window counts when the body, drawn by a line or thrust,
-// has come less than BT_STALL_SHARE of that way from where it began. Why a path and not a time: one floe size is
-// what a jam must yield to release, at any scale and speed; a body that waits for its line to be hauled taut moves again sooner.
+// Time is cut into windows in which the tow asks for a path of one mean floe size. A window counts when the body, drawn
+// by a line or thrust, has come less than BT_STALL_SHARE of that way from where it began. Why a path and not a time:
+// one floe size is what a jam must yield to release, at any scale and speed; a body that waits for its line to be
+// hauled taut moves again sooner.
 #ifndef BERGTOW_STALL_H
 #define BERGTOW_STALL_H
 

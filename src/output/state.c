@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The state of a world as named arrays: bodies by id, tiles, contacts, tow, window, collisions, events.
+// The state of a world as named arrays: bodies by id, cells, contacts, tow, window, collisions, events.
 #include "output/state.h"
 
 #include <assert.h>
@@ -11,7 +11,7 @@
 
 #include "contact/law.h"
 #include "loads/impact.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
 #include "partition/domain.h"
@@ -28,48 +28,85 @@ static const bt_state_row world_rows[] = {WORLD(I64, step), WORLD(F64, drift_x),
 #define PAR(member) MEMBER(bt_params, #member, F64, 1, member)
 /// Of the last step where they change with time; the others show that the case is the one of the checkpoint.
 static const bt_state_row par_rows[] = {
-    PAR(dt), PAR(x0), PAR(y0), PAR(period_x), PAR(period_y), PAR(tolerance), PAR(slop), PAR(size), PAR(water_u), PAR(water_v), PAR(air_u), PAR(air_v),
-    PAR(coriolis), PAR(balance_u), PAR(balance_v), PAR(tilt_ax), PAR(tilt_ay),
+    PAR(dt),       PAR(x0),        PAR(y0),        PAR(period_x), PAR(period_y), PAR(tolerance),
+    PAR(slop),     PAR(size),      PAR(water_u),   PAR(water_v),  PAR(air_u),    PAR(air_v),
+    PAR(coriolis), PAR(balance_u), PAR(balance_v), PAR(tilt_ax),  PAR(tilt_ay),
 };
 
-#define TILES(type, member) MEMBER(bt_tiles, #member, type, 1, member)
-static const bt_state_row tiles_rows[] = {
-    TILES(F64, x0), TILES(F64, y0), TILES(F64, side_x), TILES(F64, side_y), TILES(F64, allowance), TILES(F64, reach), TILES(F64, heaviest), TILES(U8, rebounds),
-    TILES(F64, margin_max), TILES(I32, low_x), TILES(I32, low_y), TILES(I32, n_x), TILES(I32, n_y), TILES(I32, wrap_x), TILES(I32, wrap_y), TILES(U8, relabel),
-    TILES(I64, n_labellings),
+#define CELLS(type, member) MEMBER(bt_cells, #member, type, 1, member)
+static const bt_state_row cells_rows[] = {
+    CELLS(F64, x0),     CELLS(F64, y0),           CELLS(F64, side_x),  CELLS(F64, side_y),     CELLS(F64, allowance),
+    CELLS(F64, reach),  CELLS(F64, heaviest),     CELLS(U8, rebounds), CELLS(F64, margin_max), CELLS(I32, low_x),
+    CELLS(I32, low_y),  CELLS(I32, n_x),          CELLS(I32, n_y),     CELLS(I32, wrap_x),     CELLS(I32, wrap_y),
+    CELLS(U8, relabel), CELLS(I64, n_labellings),
 };
 
 #define TOW(type, member) MEMBER(bt_tow, #member, type, 1, member)
 #define BRANCH(label, type, k, member) MEMBER(bt_tow, label, type, 1, branch[k].member)
 static const bt_state_row tow_rows[] = {
-    TOW(F64, time), TOW(F64, carriage_x), TOW(F64, carriage_y), TOW(F64, travel_x), TOW(F64, travel_y), TOW(F64, way), TOW(I32, mark), TOW(F64, ux), TOW(F64, uy),
-    BRANCH("impulse_1", F64, 0, lambda), BRANCH("taut_1", U8, 0, taut), BRANCH("broken_1", U8, 0, broken),
-    BRANCH("impulse_2", F64, 1, lambda), BRANCH("taut_2", U8, 1, taut), BRANCH("broken_2", U8, 1, broken),
-    MEMBER(bt_tow, "vessel_vx", F64, 1, vessel.vx), MEMBER(bt_tow, "vessel_vy", F64, 1, vessel.vy), MEMBER(bt_tow, "vessel_way", F64, 1, vessel.way),
+    TOW(F64, time),
+    TOW(F64, carriage_x),
+    TOW(F64, carriage_y),
+    TOW(F64, travel_x),
+    TOW(F64, travel_y),
+    TOW(F64, way),
+    TOW(I32, mark),
+    TOW(F64, ux),
+    TOW(F64, uy),
+    BRANCH("impulse_1", F64, 0, lambda),
+    BRANCH("taut_1", U8, 0, taut),
+    BRANCH("broken_1", U8, 0, broken),
+    BRANCH("impulse_2", F64, 1, lambda),
+    BRANCH("taut_2", U8, 1, taut),
+    BRANCH("broken_2", U8, 1, broken),
+    MEMBER(bt_tow, "vessel_vx", F64, 1, vessel.vx),
+    MEMBER(bt_tow, "vessel_vy", F64, 1, vessel.vy),
+    MEMBER(bt_tow, "vessel_way", F64, 1, vessel.way),
 };
 
 #define WINDOW(type, width, member) MEMBER(bt_window, #member, type, width, member)
 static const bt_state_row window_rows[] = {
-    WINDOW(F64, 1, start), WINDOW(F64, 1, rear), WINDOW(F64, 1, drift_x), WINDOW(F64, 1, drift_y), WINDOW(F64, 4, vel), WINDOW(I64, 1, renewed), WINDOW(I64, 1, kept),
-    WINDOW(I64, 1, missed), WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
+    WINDOW(F64, 1, start),   WINDOW(F64, 1, rear),        WINDOW(F64, 1, drift_x), WINDOW(F64, 1, drift_y),
+    WINDOW(F64, 4, vel),     WINDOW(I64, 1, renewed),     WINDOW(I64, 1, kept),    WINDOW(I64, 1, missed),
+    WINDOW(I64, 1, waiting), WINDOW(I64, 1, renewed_now), WINDOW(F64, 3, dropped), WINDOW(F64, 3, brought),
 };
 
-enum { IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double), OPEN_WIDTH = sizeof(bt_impact_open) / sizeof(double), PANEL_WIDTH = sizeof(bt_panel) / sizeof(double) };
+enum {
+    IMPACT_WIDTH = sizeof(bt_impact) / sizeof(double),
+    OPEN_WIDTH = sizeof(bt_impact_open) / sizeof(double),
+    PANEL_WIDTH = sizeof(bt_panel) / sizeof(double)
+};
 
 #define STALL(type, member) MEMBER(bt_stall, #member, type, 1, member)
-static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time), STALL(F64, asked), STALL(F64, spent), STALL(F64, from_x), STALL(F64, from_y), STALL(U8, begun)};
+static const bt_state_row stall_rows[] = {STALL(I64, windows), STALL(F64, time),   STALL(F64, asked), STALL(F64, spent),
+                                          STALL(F64, from_x),  STALL(F64, from_y), STALL(U8, begun)};
 
 #define LEAD(type, member) MEMBER(bt_lead_stats, #member, type, 1, member)
 static const bt_state_row lead_rows[] = {
-    LEAD(I32, mode), LEAD(F64, width), LEAD(F64, length), LEAD(I64, taken), LEAD(F64, area_taken), LEAD(I64, pieces), LEAD(F64, mean_piece), LEAD(F64, concentration_before),
+    LEAD(I32, mode),
+    LEAD(F64, width),
+    LEAD(F64, length),
+    LEAD(I64, taken),
+    LEAD(F64, area_taken),
+    LEAD(I64, pieces),
+    LEAD(F64, mean_piece),
+    LEAD(F64, concentration_before),
     LEAD(F64, concentration_after),
 };
 
 #define FIELD(type, label, member) MEMBER(bt_field, label, type, 1, member)
 static const bt_state_row field_rows[] = {
-    FIELD(F64, "ice_area", ice_area), FIELD(F64, "concentration", concentration), FIELD(I64, "read", outlines.read), FIELD(I64, "turned", outlines.turned),
-    FIELD(I64, "dropped", outlines.dropped), FIELD(I64, "hulled", outlines.hulled), FIELD(F64, "hull_area", outlines.hull_area), FIELD(I64, "split", outlines.split),
-    FIELD(I64, "parts", outlines.parts), FIELD(F64, "lon", outlines.lon), FIELD(F64, "lat", outlines.lat),
+    FIELD(F64, "ice_area", ice_area),
+    FIELD(F64, "concentration", concentration),
+    FIELD(I64, "read", outlines.read),
+    FIELD(I64, "turned", outlines.turned),
+    FIELD(I64, "dropped", outlines.dropped),
+    FIELD(I64, "hulled", outlines.hulled),
+    FIELD(F64, "hull_area", outlines.hull_area),
+    FIELD(I64, "split", outlines.split),
+    FIELD(I64, "parts", outlines.parts),
+    FIELD(F64, "lon", outlines.lon),
+    FIELD(F64, "lat", outlines.lat),
 };
 
 /// Not in checkpoints of before, whose fields had none of this.
@@ -84,32 +121,45 @@ static const bt_state_row map_rows[] = {
 
 _Static_assert(sizeof(bool) == 1 && sizeof(int) == 4 && sizeof(bt_lead_mode) == 4, "as the tables say");
 
-void bt_state_save_stall(const bt_stall *t, bt_snapshot *s) { bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
-void bt_state_load_stall(bt_stall *t, bt_snapshot *s) { bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t); }
-void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s) { bt_snapshot_add_rows(s, "lead", lead_rows, N_OF(lead_rows), l); }
+void bt_state_save_stall(const bt_stall *t, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
+}
+void bt_state_load_stall(bt_stall *t, bt_snapshot *s)
+{
+    bt_snapshot_take_rows(s, "stall", stall_rows, N_OF(stall_rows), t);
+}
+void bt_state_save_lead(const bt_lead_stats *l, bt_snapshot *s)
+{
+    bt_snapshot_add_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
+}
 void bt_state_load_lead(bt_lead_stats *l, bt_snapshot *s)
 {
     int32_t mode = 0;
     bt_snapshot_take(s, "lead/mode", BT_ITEM_I32, 1, 1, &mode);
-    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead"); // before it is taken as one
+    // before it is taken as one
+    bt_snapshot_want(s, mode >= BT_LEAD_NONE && mode <= BT_LEAD_MANAGED, "lead/mode", -1, "is no kind of lead");
     if (!s->faulty) bt_snapshot_take_rows(s, "lead", lead_rows, N_OF(lead_rows), l);
 }
 
 // --- bodies ----------------------------------------------------------------------------------------------------------
 
-/// What a body carries from step to step, as it travels to rank 0. Everything else about it follows from the case and the field.
+/// What a body carries from step to step, as it travels to rank 0. Everything else about it follows from the case and
+/// the field.
 typedef struct {
     double pose[3], vel[3], path;
-    int32_t tile[2], copy, lap;
-    int64_t stirred;
+    int32_t cell[2], copy, lap;
+    int64_t disturbed;
 } body_row;
 enum { BODY_WIDTH = sizeof(body_row) / sizeof(double) };
 _Static_assert(sizeof(body_row) % sizeof(double) == 0, "a body is a row of doubles");
 
 /// Its columns in the file.
 static const bt_state_row body_columns[] = {
-    MEMBER(body_row, "pose", F64, 3, pose), MEMBER(body_row, "velocity", F64, 3, vel), MEMBER(body_row, "path", F64, 1, path), MEMBER(body_row, "tile", I32, 2, tile),
-    MEMBER(body_row, "copy", I32, 1, copy), MEMBER(body_row, "lap", I32, 1, lap), MEMBER(body_row, "stirred", I64, 1, stirred),
+    MEMBER(body_row, "pose", F64, 3, pose),         MEMBER(body_row, "velocity", F64, 3, vel),
+    MEMBER(body_row, "path", F64, 1, path),         MEMBER(body_row, "tile", I32, 2, cell),
+    MEMBER(body_row, "copy", I32, 1, copy),         MEMBER(body_row, "lap", I32, 1, lap),
+    MEMBER(body_row, "stirred", I64, 1, disturbed),
 };
 
 static body_row row_of(const bt_bodies *b, bt_idx i)
@@ -118,10 +168,10 @@ static body_row row_of(const bt_bodies *b, bt_idx i)
         .pose = {b->pose[i].x, b->pose[i].y, b->pose[i].yaw},
         .vel = {b->vel[i].x, b->vel[i].y, b->vel[i].w},
         .path = b->path[i],
-        .tile = {b->tile[i][0], b->tile[i][1]},
+        .cell = {b->cell[i][0], b->cell[i][1]},
         .copy = b->home[i].copy,
         .lap = b->home[i].lap,
-        .stirred = b->stirred[i],
+        .disturbed = b->disturbed[i],
     };
 }
 
@@ -132,11 +182,11 @@ static void put_row(bt_world *w, bt_idx i, const body_row *r)
     bt_bodies_turn(&w->bodies, i);
     b->vel[i] = (bt_vel){.x = r->vel[0], .y = r->vel[1], .w = r->vel[2]};
     b->path[i] = r->path;
-    b->tile[i][0] = r->tile[0];
-    b->tile[i][1] = r->tile[1];
+    b->cell[i][0] = r->cell[0];
+    b->cell[i][1] = r->cell[1];
     b->home[i].copy = r->copy;
     b->home[i].lap = r->lap;
-    b->stirred[i] = r->stirred != 0;
+    b->disturbed[i] = r->disturbed != 0;
 }
 
 /// A column of rows of `size` bytes, to or from an array of its own.
@@ -149,7 +199,8 @@ static void column(const bt_state_row *c, char *rows, size_t size, int64_t n, ch
     }
 }
 
-static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows, size_t size, int64_t n)
+static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, void *rows,
+                         size_t size, int64_t n)
 {
     for (int k = 0; k < n_columns; k++) {
         char name[64];
@@ -159,7 +210,8 @@ static void save_columns(bt_snapshot *s, const char *group, const bt_state_row *
 }
 
 /// n < 0: as many rows as there are. The rows in new memory.
-static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, size_t size, int64_t *n)
+static void *load_columns(bt_snapshot *s, const char *group, const bt_state_row *columns, int n_columns, size_t size,
+                          int64_t *n)
 {
     char name[64];
     snprintf(name, sizeof name, "%s/%s", group, columns[0].name);
@@ -190,8 +242,10 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
     for (int k = 1; k <= c->size; k++) first[k] = b->n_global; // all to rank 0
     const int64_t count = c->rank == 0 ? b->n_global : 0;
     body_row *all = bt_alloc((size_t)count, sizeof *all);
-    const bt_status status = bt_comm_rows_by_gid(c, first, n, gid, BODY_WIDTH, (const double *)(const void *)mine, (double *)(void *)all, err);
-    if (status == BT_OK && c->rank == 0) save_columns(s, "bodies", body_columns, N_OF(body_columns), all, sizeof *all, count);
+    const bt_status status = bt_comm_rows_by_gid(c, first, n, gid, BODY_WIDTH, (const double *)(const void *)mine,
+                                                 (double *)(void *)all, err);
+    if (status == BT_OK && c->rank == 0)
+        save_columns(s, "bodies", body_columns, N_OF(body_columns), all, sizeof *all, count);
     free(all);
     free(first);
     free(mine);
@@ -205,7 +259,8 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
     assert(w->bodies.n == n); // nothing is dealt yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++) {
-        bt_snapshot_want(s, rows[g].stirred == 0 || rows[g].stirred == 1, "bodies/stirred", g, "is neither 0 nor 1");
+        bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/stirred", g,
+                         "is neither 0 nor 1");
         put_row(w, bt_world_index(w, g), &rows[g]);
     }
     free(rows);
@@ -213,15 +268,21 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 
 // --- contacts --------------------------------------------------------------------------------------------------------
 
-enum { TRACE_WIDTH = sizeof(bt_trace) / sizeof(double) };
-_Static_assert(sizeof(bt_trace) % sizeof(double) == 0, "a trace is a row of doubles");
+enum { TRACE_WIDTH = sizeof(bt_memory) / sizeof(double) };
+_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a trace is a row of doubles");
 
 static const bt_state_row trace_columns[] = {
-    MEMBER(bt_trace, "a", I64, 1, a), MEMBER(bt_trace, "b", I64, 1, b), MEMBER(bt_trace, "part", U16, 2, part), MEMBER(bt_trace, "points", I32, 1, n_points),
-    MEMBER(bt_trace, "feature", U32, 2, feature), MEMBER(bt_trace, "value", F64, 4, value), MEMBER(bt_trace, "law", U16, 1, law),
+    MEMBER(bt_memory, "a", I64, 1, a),
+    MEMBER(bt_memory, "b", I64, 1, b),
+    MEMBER(bt_memory, "part", U16, 2, part),
+    MEMBER(bt_memory, "points", I32, 1, n_points),
+    MEMBER(bt_memory, "feature", U32, 2, feature),
+    MEMBER(bt_memory, "value", F64, 4, value),
+    MEMBER(bt_memory, "law", U16, 1, law),
 };
 
-/// A checkpoint of before laws had numbers: impulse [2], friction, and whether the row is not that but the depths that the pair has crushed.
+/// A checkpoint of before laws had numbers: impulse [2], friction, and whether the row is not that but the depths that
+/// the pair has crushed.
 static void renew_contacts(bt_snapshot *s)
 {
     if (bt_snapshot_find(s, "contacts/law") || !bt_snapshot_find(s, "contacts/crushed")) return;
@@ -243,7 +304,7 @@ static void renew_contacts(bt_snapshot *s)
 }
 
 /// Numbers of a second point that is not there are what they were: two states that go on alike must look alike.
-static void blank(bt_trace *t)
+static void blank(bt_memory *t)
 {
     if (t->n_points < 2) t->feature[1] = 0, t->value[1] = 0;
 }
@@ -251,11 +312,11 @@ static void blank(bt_trace *t)
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
-    bt_trace *mine = bt_tiles_take_traces(w, &n);
-    bt_trace *trace = (bt_trace *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
+    bt_memory *mine = bt_cells_take_memory(w, &n);
+    bt_memory *trace = (bt_memory *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
     free(mine);
     if (c->rank == 0) {
-        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_trace_by_names);
+        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_memory_by_names);
         for (int64_t k = 0; k < all; k++) blank(&trace[k]);
         save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
     }
@@ -264,8 +325,9 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 
 // --- collisions, events ----------------------------------------------------------------------------------------------
 
-static const bt_state_row event_columns[] = {MEMBER(bt_event, "time", F64, 1, time), MEMBER(bt_event, "kind", I64, 1, kind), MEMBER(bt_event, "subject", I64, 1, subject),
-                                             MEMBER(bt_event, "value", F64, 1, value)};
+static const bt_state_row event_columns[] = {
+    MEMBER(bt_event, "time", F64, 1, time), MEMBER(bt_event, "kind", I64, 1, kind),
+    MEMBER(bt_event, "subject", I64, 1, subject), MEMBER(bt_event, "value", F64, 1, value)};
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 
@@ -278,11 +340,12 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
     bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
-    bt_snapshot_add_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    bt_snapshot_add_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_add_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_add_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->impacts) bt_snapshot_add(s, "impacts/open", BT_ITEM_F64, w->impacts->n_open, OPEN_WIDTH, w->impacts->open);
-    save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event, w->events.n);
+    save_columns(s, "events", event_columns, N_OF(event_columns), w->events.event, sizeof *w->events.event,
+                 w->events.n);
     return status;
 }
 
@@ -294,10 +357,13 @@ static bool all_finite(const double *x, int64_t n)
 }
 
 /// The first row that is no number.
-static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base, char name[64])
+static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base,
+                                   char name[64])
 {
     for (int k = 0; base && k < n_rows; k++) {
-        if (row[k].type != BT_ITEM_F64 || all_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width)) continue;
+        if (row[k].type != BT_ITEM_F64 ||
+            all_finite((const double *)(const void *)((const char *)base + row[k].offset), row[k].width))
+            continue;
         snprintf(name, 64, "%s/%s", group, row[k].name);
         return name;
     }
@@ -307,7 +373,8 @@ static const char *rows_not_finite(const char *group, const bt_state_row *row, i
 /// What a collision under way is made of; its corner is NaN where there is none.
 static bool open_finite(const bt_impact_open *o)
 {
-    const double real[] = {o->so_far.time, o->so_far.x, o->so_far.y, o->so_far.impulse, o->so_far.approach, o->so_far.mass, o->so_far.thickness, o->rest, o->largest};
+    const double real[] = {o->so_far.time, o->so_far.x,         o->so_far.y, o->so_far.impulse, o->so_far.approach,
+                           o->so_far.mass, o->so_far.thickness, o->rest,     o->largest};
     return all_finite(real, N_OF(real));
 }
 
@@ -322,16 +389,21 @@ const char *bt_state_not_finite(const bt_world *w, char name[64])
     if (!all_finite((const double *)(const void *)m->closed, m->n_closed * IMPACT_WIDTH)) return "impacts/closed";
     for (int64_t k = 0; k < m->n_open; k++)
         if (!open_finite(&m->open[k])) return "impacts/open";
-    return all_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL : "impacts/panels";
+    return all_finite((const double *)(const void *)m->panels.panel, m->panels.n * PANEL_WIDTH) ? NULL
+                                                                                                : "impacts/panels";
 }
 
-/// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are constants, too.
+/// The constants of the step that follow from the case must be those of the checkpoint. steady: current and wind are
+/// constants, too.
 static bool same_constants(const bt_params *now, const bt_params *then, bool steady)
 {
-    const bool fluid = now->water_u == then->water_u && now->water_v == then->water_v && now->air_u == then->air_u && now->air_v == then->air_v &&
-                       now->balance_u == then->balance_u && now->balance_v == then->balance_v && now->tilt_ax == then->tilt_ax && now->tilt_ay == then->tilt_ay;
-    return (fluid || !steady) && now->dt == then->dt && now->x0 == then->x0 && now->y0 == then->y0 && now->period_x == then->period_x && now->period_y == then->period_y &&
-           now->tolerance == then->tolerance && now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
+    const bool fluid = now->water_u == then->water_u && now->water_v == then->water_v && now->air_u == then->air_u &&
+                       now->air_v == then->air_v && now->balance_u == then->balance_u &&
+                       now->balance_v == then->balance_v && now->tilt_ax == then->tilt_ax &&
+                       now->tilt_ay == then->tilt_ay;
+    return (fluid || !steady) && now->dt == then->dt && now->x0 == then->x0 && now->y0 == then->y0 &&
+           now->period_x == then->period_x && now->period_y == then->period_y && now->tolerance == then->tolerance &&
+           now->slop == then->slop && now->size == then->size && now->coriolis == then->coriolis;
 }
 
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err)
@@ -342,7 +414,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     const uint64_t hash = (uint64_t)bt_snapshot_int(s, "world/hash");
     bt_snapshot_take_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
     load_bodies(w, s);
-    bt_snapshot_take_rows(s, "tiles", tiles_rows, N_OF(tiles_rows), w->tiles);
+    bt_snapshot_take_rows(s, "tiles", cells_rows, N_OF(cells_rows), w->cells);
     if (w->tow) bt_snapshot_take_rows(s, "tow", tow_rows, N_OF(tow_rows), w->tow);
     if (w->window) bt_snapshot_take_rows(s, "window", window_rows, N_OF(window_rows), w->window);
     if (w->impacts && c->rank == 0) {
@@ -351,15 +423,19 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     }
     bt_events_free(&w->events);
     w->events.n = -1;
-    w->events.event = load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
+    w->events.event =
+        load_columns(s, "events", event_columns, N_OF(event_columns), sizeof *w->events.event, &w->events.n);
     w->events.cap = w->events.n;
     int64_t n = -1;
     renew_contacts(s);
-    bt_trace *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
+    bt_memory *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
     if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
-        bt_errors_add(err, "%s: the case it holds makes other constants of the step now; it was written by another version of the program: go on with that one", s->path);
+        bt_errors_add(err,
+                      "%s: the case it holds makes other constants of the step now; it was written by another version "
+                      "of the program: go on with that one",
+                      s->path);
         status = BT_ERR_CASE;
     }
     if (status != BT_OK) {
@@ -367,9 +443,12 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
         return status;
     }
     bt_domain_create(w, c);
-    bt_tiles_restore(w, trace, n);
+    bt_cells_restore(w, trace, n);
     if (bt_world_hash(w) == hash) return BT_OK;
-    bt_errors_add(err, "%s: the state that was read does not have the hash it was saved with, %016" PRIx64 "; go on with the program that wrote it", s->path, hash);
+    bt_errors_add(err,
+                  "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
+                  "; go on with the program that wrote it",
+                  s->path, hash);
     return BT_ERR_NUMERIC;
 }
 

@@ -9,16 +9,17 @@
 #include "bergtow/world.h"
 #include "base/snapshot.h"
 
-/// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors: BT_ERR_NUMERIC (bodies lost).
+/// Collective, between steps. Add the state of the world; complete on rank 0, the others add nothing. Errors:
+/// BT_ERR_NUMERIC (bodies lost).
 bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 
-/// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every rank; it is dealt to the ranks
-/// here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of another version), BT_ERR_NUMERIC (the state does not have
-/// the hash it was saved with).
+/// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every
+/// rank; it is dealt to the ranks here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of
+/// another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 
-/// The first number of world, step, tow, window and collisions that is none, by its name in a checkpoint ("tow/vessel_vx"); NULL = all are numbers.
-/// Those of the bodies are not looked at.
+/// The first number of world, step, tow, window and collisions that is none, by its name in a checkpoint
+/// ("tow/vessel_vx"); NULL = all are numbers. Those of the bodies are not looked at.
 const char *bt_state_not_finite(const bt_world *w, char name[64]);
 
 /// The ice field at time zero; on rank 0.

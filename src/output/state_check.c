@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // What a checkpoint may hold: the bounds within which every step leaves its state.
 //
-// The seal shows that a file is as it was written, not that it was written by a run: a file made by hand, or by a program with an error, can be sealed
-// too, and the hash of the state leaves much of it out (labels, impulses, counters). Its numbers become indices, lengths of arrays and ends of
-// loops. So each that does is held against what steps keep true before it is used, and every other real number must be finite. Nothing here is an
+// The checksum shows that a file is as it was written, not that it was written by a run: a file made by hand, or by a
+// program with an error, can be protected by a checksum too, and the hash of the state leaves much of it out (labels,
+// impulses, counters). Its numbers become indices, lengths of arrays and ends of loops. So each that does is held
+// against what steps keep true before it is used, and every other real number must be finite. Nothing here is an
 // estimate: a bound that a sound run could exceed would take its checkpoint away from it.
 #include "output/state_check.h"
 
@@ -21,7 +22,7 @@
 #include "base/largest.h"
 
 static const double MOST = 1e15;     // of anything that is counted: more than any run can, and far from overflow
-static const int32_t FAR = 1000000000; // tiles, periods: as labels of tiles are limited (tiles.c)
+static const int32_t FAR = 1000000000; // cells, periods: as labels of cells are limited (cells.c)
 
 static bool all_finite(const double *x, int64_t n)
 {
@@ -53,12 +54,15 @@ static void want_ice(bt_snapshot *s, const char *name, int64_t row, const char *
 
 void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s)
 {
-    bt_snapshot_want(s, n_offsets >= 1 && n_offsets <= BT_MOST_FLOES + 1, "field/offsets", -1, "has no number of rows that a field can have");
+    bt_snapshot_want(s, n_offsets >= 1 && n_offsets <= BT_MOST_FLOES + 1, "field/offsets", -1,
+                     "has no number of rows that a field can have");
     if (s->faulty) return;
-    bt_snapshot_want(s, f->offsets[0] == 0 && f->offsets[n_offsets - 1] == n_vertices, "field/offsets", -1, "does not begin with 0 and end with the number of vertices");
+    bt_snapshot_want(s, f->offsets[0] == 0 && f->offsets[n_offsets - 1] == n_vertices, "field/offsets", -1,
+                     "does not begin with 0 and end with the number of vertices");
     for (int64_t i = 0; i + 1 < n_offsets && !s->faulty; i++) {
         const int64_t a = f->offsets[i], b = f->offsets[i + 1];
-        bt_snapshot_want(s, a >= 0 && a <= n_vertices && b >= a + 3 && b <= n_vertices && b - a <= BT_MAX_VERTICES, "field/offsets", i, "gives a floe too few or too many vertices");
+        bt_snapshot_want(s, a >= 0 && a <= n_vertices && b >= a + 3 && b <= n_vertices && b - a <= BT_MAX_VERTICES,
+                         "field/offsets", i, "gives a floe too few or too many vertices");
     }
     static const char *const names[] = {[BT_ICE_THICKNESS] = "field/thickness",
                                         [BT_ICE_POSE] = "field/pose",
@@ -68,7 +72,8 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
     char why[BT_ICE_WHY];
     for (bt_idx i = 0; i < f->n && !s->faulty; i++) {
         const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
-        bt_snapshot_want(s, all_finite(f->vertices + 2 * first, 2 * n) && is_floe(f, i), "field/offsets", i, "begins an outline that is no floe");
+        bt_snapshot_want(s, all_finite(f->vertices + 2 * first, 2 * n) && is_floe(f, i), "field/offsets", i,
+                         "begins an outline that is no floe");
         if (s->faulty) return;
         const double *p = f->pose + 3 * (size_t)i;
         const bt_ice_floe floe = {(int)n, f->vertices + 2 * first, p[0], p[1], p[2], f->thickness[i], f->area[i], 1e-6};
@@ -91,53 +96,60 @@ void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertic
                      "field/read", -1, "and what was done to outlines are not all counts");
 }
 
-// --- tiles -----------------------------------------------------------------------------------------------------------
+// --- cells -----------------------------------------------------------------------------------------------------------
 
 typedef struct {
     const char *corner, *side, *wrap, *low, *n;
-} tile_names;
+} cell_names;
 
-/// One direction of the tiles: as src/space/tiles.c chooses them. tiled: there are floes in them.
-static void check_direction(bt_snapshot *s, const tile_names *name, bool tiled, double period, double corner, double side, int32_t wrap, int32_t low, int32_t n)
+/// One direction of the cells: as src/space/cells.c chooses them. in_cells: there are floes in them.
+static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cells, double period, double corner,
+                            double side, int32_t wrap, int32_t low, int32_t n)
 {
     bt_snapshot_want(s, isfinite(corner), name->corner, -1, "is not finite");
     bt_snapshot_want(s, side > 0 && isfinite(side), name->side, -1, "is no width of a tile");
-    bt_snapshot_want(s, period > 0 ? wrap == 1 || (wrap >= 4 && wrap % 2 == 0) : wrap == 0, name->wrap, -1, "is no number of tiles around this domain");
+    bt_snapshot_want(s, period > 0 ? wrap == 1 || (wrap >= 4 && wrap % 2 == 0) : wrap == 0, name->wrap, -1,
+                     "is no number of tiles around this domain");
     if (s->faulty) return;
     bt_snapshot_want(s, wrap == 0 || side == period / wrap, name->side, -1, "does not go round the domain");
     bt_snapshot_want(s, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is no place of a tile");
-    bt_snapshot_want(s, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !tiled)), name->n, -1, "is no number of tiles");
+    bt_snapshot_want(s, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !in_cells)), name->n, -1,
+                     "is no number of tiles");
 }
 
-static void check_tiles(const bt_world *w, bt_snapshot *s)
+static void check_cells(const bt_world *w, bt_snapshot *s)
 {
-    static const tile_names x = {"tiles/x0", "tiles/side_x", "tiles/wrap_x", "tiles/low_x", "tiles/n_x"}, y = {"tiles/y0", "tiles/side_y", "tiles/wrap_y", "tiles/low_y", "tiles/n_y"};
-    const bt_tiles *t = w->tiles;
+    static const cell_names x = {"tiles/x0", "tiles/side_x", "tiles/wrap_x", "tiles/low_x", "tiles/n_x"},
+                            y = {"tiles/y0", "tiles/side_y", "tiles/wrap_y", "tiles/low_y", "tiles/n_y"};
+    const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     double widest = 0;
-    bool tiled = false;
+    bool in_cells = false;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->large[i]) continue;
-        tiled = true;
+        in_cells = true;
         widest = bt_max(widest, b->radius[i]);
     }
-    check_direction(s, &x, tiled, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
-    check_direction(s, &y, tiled, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
-    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "tiles/n_x", -1, "and n_y are more tiles than are made for so many floes");
+    check_direction(s, &x, in_cells, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
+    check_direction(s, &y, in_cells, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
+    bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "tiles/n_x", -1,
+                     "and n_y are more tiles than are made for so many floes");
     bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "tiles/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.
-    bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "tiles/reach", -1, "is less than the radius of a floe");
+    bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "tiles/reach", -1,
+                     "is less than the radius of a floe");
     bt_snapshot_want(s, isfinite(t->heaviest) && t->heaviest >= 0, "tiles/heaviest", -1, "is no mass");
     bt_snapshot_want(s, counts(t->n_labellings), "tiles/n_labellings", -1, "is no count");
     double slack = INFINITY;
     if (t->wrap_x != 1) slack = bt_min(slack, t->side_x - 2 * t->reach - t->margin_max);
     if (t->wrap_y != 1) slack = bt_min(slack, t->side_y - 2 * t->reach - t->margin_max);
-    bt_snapshot_want(s, slack > 0 && t->allowance == 0.5 * slack, "tiles/allowance", -1, "is not what sides, reach and margin leave");
+    bt_snapshot_want(s, slack > 0 && t->allowance == 0.5 * slack, "tiles/allowance", -1,
+                     "is not what sides, reach and margin leave");
 }
 
 // --- bodies, contacts ------------------------------------------------------------------------------------------------
 
-static bool in_box(const bt_tiles *t, const int32_t at[2])
+static bool in_box(const bt_cells *t, const int32_t at[2])
 {
     return at[0] >= t->low_x && at[0] - t->low_x < t->n_x && at[1] >= t->low_y && at[1] - t->low_y < t->n_y;
 }
@@ -155,8 +167,9 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, b->home[i].copy >= -FAR && b->home[i].copy <= FAR, "bodies/copy", g, "is out of range");
         bt_snapshot_want(s, b->home[i].lap >= -FAR && b->home[i].lap <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
-        bt_snapshot_want(s, in_box(w->tiles, b->tile[i]), "bodies/tile", g, "is outside the box of the tiles");
-        bt_snapshot_want(s, w->tiles->relabel || bt_tiles_outside(w, i) <= w->tiles->allowance, "bodies/tile", g, "is too far from where the floe is");
+        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the tiles");
+        bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/tile", g,
+                         "is too far from where the floe is");
     }
 }
 
@@ -167,31 +180,33 @@ static bool has_part(const bt_bodies *b, bt_idx i, int part)
     return false;
 }
 
-/// Can bodies i and j have a contact, and a tile that owns it?
+/// Can bodies i and j have a contact, and a cell that owns it?
 static bool can_meet(const bt_world *w, bt_idx i, bt_idx j)
 {
     const bt_bodies *b = &w->bodies;
     if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) return false;
-    return b->large[i] || b->large[j] || bt_tiles_adjacent(w->tiles, b->tile[i], b->tile[j]);
+    return b->large[i] || b->large[j] || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j]);
 }
 
-static void check_contacts(const bt_world *w, const bt_trace *trace, int64_t n, bt_snapshot *s)
+static void check_contacts(const bt_world *w, const bt_memory *trace, int64_t n, bt_snapshot *s)
 {
     const bt_bodies *b = &w->bodies;
     for (int64_t k = 0; k < n && !s->faulty; k++) {
-        const bt_trace *t = &trace[k];
-        bt_snapshot_want(s, t->a >= 0 && t->a < t->b && t->b < b->n_global, "contacts/a", k, "and b are no pair of bodies");
+        const bt_memory *t = &trace[k];
+        bt_snapshot_want(s, t->a >= 0 && t->a < t->b && t->b < b->n_global, "contacts/a", k,
+                         "and b are no pair of bodies");
         if (s->faulty) return;
         const bt_idx i = bt_world_index(w, t->a), j = bt_world_index(w, t->b);
         bt_snapshot_want(s, can_meet(w, i, j), "contacts/a", k, "and b are bodies that cannot touch");
-        bt_snapshot_want(s, has_part(b, i, t->part[0]) && has_part(b, j, t->part[1]), "contacts/part", k, "is no part of its body");
+        bt_snapshot_want(s, has_part(b, i, t->part[0]) && has_part(b, j, t->part[1]), "contacts/part", k,
+                         "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
         bt_snapshot_want(s, all_finite(t->value, 4), "contacts/value", k, "is not finite");
         bt_snapshot_want(s, t->law < BT_LAWS, "contacts/law", k, "is no contact law");
         if (s->faulty) return;
         const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_laws[t->law].applies(w, i, j));
         bt_snapshot_want(s, on, "contacts/law", k, "is a contact law that does not apply to the pair");
-        bt_snapshot_want(s, k == 0 || bt_trace_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
+        bt_snapshot_want(s, k == 0 || bt_memory_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
     }
 }
 
@@ -201,9 +216,12 @@ static void check_tow(const bt_world *w, bt_snapshot *s)
 {
     const bt_tow *t = w->tow;
     bt_snapshot_want(s, t->time == (double)w->step * t->dt, "tow/time", -1, "is not that of the step");
-    const double place[] = {t->carriage_x, t->carriage_y, t->travel_x, t->travel_y, t->way, t->ux, t->uy, t->vessel.vx, t->vessel.vy, t->vessel.way};
-    bt_snapshot_want(s, all_finite(place, sizeof place / sizeof *place), "tow/carriage_x", -1, "and what else moves with the tow are not all finite");
-    bt_snapshot_want(s, t->mark >= 0 && t->mark <= t->path.n_marks, "tow/mark", -1, "is no number of way-points passed");
+    const double place[] = {t->carriage_x, t->carriage_y, t->travel_x,  t->travel_y,  t->way,
+                            t->ux,         t->uy,         t->vessel.vx, t->vessel.vy, t->vessel.way};
+    bt_snapshot_want(s, all_finite(place, sizeof place / sizeof *place), "tow/carriage_x", -1,
+                     "and what else moves with the tow are not all finite");
+    bt_snapshot_want(s, t->mark >= 0 && t->mark <= t->path.n_marks, "tow/mark", -1,
+                     "is no number of way-points passed");
     for (int k = 0; k < BT_MAX_BRANCHES; k++)
         bt_snapshot_want(s, isfinite(t->branch[k].lambda), k ? "tow/impulse_2" : "tow/impulse_1", -1, "is not finite");
 }
@@ -212,10 +230,15 @@ static void check_window(const bt_world *w, bt_snapshot *s)
 {
     const bt_window *v = w->window;
     const double real[] = {v->start, v->rear, v->drift_x, v->drift_y, v->vel.x, v->vel.y, v->vel.w};
-    bt_snapshot_want(s, all_finite(real, sizeof real / sizeof *real) && all_finite(v->dropped, 3) && all_finite(v->brought, 3), "window/rear", -1, "and what else belongs to it are not all finite");
+    bt_snapshot_want(
+        s, all_finite(real, sizeof real / sizeof *real) && all_finite(v->dropped, 3) && all_finite(v->brought, 3),
+        "window/rear", -1, "and what else belongs to it are not all finite");
     bt_snapshot_want(s, fabs(v->drift_x) <= FAR * w->par.period_x, "window/drift_x", -1, "is out of range");
-    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1, "is out of range");
-    bt_snapshot_want(s, counts(v->renewed) && counts(v->kept) && counts(v->missed) && counts(v->waiting) && counts(v->renewed_now), "window/renewed", -1, "and its other counters are not all counts");
+    bt_snapshot_want(s, !(w->par.period_y > 0) || fabs(v->drift_y) <= FAR * w->par.period_y, "window/drift_y", -1,
+                     "is out of range");
+    bt_snapshot_want(
+        s, counts(v->renewed) && counts(v->kept) && counts(v->missed) && counts(v->waiting) && counts(v->renewed_now),
+        "window/renewed", -1, "and its other counters are not all counts");
 }
 
 static bool is_gid(double x, bt_gid n) { return x >= 0 && x < (double)n && x == floor(x); }
@@ -226,9 +249,12 @@ static void check_impacts(const bt_world *w, bt_snapshot *s)
     const bt_gid n = w->bodies.n_global;
     for (int64_t k = 0; k < m->n_open && !s->faulty; k++) {
         const bt_impact *e = &m->open[k].so_far;
-        bt_snapshot_want(s, is_gid(e->gid, n) && (k == 0 || m->open[k - 1].so_far.gid < e->gid), "impacts/open", k, "is no collision, or out of order");
-        const double real[] = {e->time, e->x, e->y, e->impulse, e->approach, e->mass, e->thickness, m->open[k].rest, m->open[k].largest};
-        bt_snapshot_want(s, all_finite(real, sizeof real / sizeof *real) && e->impulse >= 0, "impacts/open", k, "is not finite");
+        bt_snapshot_want(s, is_gid(e->gid, n) && (k == 0 || m->open[k - 1].so_far.gid < e->gid), "impacts/open", k,
+                         "is no collision, or out of order");
+        const double real[] = {
+            e->time, e->x, e->y, e->impulse, e->approach, e->mass, e->thickness, m->open[k].rest, m->open[k].largest};
+        bt_snapshot_want(s, all_finite(real, sizeof real / sizeof *real) && e->impulse >= 0, "impacts/open", k,
+                         "is not finite");
     }
 }
 
@@ -244,15 +270,18 @@ static void check_events(const bt_world *w, bt_snapshot *s)
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 
-void bt_state_check(const bt_world *w, const bt_trace *trace, int64_t n, bool impacts, bt_snapshot *s)
+void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool impacts, bt_snapshot *s)
 {
     if (s->faulty) return; // then arrays are missing
     const bt_params *p = &w->par;
-    const double fluid[] = {p->water_u, p->water_v, p->air_u, p->air_v, p->balance_u, p->balance_v, p->tilt_ax, p->tilt_ay};
+    const double fluid[] = {p->water_u,   p->water_v,   p->air_u,   p->air_v,
+                            p->balance_u, p->balance_v, p->tilt_ax, p->tilt_ay};
     bt_snapshot_want(s, w->step >= 0, "world/step", -1, "is negative");
-    bt_snapshot_want(s, isfinite(w->drift_x) && isfinite(w->drift_y), "world/drift_x", -1, "and drift_y are not finite");
-    bt_snapshot_want(s, all_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1, "and what else is of water and air are not all finite");
-    check_tiles(w, s);
+    bt_snapshot_want(s, isfinite(w->drift_x) && isfinite(w->drift_y), "world/drift_x", -1,
+                     "and drift_y are not finite");
+    bt_snapshot_want(s, all_finite(fluid, sizeof fluid / sizeof *fluid), "step/water_u", -1,
+                     "and what else is of water and air are not all finite");
+    check_cells(w, s);
     if (!s->faulty) check_bodies(w, s);
     if (!s->faulty) check_contacts(w, trace, n, s);
     if (w->tow && !s->faulty) check_tow(w, s);

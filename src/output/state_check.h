@@ -4,13 +4,14 @@
 #define BT_STATE_CHECK_H
 
 #include "bergtow/field.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "base/snapshot.h"
 
-/// Complains into s of the first thing that is wrong with a field, whose arrays have the lengths that the first two give.
+/// Complains into s of the first thing that is wrong with a field, whose arrays have the lengths that the first two
+/// give.
 void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s);
 
 /// The same for a world before it is dealt, and for traces [n]; impacts: those were taken too.
-void bt_state_check(const bt_world *w, const bt_trace *trace, int64_t n, bool impacts, bt_snapshot *s);
+void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool impacts, bt_snapshot *s);
 
 #endif

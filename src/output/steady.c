@@ -23,7 +23,8 @@ static const struct { const char *name, *key; bt_column column; bool load, alway
     [BT_REPORTED_THRUST] = {"thrust of the vessel", "vessel_thrust", BT_COL_THRUST, true, false},
 };
 
-/// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window too short.
+/// Reasons of one verdict stand one after the other; one of a run that is not steady takes the place of one of a window
+/// too short.
 __attribute__((format(printf, 3, 4))) static void decide(bt_steady *s, bt_verdict verdict, const char *text, ...)
 {
     if (s->verdict == BT_NOT_STEADY && verdict == BT_TOO_SHORT) return;
@@ -44,7 +45,8 @@ static int64_t first_at_or_after(const bt_history *h, double time)
     return i;
 }
 
-/// A series that the run has from step `first` to its end; one that begins or ends within, as the tension of a line that parts, has no mean.
+/// A series that the run has from step `first` to its end; one that begins or ends within, as the tension of a line
+/// that parts, has no mean.
 static bool is_there(const double *x, int64_t first, int64_t n)
 {
     for (int64_t i = first; i < n; i++)
@@ -71,8 +73,10 @@ static int64_t find_start(bt_steady *s, const bt_history *h, const bt_case *c)
             settles = reported[k].name;
     }
     if (settles)
-        decide(s, BT_NOT_STEADY, "the %s still settles in the first half of the run, and the window begins at its middle (%g s): run longer", settles,
-               h->column[BT_COL_TIME][first]);
+        decide(
+            s, BT_NOT_STEADY,
+            "the %s still settles in the first half of the run, and the window begins at its middle (%g s): run longer",
+            settles, h->column[BT_COL_TIME][first]);
     return first;
 }
 
@@ -81,7 +85,9 @@ static void reduce(bt_steady *s, const bt_history *h)
     for (int k = 0; k < BT_N_REPORTED; k++) {
         const double *x = h->column[reported[k].column];
         bt_reported *r = &s->series[k];
-        *r = (bt_reported){.name = reported[k].name, .key = reported[k].key, .present = reported[k].always || is_there(x, s->first, h->n)};
+        *r = (bt_reported){.name = reported[k].name,
+                           .key = reported[k].key,
+                           .present = reported[k].always || is_there(x, s->first, h->n)};
         if (!r->present) continue;
         r->mean = bt_stats_mean(x + s->first, s->n);
         r->trend = bt_stats_trend(x + s->first, s->n);
@@ -99,11 +105,17 @@ static void judge_solver(bt_steady *s, const bt_case *c, const bt_run_totals *t)
 {
     const double speed = t->tolerance / c->solver.tolerance;
     if (s->unconverged > BT_STEADY_UNCONVERGED)
-        decide(s, BT_NOT_STEADY, "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise solver.max_sweeps or "
-               "lower run.dt", 100 * s->unconverged, 100 * BT_STEADY_UNCONVERGED);
+        decide(s, BT_NOT_STEADY,
+               "%.1f %% of the steps in the window did not converge, more than the %g %% that a mean bears: raise "
+               "solver.max_sweeps or "
+               "lower run.dt",
+               100 * s->unconverged, 100 * BT_STEADY_UNCONVERGED);
     if (s->residual > BT_STEADY_RESIDUAL * speed)
-        decide(s, BT_NOT_STEADY, "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of %.3g m/s: raise "
-               "solver.max_sweeps or lower run.dt", s->residual, BT_STEADY_RESIDUAL, speed);
+        decide(s, BT_NOT_STEADY,
+               "a step in the window was left with a residual of %.2g m/s, more than %g of the reference speed of %.3g "
+               "m/s: raise "
+               "solver.max_sweeps or lower run.dt",
+               s->residual, BT_STEADY_RESIDUAL, speed);
 }
 
 /// What happened within the window that no mean goes across.
@@ -112,7 +124,9 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
     const double *p = c->tow.programme;
     for (int i = 0; i + 1 < c->tow.n_programme; i++) {
         if (p[2 * i + 1] == p[2 * i + 3] || p[2 * i + 2] <= s->start || p[2 * i] >= s->end) continue;
-        decide(s, BT_NOT_STEADY, "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read the series",
+        decide(s, BT_NOT_STEADY,
+               "the speed programme goes from %g to %g m/s within the window, %g to %g s: end the run before, or read "
+               "the series",
                p[2 * i + 1], p[2 * i + 3], s->start, s->end);
     }
     for (int64_t i = 0; t->events && i < t->events->n; i++) {
@@ -120,15 +134,21 @@ static void judge_events(bt_steady *s, const bt_case *c, const bt_run_totals *t)
         if (e->kind == BT_EVENT_ADRIFT)
             decide(s, BT_NOT_STEADY, "the last line parted at %g s, and nothing tows the body since", e->time);
         else if (e->kind == BT_EVENT_LINE_BROKEN && e->time > s->start)
-            decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after", e->time);
+            decide(s, BT_NOT_STEADY, "a line parted at %g s, within the window, whose means mix before and after",
+                   e->time);
     }
     if (t->stall.time > BT_STEADY_STALLED * s->end)
-        decide(s, BT_NOT_STEADY, "the towed body stood still for %.3g s of %.3g s: the mean depends on how often it jammed", t->stall.time, s->end);
+        decide(s, BT_NOT_STEADY,
+               "the towed body stood still for %.3g s of %.3g s: the mean depends on how often it jammed",
+               t->stall.time, s->end);
     if (!t->window) return;
     const double places = (double)(t->window->renewed + t->window->missed);
     if (places > 0 && (double)t->window->missed > BT_STEADY_MISSED * places)
-        decide(s, BT_NOT_STEADY, "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or carries it along: take a "
-               "longer domain", 100 * (double)t->window->missed / places);
+        decide(s, BT_NOT_STEADY,
+               "%.0f %% of the places ahead of the moving window stayed empty: the body pushes ever more ice, or "
+               "carries it along: take a "
+               "longer domain",
+               100 * (double)t->window->missed / places);
 }
 
 /// The first of the reported series with a trend that matters: the others mostly follow from it.
@@ -139,8 +159,11 @@ static void judge_trends(bt_steady *s)
         const bt_reported *r = &s->series[k];
         const bt_trend *t = &r->trend;
         if (!r->present || !t->significant || !(fabs(t->change) > BT_STEADY_MATERIAL * fabs(r->mean.mean))) continue;
-        decide(s, BT_NOT_STEADY, "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the window later", r->name,
-               t->change > 0 ? "rises" : "falls", bt_force_text(change, fabs(t->change)), bt_force_text(low, bt_min(fabs(t->low), fabs(t->high))),
+        decide(s, BT_NOT_STEADY,
+               "the %s %s over the window by %s (95 %%: %s to %s), %.0f %% of its mean: run longer, or begin the "
+               "window later",
+               r->name, t->change > 0 ? "rises" : "falls", bt_force_text(change, fabs(t->change)),
+               bt_force_text(low, bt_min(fabs(t->low), fabs(t->high))),
                bt_force_text(high, bt_max(fabs(t->low), fabs(t->high))), 100 * fabs(t->change / r->mean.mean));
         return;
     }
@@ -155,8 +178,11 @@ static void judge_length(bt_steady *s)
         if (reported[k].load && r->present && !(worst && r->mean.n_eff >= worst->mean.n_eff)) worst = r;
     }
     if (!worst || worst->mean.n_eff >= BT_STEADY_INDEPENDENT) return;
-    decide(s, BT_TOO_SHORT, "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run longer", s->end - s->start,
-           worst->mean.n_eff, worst->name, s->n > 1 ? worst->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN, BT_STEADY_INDEPENDENT);
+    decide(s, BT_TOO_SHORT,
+           "the window of %g s holds %.1f independent samples of the %s (correlation time %.3g s), fewer than %d: run "
+           "longer",
+           s->end - s->start, worst->mean.n_eff, worst->name,
+           s->n > 1 ? worst->mean.tau * (s->end - s->start) / (double)(s->n - 1) : NAN, BT_STEADY_INDEPENDENT);
 }
 
 void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
@@ -167,8 +193,8 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     s->put_off = s->first - first_at_or_after(h, s->earliest);
     s->n = h->n - s->first;
     if (s->n == 0) {
-        decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s", s->earliest,
-               h->n ? time[h->n - 1] : 0, s->given ? "lower output.window_start" : "shorten tow.ramp");
+        decide(s, BT_TOO_SHORT, "no window: it would begin at %g s and the run ends at %g s: run longer, or %s",
+               s->earliest, h->n ? time[h->n - 1] : 0, s->given ? "lower output.window_start" : "shorten tow.ramp");
     } else {
         s->start = time[s->first];
         s->end = time[h->n - 1];
@@ -177,9 +203,12 @@ void bt_steady_find(bt_steady *s, const bt_history *h, const bt_case *c, const b
     if (s->n == 0) return;
     s->correlation_time = s->n > 1 ? s->series[BT_REPORTED_ICE].mean.tau * t->dt : NAN;
     if (!isfinite(s->series[BT_REPORTED_ICE].mean.mean) || !isfinite(s->series[BT_REPORTED_TOW].mean.mean))
-        decide(s, BT_NOT_STEADY, "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
+        decide(s, BT_NOT_STEADY,
+               "the forces on the body are not finite within the window: the run is not usable: lower run.dt");
     if (s->start < ramp * (1 - 1e-12))
-        decide(s, BT_NOT_STEADY, "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start", s->start, ramp);
+        decide(s, BT_NOT_STEADY,
+               "the window begins at %g s, before the ramp of the tow ends at %g s: raise output.window_start",
+               s->start, ramp);
     judge_solver(s, c, t);
     judge_events(s, c, t);
     judge_trends(s);

@@ -4,10 +4,12 @@
 //     | ramp |  start-up  |  window: means, intervals, percentiles, peaks  |
 //     0    earliest     start                                             end
 //
-// Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that MSER-5 finds, and of these the
+// Start. Given by output.window_start; else, for each reported series, the point from the end of the ramp on that
+// MSER-5 finds, and of these the
 // latest: the ice resistance may be steady long before the tension of the line is.
 // Verdict:
-//     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within the window, or the contacts
+//     not steady   the window begins within the ramp, a reported series has a trend, the tow or the body changes within
+//                  the window, or the contacts
 //                  were not solved: the mean is that of this stretch of time, and says nothing of a longer tow
 //     too short    there is no window, or one of fewer than BT_STEADY_INDEPENDENT independent samples of some load
 //     steady       none of these was found
@@ -17,7 +19,8 @@
 #include "bergtow/stats.h"
 #include "output/history.h"
 
-#define BT_STEADY_INDEPENDENT 20    ///< below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
+/// below it the interval covers in less than 93 % of all cases (measured, src/base/stats.c)
+#define BT_STEADY_INDEPENDENT 20
 #define BT_STEADY_MATERIAL 0.02     ///< change over the window / mean below which a trend does not matter, assumed
 #define BT_STEADY_UNCONVERGED 0.01  ///< largest share of unconverged steps in the window, assumed
 #define BT_STEADY_RESIDUAL 0.1      ///< largest residual of a step in the window / reference speed, assumed
@@ -31,7 +34,13 @@ extern const char *const bt_verdict_names[];
 
 /// Series whose means are reported.
 typedef enum bt_reported_series {
-    BT_REPORTED_ICE, BT_REPORTED_TOW, BT_REPORTED_DRAG, BT_REPORTED_TENSION_1, BT_REPORTED_TENSION_2, BT_REPORTED_THRUST, BT_N_REPORTED
+    BT_REPORTED_ICE,
+    BT_REPORTED_TOW,
+    BT_REPORTED_DRAG,
+    BT_REPORTED_TENSION_1,
+    BT_REPORTED_TENSION_2,
+    BT_REPORTED_THRUST,
+    BT_N_REPORTED
 } bt_reported_series;
 
 /// A series whose mean is reported, over the window.

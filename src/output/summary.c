@@ -2,8 +2,9 @@
 // The numbers of a whole run: reduced over one window (steady.h), with a warning for each doubt.
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
-//     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step means
-//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − <inertia>)      the body's own momentum balance
+//     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step
+//     means
+//     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − … − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "output/summary.h"
 #include "case/arch.h"
@@ -19,7 +20,8 @@
 #define MOMENTUM_LIMIT 1e-9
 /// Overlap above this fraction of the mean floe size is told.
 #define OVERLAP_LIMIT 0.01
-/// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other part sideways.
+/// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other
+/// part sideways.
 #define CRUSH_LIMIT 0.3
 
 static int ascending(const void *a, const void *b)
@@ -37,7 +39,10 @@ static double percentile(const double *x, int64_t n, double percent)
     return x[i] + (at - (double)i) * (x[next] - x[i]);
 }
 
-static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k) { return bt_stats_mean(h->column[k] + s->window.first, s->window.n); }
+static bt_mean mean_over(const bt_summary *s, const bt_history *h, bt_column k)
+{
+    return bt_stats_mean(h->column[k] + s->window.first, s->window.n);
+}
 
 static void reduce_window(bt_summary *s, const bt_history *h)
 {
@@ -47,6 +52,7 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     s->drag = mean_over(s, h, BT_COL_DRAG);
     s->coriolis = mean_over(s, h, BT_COL_CORIOLIS);
     s->tilt = mean_over(s, h, BT_COL_TILT);
+    for (int k = 0; k < h->n_laws; k++) s->law[k] = bt_stats_mean(h->law[k] + s->window.first, s->window.n);
     s->inertia = mean_over(s, h, BT_COL_INERTIA);
     s->budget = mean_over(s, h, BT_COL_BUDGET);
 
@@ -60,7 +66,12 @@ static void reduce_window(bt_summary *s, const bt_history *h)
 
     double largest = bt_max(fabs(s->ice.mean), bt_max(fabs(s->tow.mean), fabs(s->drag.mean)));
     largest = bt_max(largest, bt_max(fabs(s->coriolis.mean), fabs(s->tilt.mean)));
-    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean - s->inertia.mean;
+    s->balance = s->tow.mean - s->drag.mean - s->coriolis.mean - s->tilt.mean;
+    for (int k = 0; k < h->n_laws; k++) {
+        largest = bt_max(largest, fabs(s->law[k].mean));
+        s->balance -= s->law[k].mean;
+    }
+    s->balance -= s->inertia.mean;
     s->closure = s->ice.mean - s->balance;
     s->closure_relative = largest > 0 ? s->closure / largest : s->closure == 0 ? 0 : NAN;
     const double other = s->ice.mean - s->budget.mean;
@@ -68,11 +79,16 @@ static void reduce_window(bt_summary *s, const bt_history *h)
     if (n == 0) return;
 
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
-        bt_errors_add(&s->warnings, "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the largest of them; "
-                      "the momentum balance of the towed body does not close", fabs(s->closure_relative));
+        bt_errors_add(&s->warnings,
+                      "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the "
+                      "largest of them; "
+                      "the momentum balance of the towed body does not close",
+                      fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
-        bt_errors_add(&s->warnings, "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
-                      "walls; the momentum balance of the ice does not close", fabs(s->budget_closure_relative));
+        bt_errors_add(&s->warnings,
+                      "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
+                      "walls; the momentum balance of the ice does not close",
+                      fabs(s->budget_closure_relative));
 }
 
 /// A line that broke changes what the means stand for.
@@ -86,10 +102,12 @@ static void warn_of_events(bt_summary *s, const bt_events *e)
     }
 }
 
-/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start, its width and its length.
+/// The verdict, where it is not "steady", and what in the case itself casts doubt on a mean: its start, its width and
+/// its length.
 static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals *t)
 {
-    if (s->window.verdict != BT_STEADY) bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
+    if (s->window.verdict != BT_STEADY)
+        bt_errors_add(&s->warnings, "%s: %s", bt_verdict_names[s->window.verdict], s->window.reason);
     bt_case_warn_start(c, &s->warnings);
     const bt_arch arch = bt_arch_of(c, t->concentration, t->mean_size);
     bt_arch_warn(&arch, &s->warnings);
@@ -106,6 +124,7 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
 
     const bt_mean none = bt_stats_mean(NULL, 0);
     s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
+    for (int k = 0; k < h->n_laws; k++) s->law[k] = none;
     s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
     s->window.start = s->window.end = s->window.correlation_time = nan;
     if (body) {
@@ -123,41 +142,64 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
     s->updates = h->n ? h->sum_updates / (double)h->n : nan;
     s->moves = h->n ? h->sum_moves / (double)h->n : nan;
-    s->ns_per_floe_step = n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
+    s->ns_per_floe_step =
+        n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
 
-    if (c->solver.turn_rows != BT_TURN_ROWS) bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
+    if (c->solver.turn_rows != BT_TURN_ROWS)
+        bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
-        bt_errors_add(&s->warnings, "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
+        bt_errors_add(&s->warnings,
+                      "%lld of %lld steps met the sweep limit before the tolerance (largest residual %.2g m/s, "
                       "tolerance %.2g m/s); raise solver.max_sweeps or lower run.dt",
                       (long long)h->unconverged, (long long)h->n, h->max_residual, t->tolerance);
     if (h->outrun)
-        bt_errors_add(&s->warnings, "in %lld of %lld steps, mostly unconverged ones, a floe moved farther than the contact detection looks "
-                      "ahead: a contact may have been met a step late, as overlap; lower run.dt", (long long)h->outrun, (long long)h->n);
+        bt_errors_add(
+            &s->warnings,
+            "in %lld of %lld steps, mostly unconverged ones, a floe moved farther than the contact detection looks "
+            "ahead: a contact may have been met a step late, as overlap; lower run.dt",
+            (long long)h->outrun, (long long)h->n);
     if (h->restitution_cut)
-        bt_errors_add(&s->warnings, "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
-                      (long long)h->restitution_cut, (long long)h->n);
+        bt_errors_add(
+            &s->warnings,
+            "in %lld of %lld steps simultaneous rebounds would have added energy; their restitution was lowered",
+            (long long)h->restitution_cut, (long long)h->n);
     if (h->positive_work)
-        bt_errors_add(&s->warnings, "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
+        bt_errors_add(&s->warnings,
+                      "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
                       (long long)h->positive_work, (long long)h->n);
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
-        bt_errors_add(&s->warnings, "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
-                      "solver.position_sweeps", h->max_overlap, 100 * h->max_overlap / t->mean_size);
+        bt_errors_add(&s->warnings,
+                      "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
+                      "solver.position_sweeps",
+                      h->max_overlap, 100 * h->max_overlap / t->mean_size);
     if (!(h->max_crushed_depth <= CRUSH_LIMIT * t->mean_size))
-        bt_errors_add(&s->warnings, "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses stay as they were, "
-                      "which is no model of that", h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
+        bt_errors_add(&s->warnings,
+                      "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses "
+                      "stay as they were, "
+                      "which is no model of that",
+                      h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
     if (t->stall.windows)
-        bt_errors_add(&s->warnings, "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a path of a "
-                      "mean floe size: a jam%s", t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
-                      c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0 ? "" : "; rigid contact has no largest force: consider ice.rafting.kappa or ice.crushing.pressure");
+        bt_errors_add(
+            &s->warnings,
+            "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a "
+            "path of a "
+            "mean floe size: a jam%s",
+            t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
+            c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0
+                ? ""
+                : "; rigid contact has no largest force: consider ice.rafting.kappa or ice.crushing.pressure");
     if (!(h->max_momentum_residual <= MOMENTUM_LIMIT))
-        bt_errors_add(&s->warnings, "momentum is conserved only to %.2g of what the steps exchange; please report this case",
+        bt_errors_add(&s->warnings,
+                      "momentum is conserved only to %.2g of what the steps exchange; please report this case",
                       h->max_momentum_residual);
     bt_outline_warn(&t->outlines, c, &s->warnings);
     warn_of_events(s, t->events);
     bt_summary_window_warn(&s->warnings, t->window);
     if (t->floes_outside)
-        bt_errors_add(&s->warnings, "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
-                      "matters", (long long)t->floes_outside);
+        bt_errors_add(&s->warnings,
+                      "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
+                      "matters",
+                      (long long)t->floes_outside);
 }
 
 void bt_summary_free(bt_summary *s)

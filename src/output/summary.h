@@ -13,8 +13,9 @@ typedef struct bt_summary {
     double sim_time;                  ///< s
     bt_steady window;
     bt_mean ice, tow, drag, coriolis, tilt, inertia, budget; ///< N, over the window
+    bt_mean law[BT_MAX_FORCE_LAWS];   ///< N, of the other force laws, [bt_n_law_series()]
     double p95, p99, peak;            ///< N, of the step means of the ice resistance
-    double balance;                   ///< mean tow − drag − Coriolis − tilt − inertia, N
+    double balance;                   ///< mean tow − drag − Coriolis − tilt − other laws − inertia, N
     double closure, closure_relative; ///< mean ice − balance, N; over the largest of the means
     double budget_closure_relative;   ///< (mean ice − budget) over the largest of the means
     double contacts, sweeps, updates, moves; ///< means over all steps
@@ -28,8 +29,10 @@ typedef struct bt_summary {
 void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
                      bool body);
 /// summary.json as text; the caller frees it.
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
-void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes);
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes);
 void bt_summary_free(bt_summary *s);
 
 #endif

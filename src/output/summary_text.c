@@ -77,7 +77,10 @@ enum { N_OF_THE_LINE = sizeof of_the_line / sizeof *of_the_line };
 /// Mean with standard error and 95 % interval: mean_KEY_n, mean_KEY_se_n, mean_KEY_low_n, mean_KEY_high_n.
 static void json_mean(bt_json *j, const char *key, const bt_mean *m)
 {
-    const struct { const char *suffix; double value; } row[] = {{"", m->mean}, {"_se", m->se}, {"_low", m->low}, {"_high", m->high}};
+    const struct {
+        const char *suffix;
+        double value;
+    } row[] = {{"", m->mean}, {"_se", m->se}, {"_low", m->low}, {"_high", m->high}};
     for (int k = 0; k < 4; k++) {
         char name[80];
         snprintf(name, sizeof name, "mean_%s%s_n", key, row[k].suffix);
@@ -85,7 +88,8 @@ static void json_mean(bt_json *j, const char *key, const bt_mean *m)
     }
 }
 
-/// What the verdict rests on: of each reported series the trend, the quarters, the independent samples, and the peaks within and before the window.
+/// What the verdict rests on: of each reported series the trend, the quarters, the independent samples, and the peaks
+/// within and before the window.
 static void json_reported(bt_json *j, const bt_steady *w)
 {
     bt_json_open(j, "series", '{');
@@ -166,6 +170,11 @@ static void json_forces(bt_json *j, const bt_summary *s, const bt_case *c)
     bt_json_number(j, "mean_drag_force_n", s->drag.mean);
     bt_json_number(j, "mean_coriolis_force_n", s->coriolis.mean);
     bt_json_number(j, "mean_tilt_force_n", s->tilt.mean);
+    for (int k = 0; k < bt_n_law_series(); k++) {
+        char key[80];
+        snprintf(key, sizeof key, "mean_%s_force_n", bt_force_series_of[bt_law_series(k)].name);
+        bt_json_number(j, key, s->law[k].mean);
+    }
     bt_json_number(j, "mean_inertia_force_n", s->inertia.mean);
     bt_json_number(j, "mean_ice_resistance_budget_n", s->budget.mean);
     bt_json_open(j, "budget", '{');
@@ -208,10 +217,12 @@ static void print_events(const bt_events *e)
         bt_event_describe(&e->event[i], text);
         printf("  event               %g s: %s\n", e->event[i].time, text);
     }
-    if (e && e->n > MAX_EVENTS) printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - MAX_EVENTS);
+    if (e && e->n > MAX_EVENTS)
+        printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - MAX_EVENTS);
 }
 
-char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes)
+char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes)
 {
     bt_json j = {0};
     bt_json_open(&j, NULL, '{');
@@ -295,7 +306,8 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
 static void print_mean(const char *label, const bt_mean *m)
 {
     char a[32], b[32], d[32], e[32];
-    printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, bt_force_text(a, m->mean), bt_force_text(b, m->low), bt_force_text(d, m->high), bt_force_text(e, m->sd));
+    printf("  %-19s %s, 95 %% interval %s to %s, sd %s\n", label, bt_force_text(a, m->mean), bt_force_text(b, m->low),
+           bt_force_text(d, m->high), bt_force_text(e, m->sd));
 }
 
 static void print_forces(const bt_summary *s, const bt_case *c)
@@ -307,20 +319,25 @@ static void print_forces(const bt_summary *s, const bt_case *c)
         printf("  window              none: %s\n", w->reason);
         return;
     }
-    printf("  window              %g to %g s (%s), %s; %.3g independent samples, correlation time %.3g s\n", w->start, w->end,
-           w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff, w->correlation_time);
+    printf("  window              %g to %g s (%s), %s; %.3g independent samples, correlation time %.3g s\n", w->start,
+           w->end, w->given ? "given" : "found by MSER-5", loud[w->verdict], s->ice.n_eff, w->correlation_time);
     if (w->verdict != BT_STEADY) printf("    %-17s %s\n", bt_verdict_names[w->verdict], w->reason);
-    printf("  %s\n", w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
+    printf("  %s\n",
+           w->verdict == BT_STEADY ? "means of the steady tow" : "means over the window, not of a steady tow");
     print_mean("  ice resistance", &s->ice);
-    printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to use\n");
+    printf("    one field         the interval knows this field alone: take several values of ice.seed for a number to "
+           "use\n");
     const double *quarter = w->series[BT_REPORTED_ICE].quarter;
     printf("    quarters          %s,", bt_force_text(a, quarter[0]));
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
-    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95), bt_force_text(b, s->p99), bt_force_text(d, s->peak));
-    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n", bt_force_text(a, s->balance),
-           bt_force_text(b, s->budget.mean));
+    printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95),
+           bt_force_text(b, s->p99), bt_force_text(d, s->peak));
+    printf("    from balances     %s by tow - drag - Coriolis - tilt - inertia, %s by the momentum of the ice\n",
+           bt_force_text(a, s->balance), bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
     printf("    drag              %s\n", bt_force_text(a, s->drag.mean));
+    for (int k = 0; k < bt_n_law_series(); k++)
+        printf("    %-17s %s\n", bt_force_series_of[bt_law_series(k)].name, bt_force_text(a, s->law[k].mean));
     for (int k = 0; k < N_OF_THE_LINE; k++) {
         const bt_reported *r = &w->series[of_the_line[k].series];
         if (!r->present) continue;
@@ -334,39 +351,47 @@ static void print_forces(const bt_summary *s, const bt_case *c)
                c->reference.source ? c->reference.source : "no source given", s->reference_ratio);
 }
 
-void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes)
+void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t,
+                      bt_idx n_floes)
 {
     if (c->run.title && *c->run.title) printf("%s\n", c->run.title);
-    printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes, t->concentration,
-           (long long)t->n_steps, t->dt, s->sim_time);
+    printf("  run                 %d floes, concentration %.3g, %lld steps of %g s = %g s\n", (int)n_floes,
+           t->concentration, (long long)t->n_steps, t->dt, s->sim_time);
     bt_lead_stats_print(&t->lead);
     const bt_outline_counts *o = &t->outlines;
     if (o->read) printf("  outlines            %lld, coordinates %s\n", (long long)o->read, o->crs);
     if (o->rounded)
         printf("  outlines            %lld not convex by rounding alone, %lld corners left out, which adds %.3g m2\n",
                (long long)o->rounded, (long long)o->rounded_corners, o->rounded_area);
-    if (o->hulled) printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n", (long long)o->hulled, o->hull_area);
-    if (o->split) printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split, (long long)o->parts);
+    if (o->hulled)
+        printf("  outlines            %lld not convex and replaced by their hulls, which adds %.4g m2\n",
+               (long long)o->hulled, o->hull_area);
+    if (o->split)
+        printf("  outlines            %lld not convex, in %lld convex parts\n", (long long)o->split,
+               (long long)o->parts);
     if (s->body) print_forces(s, c);
     bt_impacts_print(s->impacts);
     if (s->body && !isnan(s->estimate.along)) {
-        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate where that knows the concentration and holds, regime\n", s->estimate.along);
+        printf("  estimates           at %.4g m/s through the ice: force, ice resistance of this run / estimate where "
+               "that knows the concentration and holds, regime\n",
+               s->estimate.along);
         bt_estimates_print(&s->estimate, s->ice.mean, "    ", false);
     }
     if (h->n)
-        printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts, s->sweeps,
-               (long long)h->unconverged);
+        printf("  contacts            %.4g points, %.3g sweeps a step, %lld steps unconverged\n", s->contacts,
+               s->sweeps, (long long)h->unconverged);
     print_events(t->events);
     printf("  largest overlap     %.3g m (%.2g %% of the mean floe size)\n", h->max_overlap,
            t->mean_size > 0 ? 100 * h->max_overlap / t->mean_size : 0.0);
     printf("  momentum residual   %.2g; contact work %.4g J\n", h->max_momentum_residual, h->contact_work);
     if (c->ice.crushing_pressure > 0)
-        printf("  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n", h->crushed_work,
-               (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
+        printf("  crushed             %.4g J in %lld steps, at most %.0f contact points at once, deepest %.3g m\n",
+               h->crushed_work, (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
     if (c->ice.rafting_kappa > 0)
-        printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J of it in the sheets' height, "
-               "friction between sheets %.4g J\n", h->rafted_area, t->ice_area > 0 ? 100 * h->rafted_area / t->ice_area : 0.0, h->rafting, h->raft_edge_work,
-               h->rafted_energy, h->raft_friction_work);
+        printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J "
+               "of it in the sheets' height, friction between sheets %.4g J\n",
+               h->rafted_area, t->ice_area > 0 ? 100 * h->rafted_area / t->ice_area : 0.0, h->rafting,
+               h->raft_edge_work, h->rafted_energy, h->raft_friction_work);
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);
@@ -375,8 +400,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
     phase_rows(&t->phases, rows);
     double sum = 0;
     for (int i = 0; i < N_PHASES; i++) sum += rows[i].seconds;
-    for (int i = 0; i < N_PHASES; i++) printf(" %s %.1f %%%s", rows[i].name, sum > 0 ? 100 * rows[i].seconds / sum : 0.0,
-                                              i + 1 < N_PHASES ? "," : "\n");
+    for (int i = 0; i < N_PHASES; i++)
+        printf(" %s %.1f %%%s", rows[i].name, sum > 0 ? 100 * rows[i].seconds / sum : 0.0,
+               i + 1 < N_PHASES ? "," : "\n");
     printf("  state hash          %016" PRIx64 "\n", t->state_hash);
     for (size_t i = 0; i < s->warnings.n; i++) printf("  warning: %s\n", s->warnings.text[i]);
 }

@@ -33,24 +33,33 @@ void bt_summary_window_json(bt_json *j, const bt_window *v)
 void bt_summary_window_print(const bt_window *v)
 {
     if (!v) return;
-    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept, %lld places missed, %lld floes wait\n",
+    printf("  moving window       %.3g times its length; %lld floes renewed, %lld kept, %lld places missed, %lld floes "
+           "wait\n",
            bt_window_laps(v), (long long)v->renewed, (long long)v->kept, (long long)v->missed, (long long)v->waiting);
 }
 
 void bt_summary_window_warn(bt_errors *warnings, const bt_window *v)
 {
     if (!v) return;
-    const double laps = bt_window_laps(v), places = (double)(v->renewed + v->missed), floes = (double)(v->renewed + v->kept);
+    const double laps = bt_window_laps(v), places = (double)(v->renewed + v->missed),
+                 floes = (double)(v->renewed + v->kept);
     if (laps > 1)
-        bt_errors_add(warnings, "the moving window has gone %.2f times its length: the body meets the same field again after "
-                      "each, with the hole in which it stood at time zero; samples a length apart are not independent, and the standard "
-                      "error may be too small; take a longer domain, or several values of ice.seed", laps);
+        bt_errors_add(warnings,
+                      "the moving window has gone %.2f times its length: the body meets the same field again after "
+                      "each, with the hole in which it stood at time zero; samples a length apart are not independent, "
+                      "and the standard "
+                      "error may be too small; take a longer domain, or several values of ice.seed",
+                      laps);
     if (places > 0 && (double)v->missed > SHARE_LIMIT * places)
-        bt_errors_add(warnings, "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
-                      "along, or pushes them far ahead; the ice that it meets is thinner by that; take a longer domain",
-                      100 * (double)v->missed / places);
+        bt_errors_add(
+            warnings,
+            "%.1f %% of the places at the front of the moving window stayed empty: the body carries their floes "
+            "along, or pushes them far ahead; the ice that it meets is thinner by that; take a longer domain",
+            100 * (double)v->missed / places);
     if (floes > 0 && (double)v->kept > SHARE_LIMIT * floes)
-        bt_errors_add(warnings, "%.1f %% of the floes behind the moving window came back ahead as they were, their places not being "
-                      "free: disturbed ice enters; take a longer domain, and more of it behind the body",
-                      100 * (double)v->kept / floes);
+        bt_errors_add(
+            warnings,
+            "%.1f %% of the floes behind the moving window came back ahead as they were, their places not being "
+            "free: disturbed ice enters; take a longer domain, and more of it behind the body",
+            100 * (double)v->kept / floes);
 }

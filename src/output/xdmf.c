@@ -5,9 +5,10 @@
 // precision; the polygons never change, and their connectivity is stored once:
 //     /xdmf/floes, /xdmf/bodies                                  mixed topology
 //     /xdmf/NNNNNN/{floe_points, floe_speed, floe_force, body_points, body_speed}     frame NNNNNN
-// Floes and other bodies are two blocks, because only floes have a contact force. Each frame has datasets of its own: as
-// hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps a
-// geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be moved.
+// Floes and other bodies are two blocks, because only floes have a contact force. Each frame has datasets of its own:
+// as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps
+// a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be
+// moved.
 #include "output/xdmf.h"
 
 #include <inttypes.h>
@@ -15,7 +16,9 @@
 
 static void data_item(FILE *f, int64_t n, int width, const char *type, const char *dataset)
 {
-    fprintf(f, "<DataItem Dimensions=\"%" PRId64 "%s\" NumberType=\"%s\" Precision=\"4\" Format=\"HDF\">result.h5:%s</DataItem>",
+    fprintf(f,
+            "<DataItem Dimensions=\"%" PRId64
+            "%s\" NumberType=\"%s\" Precision=\"4\" Format=\"HDF\">result.h5:%s</DataItem>",
             n, width == 2 ? " 2" : "", type, dataset);
 }
 
@@ -34,8 +37,10 @@ static void block(FILE *f, const char *name, const char *kind, int64_t cells, in
     if (cells == 0) return;
     char path[64];
     snprintf(path, sizeof path, "/xdmf/%s", name);
-    fprintf(f, "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
-               "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n            ", name, cells);
+    fprintf(f,
+            "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
+            "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n            ",
+            name, cells);
     data_item(f, points + 2 * cells, 1, "Int", path);
     fputs("\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
     snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_points", frame, kind);

@@ -43,7 +43,8 @@ typedef struct {
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
     int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
-    int alone;          ///< descriptor held by the one group that may work on members that look hopeless, −1 = not this one
+    /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
+    int alone;
     int64_t lost;       ///< members whose failure could not be recorded
     bt_member_records records;
     double began, gathered, gathering; ///< gathered: when ensemble.h5 was last looked at; gathering: s that took
@@ -62,7 +63,9 @@ static void journal(const ensemble *e, const char *event, const bt_member *m, do
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
     char line[256];
-    const int n = snprintf(line, sizeof line, "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": %.3f, \"exit_code\": %d}\n",
+    const int n = snprintf(line, sizeof line,
+                           "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
+                           "%.3f, \"exit_code\": %d}\n",
                            (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), wall, code);
     const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
@@ -100,7 +103,8 @@ static int check_member(ensemble *e, entry *x, bt_errors *told_of)
     if (status == BT_ERR_CASE) {
         const int fd = bt_member_open(x->folder, "lock", O_RDWR | O_CREAT);
         bt_errors again = {0};
-        if (fd < 0 || !bt_member_take_lock(fd, false) || bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
+        if (fd < 0 || !bt_member_take_lock(fd, false) ||
+            bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) {
             bt_errors_free(&why); // another process has found it out, too
         } else if (bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &again) == BT_OK) {
             bt_errors_free(&why); // and made it good meanwhile
@@ -113,7 +117,9 @@ static int check_member(ensemble *e, entry *x, bt_errors *told_of)
         if (fd >= 0) close(fd);
     }
     for (size_t k = 0; k < why.n && k < 1; k++)
-        bt_errors_add(told_of, "warning: member %s is not sound%s: %s%s", x->m.name, status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k], why.n > 1 ? ", ..." : "");
+        bt_errors_add(told_of, "warning: member %s is not sound%s: %s%s", x->m.name,
+                      status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k],
+                      why.n > 1 ? ", ..." : "");
     bt_errors_free(&why);
     return status == BT_OK ? SOUND : status == BT_ERR_CASE ? DAMAGED : UNREADABLE;
 }
@@ -169,7 +175,8 @@ static void make_list(ensemble *e)
         x->index = i;
         bt_study_member(e->s, i, &x->m);
         if (asprintf(&x->folder, "%s/members/%s", e->o->dir, x->m.name) < 0) abort();
-        if (x->m.condition != priced) { // fields of one condition cost the same; a case that cannot be read fails when its turn comes
+        // fields of one condition cost the same; a case that cannot be read fails when its turn comes
+        if (x->m.condition != priced) {
             bt_case c;
             bt_errors unheard = {0};
             priced = x->m.condition;
@@ -195,7 +202,8 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
 {
     char *text = bt_study_resolved(s, err);
     if (!text) return BT_ERR_CASE;
-    char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"), *copy = bt_file_join(o->dir, "study.yml");
+    char *members = bt_file_join(o->dir, "members"), *path = bt_file_join(o->dir, "study.resolved.yml"),
+         *copy = bt_file_join(o->dir, "study.yml");
     bt_status status = bt_file_make_dir(members, err);
     const int fd = status == BT_OK ? bt_member_open(o->dir, "lock", O_RDWR | O_CREAT) : -1;
     if (fd >= 0) bt_member_take_lock(fd, true); // calls that begin together
@@ -204,7 +212,10 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
         size_t size;
         status = bt_file_read(path, "a study", &before, &size, err);
         if (status == BT_OK && strcmp(before, text)) {
-            bt_errors_add(err, "%s: holds the members of another study (see %s): only `repeats` may change; give another folder with -o, or restore the study and its base case", o->dir, path);
+            bt_errors_add(err,
+                          "%s: holds the members of another study (see %s): only `repeats` may change; give another "
+                          "folder with -o, or restore the study and its base case",
+                          o->dir, path);
             status = BT_ERR_CASE;
         }
         free(before);
@@ -234,27 +245,34 @@ static void say(const ensemble *e, const entry *x, bt_status status, double wall
         done++;
         cost += e->list[i].cost;
     }
-    const double passed = bt_clock() - e->began, spent = cost - e->cost_before, left = spent > 0 ? passed * (all - cost) / spent : NAN;
+    const double passed = bt_clock() - e->began, spent = cost - e->cost_before,
+                 left = spent > 0 ? passed * (all - cost) / spent : NAN;
     char line[512];
-    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name, status == BT_OK ? "finished" : "FAILED", wall);
-    for (int p = 0; p < e->s->n_parameters && n < 400; p++) n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
-    if (isfinite(left) && done < e->n) snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left", left < 120 ? left : left / 60);
+    int n = snprintf(line, sizeof line, "[%" PRId64 "/%" PRId64 "] %s %s, %.3g s", done, e->n, x->m.name,
+                     status == BT_OK ? "finished" : "FAILED", wall);
+    for (int p = 0; p < e->s->n_parameters && n < 400; p++)
+        n += snprintf(line + n, sizeof line - (size_t)n, ", %.40s %.40s", e->s->parameter[p].name, x->m.value[p]);
+    if (isfinite(left) && done < e->n)
+        snprintf(line + n, sizeof line - (size_t)n, left < 120 ? "; about %.0f s left" : "; about %.0f min left",
+                 left < 120 ? left : left / 60);
     printf("%s\n", line);
     fflush(stdout);
 }
 
-/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is told of at the end, and is tried again by the next call.
+/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is told of at the end,
+/// and is tried again by the next call.
 static void settle_failed(ensemble *e, entry *x, bt_status status, const bt_errors *why)
 {
     bt_errors unrecorded = {0};
     x->settled = true;
     if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < MOST_TOLD)
-        bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again", x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
+        bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
+                      x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
     bt_errors_free(&unrecorded);
 }
 
-/// A suspect that is run beside another member takes that with it when it ends the program, and again at every call, until both are given up.
-/// So one at a time is run, once nothing else is left to begin.
+/// A suspect that is run beside another member takes that with it when it ends the program, and again at every call,
+/// until both are given up. So one at a time is run, once nothing else is left to begin.
 static bool may_take_suspects(ensemble *e)
 {
     if (e->alone >= 0) return true;
@@ -303,7 +321,8 @@ static int64_t claim(ensemble *e)
     return -1;
 }
 
-/// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts anew.
+/// Collective over the group. A member that was stopped goes on from its checkpoint; where that is refused, it starts
+/// anew.
 static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_run_options *o, bt_errors *why)
 {
     int kept = group->rank == 0 && bt_checkpoint_there(o->dir);
@@ -316,7 +335,8 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_r
     return bt_run(group, c, o, why);
 }
 
-/// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as errors, which are told at the end.
+/// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as
+/// errors, which are told at the end.
 static bt_status gather(ensemble *e, bool wait)
 {
     bt_status status = BT_OK;
@@ -324,7 +344,8 @@ static bt_status gather(ensemble *e, bool wait)
     const double t0 = bt_clock();
     const int fd = bt_member_open(e->o->dir, "lock", O_RDWR | O_CREAT);
     if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
-    else if (fd >= 0 && bt_member_take_lock(fd, wait)) status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
+    else if (fd >= 0 && bt_member_take_lock(fd, wait))
+        status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
     e->gathered = bt_clock();
@@ -339,7 +360,8 @@ static bt_status run_member(ensemble *e, entry *x)
     bt_errors why = {0};
     bt_status status = BT_OK;
     if (first && x->attempts >= BT_MAX_ATTEMPTS) {
-        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name, x->attempts);
+        bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name,
+                      x->attempts);
         status = BT_ERR_NUMERIC;
     }
     if (first) {
@@ -353,7 +375,12 @@ static bt_status run_member(ensemble *e, entry *x)
         bt_case c;
         status = bt_member_case(e->s, &x->m, &c, &why);
         status = bt_comm_agree(e->group, status);
-        const bt_run_options o = {.dir = x->folder, .threads = e->threads, .quiet = true, .dump_step = -1, .told = &told, .command_line = e->o->command_line};
+        const bt_run_options o = {.dir = x->folder,
+                                  .threads = e->threads,
+                                  .quiet = true,
+                                  .dump_step = -1,
+                                  .told = &told,
+                                  .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
     }
@@ -366,7 +393,11 @@ static bt_status run_member(ensemble *e, entry *x)
             if (status == BT_OK) bt_checkpoint_remove(x->folder);
         }
         if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
-        journal(e, status == BT_OK ? "finished" : status == BT_ERR_SIGNAL ? "stopped" : "failed", &x->m, wall, (int)status);
+        journal(e,
+                status == BT_OK           ? "finished"
+                : status == BT_ERR_SIGNAL ? "stopped"
+                                          : "failed",
+                &x->m, wall, (int)status);
         if (status != BT_ERR_SIGNAL) say(e, x, status, wall);
     }
     bt_errors_free(&why);
@@ -384,7 +415,9 @@ static bt_status work(ensemble *e)
         const bt_status status = run_member(e, &e->list[i]);
         if (e->group->rank == 0) {
             close(e->lock);
-            if (status != BT_ERR_SIGNAL && bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE)) gather(e, false);
+            if (status != BT_ERR_SIGNAL &&
+                bt_clock() - e->gathered > e->n_groups * bt_max(GATHER_SECONDS, e->gathering / GATHER_SHARE))
+                gather(e, false);
         }
         if (status == BT_ERR_SIGNAL) return status;
     }
@@ -402,16 +435,21 @@ static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *
     bt_errors damage = {0};
     bt_status status = BT_OK;
     const bt_member_state state = bt_ensemble_state(x->folder, &code, &why);
-    const bt_status sound = state == BT_MEMBER_FINISHED ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage) : BT_OK;
+    const bt_status sound = state == BT_MEMBER_FINISHED
+                                ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage)
+                                : BT_OK;
     if (sound != BT_OK) {
-        if (n->unsound++ < MOST_TOLD) bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0], sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
+        if (n->unsound++ < MOST_TOLD)
+            bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0],
+                          sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
         status = BT_ERR_IO;
     } else if (state == BT_MEMBER_FINISHED) {
         n->finished++;
         if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
-        if (n->failed++ < MOST_TOLD) bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
+        if (n->failed++ < MOST_TOLD)
+            bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
         n->left++;
@@ -422,9 +460,13 @@ static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *
     return status;
 }
 
-static int by_index(const void *a, const void *b) { return ((const entry *)a)->index < ((const entry *)b)->index ? -1 : 1; }
+static int by_index(const void *a, const void *b)
+{
+    return ((const entry *)a)->index < ((const entry *)b)->index ? -1 : 1;
+}
 
-/// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no hole.
+/// What became of the members: the worst status of the failed, each with its first reason. BT_OK only where there is no
+/// hole.
 static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
 {
     counts n = {0};
@@ -434,11 +476,22 @@ static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
         const bt_status of = tell_member(e, &e->list[i], &n, err);
         if (worst == BT_OK) worst = of;
     }
-    if (n.failed > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_TOLD, e->o->dir);
-    if (n.unsound > MOST_TOLD) bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
-    if (status == BT_ERR_SIGNAL) bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left", n.left);
-    else if (n.at_work) bt_errors_add(err, "%" PRId64 " members are being worked on by other processes; the same call takes them in when those have ended", n.at_work);
-    else if (n.left && worst == BT_OK) bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
+    if (n.failed > MOST_TOLD)
+        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_TOLD,
+                      e->o->dir);
+    if (n.unsound > MOST_TOLD)
+        bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
+    if (status == BT_ERR_SIGNAL)
+        bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left",
+                      n.left);
+    else if (n.at_work)
+        bt_errors_add(
+            err,
+            "%" PRId64
+            " members are being worked on by other processes; the same call takes them in when those have ended",
+            n.at_work);
+    else if (n.left && worst == BT_OK)
+        bt_errors_add(err, "%" PRId64 " members are left; the same call goes on with them", n.left);
     if (n.left && worst == BT_OK) worst = BT_ERR_SIGNAL;
     if (!e->o->quiet) {
         printf("%" PRId64 " members finished, %" PRId64 " failed, %" PRId64 " left", n.finished, n.failed, n.left);
@@ -457,7 +510,8 @@ static void forget_failures(const ensemble *e)
     }
 }
 
-/// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or die. told_of: that has been said.
+/// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or
+/// die. told_of: that has been said.
 static bool wait_for_others(ensemble *e, bool told_of)
 {
     int64_t n = 0;
@@ -476,7 +530,8 @@ static bool wait_for_others(ensemble *e, bool told_of)
 }
 
 /// As for a run of the base case.
-static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads, bt_errors *err)
+static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads,
+                                bt_errors *err)
 {
     bt_case c;
     const bt_status status = bt_study_base_case(s, &c, err);
@@ -489,7 +544,10 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
 {
     bt_status status = BT_OK;
     if (s->ranks > comm->size) {
-        bt_errors_add(err, "%s: ranks: a member asks for %" PRId64 " ranks and there are %d; start more with mpirun -n, or lower it", s->path, s->ranks, comm->size);
+        bt_errors_add(err,
+                      "%s: ranks: a member asks for %" PRId64
+                      " ranks and there are %d; start more with mpirun -n, or lower it",
+                      s->path, s->ranks, comm->size);
         status = BT_ERR_CASE;
     }
     bt_member_records records = {0};
@@ -506,15 +564,26 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     bt_comm group;
     bt_comm_split(comm, comm->rank / (int)s->ranks, &group);
     const bool idle = comm->rank / (int)s->ranks >= comm->size / (int)s->ranks; // ranks that make no whole group
-    ensemble e = {.world = comm, .group = &group, .s = s, .o = o, .began = bt_clock(), .gathered = bt_clock(), .err = err, .n_groups = comm->size / (int)s->ranks, .alone = -1};
+    ensemble e = {.world = comm,
+                  .group = &group,
+                  .s = s,
+                  .o = o,
+                  .began = bt_clock(),
+                  .gathered = bt_clock(),
+                  .err = err,
+                  .n_groups = comm->size / (int)s->ranks,
+                  .alone = -1};
     e.threads = threads;
     e.records = records;
     make_list(&e);
     if (o->retry && comm->rank == 0) forget_failures(&e);
     if (o->retry) bt_comm_rest(comm);
-    if (o->retry) for (int64_t i = 0; i < e.n; i++) e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
+    if (o->retry)
+        for (int64_t i = 0; i < e.n; i++)
+            e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
     if (comm->rank == 0 && !o->quiet) {
-        printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64 " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
+        printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64
+               " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
                e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
         fflush(stdout);
     }

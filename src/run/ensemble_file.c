@@ -2,17 +2,21 @@
 // ensemble.h5: one row a member, gathered from the members' folders.
 //
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
-//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a waiting member's process died, or that its
+//     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a
+//     waiting member's process died, or that its
 //                                                        result is not sound
-//     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the case could not be read
-//     /summary/NAME [M]                                  every number of summary.json that does not depend on time or machine; nested ones as A_B; NaN where
+//     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the
+//     case could not be read
+//     /summary/NAME [M]                                  every number of summary.json that does not depend on time or
+//     machine; nested ones as A_B; NaN where
 //                                                        there is none
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
-//     /study, /study_resolved                            texts; attributes of the root: complete, n_members, n_finished, n_failed
+//     /study, /study_resolved                            texts; attributes of the root: complete, n_members,
+//     n_finished, n_failed
 //
-// Made whole each time under a temporary name, sealed and renamed: a reader finds the old or the new one. Only members whose files fit their
-// record (ensemble_record.h) are taken in. Members are written in their order, columns in
-// that of their first appearance, so the file depends on the set of finished members alone.
+// Made whole each time under a temporary name, protected by a checksum and renamed: a reader finds the old or the new
+// one. Only members whose files fit their record (ensemble_record.h) are taken in. Members are written in their order,
+// columns in that of their first appearance, so the file depends on the set of finished members alone.
 #include <errno.h>
 #include <inttypes.h>
 #include <jansson.h>
@@ -27,13 +31,27 @@
 #include "base/fileio.h"
 #include "base/h5util.h"
 #include "case/schema.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/units.h"
 #include "case/value.h"
 
 // Of the machine and the moment, not of the result.
-static const char *const left_out[] = {"wall_time_s", "ranks", "threads", "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
-                                       "edge_cut", "halo_share", "memory_per_floe_b", "sweep_bytes_per_contact", "ns_per_floe_step", "phases_s", NULL};
+static const char *const left_out[] = {"wall_time_s",
+                                       "ranks",
+                                       "threads",
+                                       "divisions",
+                                       "moved_floes",
+                                       "imbalance",
+                                       "worst_imbalance",
+                                       "dealt_imbalance",
+                                       "worst_dealt_imbalance",
+                                       "edge_cut",
+                                       "halo_share",
+                                       "memory_per_floe_b",
+                                       "sweep_bytes_per_contact",
+                                       "ns_per_floe_step",
+                                       "phases_s",
+                                       NULL};
 static const char *const series[] = {"time", "ice_resistance", "tow_force"};
 enum { N_SERIES = sizeof series / sizeof *series };
 
@@ -109,7 +127,8 @@ static hsize_t read_series(const char *folder, int which, double **out)
     void *data;
     H5Eget_auto2(H5E_DEFAULT, &handler, &data);
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT), set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
+    const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT),
+                set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
     if (set >= 0) {
         const hid_t space = H5Dget_space(set);
         hsize_t dims[H5S_MAX_RANK] = {0};
@@ -143,7 +162,8 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
     bt_h5_group(h, "/series");
     for (int k = 0; k < N_SERIES; k++) {
         char *name = bt_file_join("/series", series[k]);
-        hid_t set = bt_h5_growing(h, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
+        hid_t set =
+            bt_h5_growing(h, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
         double *row = bt_alloc(most, sizeof *row);
         for (int64_t m = 0; m < t->n; m++) {
             char *folder = NULL;
@@ -213,7 +233,10 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
     if (status != BT_OK) {
         free(t->reason[m]);
         t->reason[m] = NULL;
-        if (asprintf(&t->reason[m], "its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again", why.n ? why.text[0] : "no reason given") < 0) abort();
+        if (asprintf(&t->reason[m], "its result %s: %s",
+                     status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again",
+                     why.n ? why.text[0] : "no reason given") < 0)
+            abort();
     }
     bt_errors_free(&why);
     return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
@@ -291,7 +314,8 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
     size_t size;
     bt_errors unheard = {0};
-    if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK) bt_h5_write_text(h, "/study_resolved", resolved);
+    if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK)
+        bt_h5_write_text(h, "/study_resolved", resolved);
     bt_errors_free(&unheard);
     free(resolved);
     free(path);
@@ -314,7 +338,7 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
     if (status == BT_OK) {
         write_all(&h, &t, s, dir);
         status = bt_h5_close(&h);
-        if (status == BT_OK) status = bt_seal_write(part, BT_SEAL_ENSEMBLE, err);
+        if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
         if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
         if (status != BT_OK) unlink(part);
     }

@@ -46,7 +46,9 @@ int bt_member_attempts(const char *folder)
     struct stat st, last;
     int n = stat(path, &st) == 0 ? (int)bt_min((double)st.st_size, BT_MAX_ATTEMPTS) : 0;
     if (n > 0 && stat(checkpoint, &last) == 0 &&
-        (last.st_mtim.tv_sec > st.st_mtim.tv_sec || (last.st_mtim.tv_sec == st.st_mtim.tv_sec && last.st_mtim.tv_nsec > st.st_mtim.tv_nsec))) n = 0;
+        (last.st_mtim.tv_sec > st.st_mtim.tv_sec ||
+         (last.st_mtim.tv_sec == st.st_mtim.tv_sec && last.st_mtim.tv_nsec > st.st_mtim.tv_nsec)))
+        n = 0;
     free(path);
     free(checkpoint);
     return n;
@@ -130,7 +132,12 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
     if (code) *code = 0;
     if (bt_file_there(folder, "finished")) return BT_MEMBER_FINISHED;
     if (read_failure(folder, 0, code, why) || read_failure(folder, 1, code, why)) return BT_MEMBER_FAILED;
-    const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n; // the one under way has no end yet
-    if (died > 0 && asprintf(why, "its process died in %d attempt%s without a checkpoint; it is tried again after all others, %d times in all", died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS) < 0) abort();
+    // the one under way has no end yet
+    const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n;
+    if (died > 0 && asprintf(why,
+                             "its process died in %d attempt%s without a checkpoint; it is tried again after all "
+                             "others, %d times in all",
+                             died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS) < 0)
+        abort();
     return BT_MEMBER_WAITING;
 }

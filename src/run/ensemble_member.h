@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The files by which members of an ensemble are told apart: lock, attempts, reasons of a failure. What they mean: bergtow/ensemble.h.
+// The files by which members of an ensemble are told apart: lock, attempts, reasons of a failure. What they mean:
+// bergtow/ensemble.h.
 #ifndef BT_ENSEMBLE_MEMBER_H
 #define BT_ENSEMBLE_MEMBER_H
 
@@ -14,7 +15,8 @@ bool bt_member_take_lock(int fd, bool wait);
 /// Is somebody, this process too, at work on the member?
 bool bt_member_held(const char *folder);
 
-/// Starts of a member that had no end, since it last came on: one that has written a checkpoint since is no hopeless one.
+/// Starts of a member that had no end, since it last came on: one that has written a checkpoint since is no hopeless
+/// one.
 int bt_member_attempts(const char *folder);
 void bt_member_note_attempt(const char *folder);
 void bt_member_forget_attempts(const char *folder);

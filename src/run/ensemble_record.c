@@ -14,19 +14,19 @@
 
 #include "bergtow/checkpoint.h"
 #include "base/fileio.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 
 #define RECORD "finished"
 static const char *const files[] = {"summary.json", "result.h5", "case.resolved.yml"};
 enum { N_FILES = sizeof files / sizeof *files, MOST_TEXT = 1024 };
-_Static_assert((int)BT_DIGEST_TEXT == (int)BT_SEAL_DIGEST, "the same digest");
+_Static_assert((int)BT_DIGEST_TEXT == (int)BT_CHECKSUM_DIGEST, "the same digest");
 
 bt_status bt_member_records_begin(bt_member_records *r, const bt_study *s, bt_errors *err)
 {
     *r = (bt_member_records){.n = bt_study_n_members(s)};
     char *text = bt_study_resolved(s, err);
     if (!text) return BT_ERR_CASE;
-    bt_seal_digest_text(text, strlen(text), r->study);
+    bt_checksum_digest_text(text, strlen(text), r->study);
     free(text);
     r->seen = bt_alloc((size_t)r->n, sizeof *r->seen);
     return BT_OK;
@@ -49,8 +49,9 @@ static uint64_t stamp(const char *folder)
         const bool there = stat(path, &st) == 0;
         free(path);
         if (!there) return 0;
-        const uint64_t of[6] = {(uint64_t)st.st_ino, (uint64_t)st.st_size, (uint64_t)st.st_mtim.tv_sec, (uint64_t)st.st_mtim.tv_nsec, (uint64_t)st.st_ctim.tv_sec,
-                                (uint64_t)st.st_ctim.tv_nsec};
+        const uint64_t of[6] = {(uint64_t)st.st_ino,         (uint64_t)st.st_size,
+                                (uint64_t)st.st_mtim.tv_sec, (uint64_t)st.st_mtim.tv_nsec,
+                                (uint64_t)st.st_ctim.tv_sec, (uint64_t)st.st_ctim.tv_nsec};
         memcpy(part[k], of, sizeof of);
     }
     const uint64_t all = XXH3_64bits(part, sizeof part);
@@ -58,13 +59,14 @@ static uint64_t stamp(const char *folder)
 }
 
 /// The record that the files ask for. Errors: BT_ERR_CASE, one is missing; BT_ERR_IO.
-static bt_status make(const bt_member_records *r, const char *name, const char *folder, char text[MOST_TEXT], bt_errors *err)
+static bt_status make(const bt_member_records *r, const char *name, const char *folder, char text[MOST_TEXT],
+                      bt_errors *err)
 {
     int n = snprintf(text, MOST_TEXT, "bergtow finished member 1\nname: %.100s\nstudy: %s\n", name, r->study);
     for (int k = 0; k < N_FILES; k++) {
-        char *path = bt_file_join(folder, files[k]), digest[BT_SEAL_DIGEST];
+        char *path = bt_file_join(folder, files[k]), digest[BT_CHECKSUM_DIGEST];
         int64_t bytes;
-        const bt_status status = bt_seal_digest_file(path, digest, &bytes, err);
+        const bt_status status = bt_checksum_digest_file(path, digest, &bytes, err);
         free(path);
         if (status != BT_OK) return status;
         n += snprintf(text + n, (size_t)(MOST_TEXT - n), "%s: %" PRId64 " bytes, xxh128 %s\n", files[k], bytes, digest);
@@ -83,7 +85,8 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     for (int k = 0; numbers[k] && !missing; k++)
         if (!json_is_number(json_object_get(root, numbers[k]))) missing = numbers[k];
     const bool stopped = json_is_string(json_object_get(root, "stopped"));
-    if (!root) bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
+    if (!root)
+        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
     else if (missing) bt_errors_add(err, "%s: has no %s; look at the disk", path, missing);
     else if (stopped) bt_errors_add(err, "%s: is of a run that was stopped", path);
     const bt_status status = root && !missing && !stopped ? BT_OK : BT_ERR_IO;
@@ -95,7 +98,7 @@ static bt_status check_summary(const char *folder, bt_errors *err)
 bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err)
 {
     char text[MOST_TEXT], *result = bt_file_join(folder, "result.h5"), *path = bt_file_join(folder, RECORD);
-    bt_status status = bt_seal_check(result, BT_SEAL_RESULT, NULL, err);
+    bt_status status = bt_checksum_check(result, BT_CHECKSUM_RESULT, NULL, err);
     if (status == BT_OK) status = check_summary(folder, err);
     if (status == BT_OK) status = make(r, name, folder, text, err);
     if (status == BT_OK) status = bt_file_write(path, text, err);
@@ -111,7 +114,8 @@ static void line_of(const char *text, const char *key, char out[128])
     const size_t n = strlen(key);
     *out = 0;
     for (const char *at = text; at && *at; at = strchr(at, '\n') ? strchr(at, '\n') + 1 : NULL)
-        if (!strncmp(at, key, n) && at[n] == ':') snprintf(out, 128, "%.*s", (int)bt_min((double)strcspn(at, "\n"), 127), at);
+        if (!strncmp(at, key, n) && at[n] == ':')
+            snprintf(out, 128, "%.*s", (int)bt_min((double)strcspn(at, "\n"), 127), at);
 }
 
 /// Why a record is not the one that the files ask for, in words.
@@ -120,7 +124,11 @@ static void tell(const char *folder, const char *kept, const char *wanted, bt_er
     static const char *const whose[] = {"name", "study"};
     char a[128], b[128];
     if (strncmp(kept, "bergtow finished member 1\n", 26)) {
-        bt_errors_add(err, "%s/%s: %s", folder, RECORD, *kept ? "is no record of a finished member" : "is empty, as older versions of the program left it: nothing tells whether the result is as it was");
+        bt_errors_add(
+            err, "%s/%s: %s", folder, RECORD,
+            *kept
+                ? "is no record of a finished member"
+                : "is empty, as older versions of the program left it: nothing tells whether the result is as it was");
         return;
     }
     for (int k = 0; k < 2; k++) {
@@ -141,11 +149,11 @@ bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *na
 {
     const uint64_t now = stamp(folder);
     if (now && r->seen[m] == now) return BT_OK;
-    char text[MOST_TEXT], digest[BT_SEAL_DIGEST], *path = bt_file_join(folder, RECORD), *kept = NULL;
+    char text[MOST_TEXT], digest[BT_CHECKSUM_DIGEST], *path = bt_file_join(folder, RECORD), *kept = NULL;
     size_t size = 0;
     int64_t bytes;
     bt_errors why = {0};
-    bt_status status = bt_seal_digest_file(path, digest, &bytes, &why); // is there one that can be read at all?
+    bt_status status = bt_checksum_digest_file(path, digest, &bytes, &why); // is there one that can be read at all?
     if (status == BT_OK) status = bt_file_read_to(path, "a record", MOST_TEXT, &kept, &size, &why);
     if (status == BT_OK) status = make(r, name, folder, text, &why);
     if (status == BT_OK && (size != strlen(text) || memcmp(kept, text, size))) {

@@ -3,13 +3,16 @@
 //
 // The file `finished` is the last thing that a member writes:
 //
-//     bergtow finished member 1\nname: c001-r001\nstudy: 0123...\nsummary.json: 5123 bytes, xxh128 0123...\nresult.h5: ...\ncase.resolved.yml: ...
+//     bergtow finished member 1\nname: c001-r001\nstudy: 0123...\nsummary.json: 5123 bytes, xxh128 0123...\nresult.h5:
+//     ...\ncase.resolved.yml: ...
 //
-// name and study (the digest of study.resolved.yml) tell whose record it is, the digests (XXH3, 128 bits) cover every byte of what an ensemble and its statistics
-// read. A member is sound when the record made anew from its files is this text to the last byte; so a damaged record is no sound one, either. It is written
-// only of a sealed result and a summary that reads, is of a whole run and has its numbers, and after that nothing changes these files.
-// Rejected: to compare state hash and key numbers of summary.json with result.h5, which leaves all other numbers open; a digest inside summary.json, which does
-// not tell a member from another that was copied over it; to trust the seal of result.h5 alone, for the same reason.
+// name and study (the digest of study.resolved.yml) tell whose record it is, the digests (XXH3, 128 bits) cover every
+// byte of what an ensemble and its statistics read. A member is sound when the record made anew from its files is this
+// text to the last byte; so a damaged record is no sound one, either. It is written only of a protected by a checksum
+// result and a summary that reads, is of a whole run and has its numbers, and after that nothing changes these files.
+// Rejected: to compare state hash and key numbers of summary.json with result.h5, which leaves all other numbers open;
+// a digest inside summary.json, which does not tell a member from another that was copied over it; to trust the
+// checksum of result.h5 alone, for the same reason.
 #ifndef BT_ENSEMBLE_RECORD_H
 #define BT_ENSEMBLE_RECORD_H
 
@@ -21,18 +24,21 @@ enum { BT_DIGEST_TEXT = 33 };
 typedef struct bt_member_records {
     char study[BT_DIGEST_TEXT]; ///< digest of the resolved study
     int64_t n;                  ///< members
-    uint64_t *seen;             ///< [n] stamp (names, lengths, times) of the files that were found sound; 0 = not looked at yet
+    /// [n] stamp (names, lengths, times) of the files that were found sound; 0 = not looked at yet
+    uint64_t *seen;
 } bt_member_records;
 
 /// Errors: BT_ERR_CASE, for a study whose base cannot be read.
 bt_status bt_member_records_begin(bt_member_records *r, const bt_study *s, bt_errors *err);
 void bt_member_records_end(bt_member_records *r);
 
-/// Write the record of member m, which has just finished in this folder. Errors: BT_ERR_IO, when its files are not what a run leaves, or it cannot be written.
+/// Write the record of member m, which has just finished in this folder. Errors: BT_ERR_IO, when its files are not what
+/// a run leaves, or it cannot be written.
 bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
 
-/// Do the files fit the record? They are read whole, once: later only when their stamp has changed. Errors: BT_ERR_CASE, they are missing or damaged;
-/// BT_ERR_IO, the system does not let them be read, which says nothing of them.
+/// Do the files fit the record? They are read whole, once: later only when their stamp has changed. Errors:
+/// BT_ERR_CASE, they are missing or damaged; BT_ERR_IO, the system does not let them be read, which says nothing of
+/// them.
 bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
 
 /// Take record and files of a member away, so that it is run anew; the caller holds its lock. Errors: BT_ERR_IO.

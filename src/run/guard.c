@@ -8,9 +8,10 @@
 
 #include "case/case_derived.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "output/observe.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "partition/domain.h"
 #include "output/state.h"
 
@@ -47,19 +48,27 @@ static drivers drivers_of(const bt_case *c)
 static double ratio(double a, double b) { return a > 0 ? a / b : 0; }
 
 /// v of body i, m/s.
-static double driven_speed(const drivers *d, const bt_bodies *b, bt_idx i)
+static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
 {
+    const bt_bodies *b = &w->bodies;
     const bt_drag *k = &b->drag[i];
+    bt_load load;
+    bt_forces_load(w, i, &b->vel[i], &load);
+    const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i],
+                 drawn = ratio(hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
     const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));
     const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);
     const double wind = share <= 1 ? d->wind * share / (1 + share) : d->wind;
-    const double terminal = sqrt(ratio(mass * d->slope, k->water_skin + k->water_form * b->area[i] / width));
-    const double slope = bt_min(d->slope * d->duration, bt_max(d->slope * d->dt, terminal));
-    return bt_max(d->prescribed, d->water + wind + slope);
+    const double terminal = sqrt(ratio(mass * pushed, k->water_skin + k->water_form * b->area[i] / width));
+    const double push = bt_min(pushed * d->duration, bt_max(pushed * d->dt, terminal));
+    return bt_max(d->prescribed, d->water + wind + push + drawn);
 }
 
-static double energy_of(double mass, double inertia, double vx, double vy, double turn) { return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn); }
+static double energy_of(double mass, double inertia, double vx, double vy, double turn)
+{
+    return 0.5 * (mass * (vx * vx + vy * vy) + inertia * turn * turn);
+}
 
 /// E_0 + Σ ½ M v². Of a run that goes on, too, E_0 is that of time zero.
 static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
@@ -72,10 +81,13 @@ static double driven_energy(const bt_case *c, const bt_world *w, bt_gid n_floes)
         double start = 0;
         const bt_gid by_hand = b->gid[i] - (n_floes - c->n_floes);
         // A velocity that is not given is that of free drift, below the driven speed.
-        if (b->gid[i] == w->towed) start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy), c->body.yaw_rate);
+        if (b->gid[i] == w->towed)
+            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->body.vx), bt_case_start(c->body.vy),
+                              c->body.yaw_rate);
         else if (by_hand >= 0 && by_hand < c->n_floes)
-            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx), bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
-        bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, b, i), 0, 0)) / UNIT);
+            start = energy_of(b->mass[i], b->inertia[i], bt_case_start(c->floes[by_hand].vx),
+                              bt_case_start(c->floes[by_hand].vy), c->floes[by_hand].yaw_rate);
+        bt_sum_add(&t.sum[0], (start + energy_of(b->mass[i], 0, driven_speed(&d, w, i), 0, 0)) / UNIT);
     }
     bt_domain_reduce(w, &t);
     return UNIT * bt_sum_value(&t.sum[0]);
@@ -118,7 +130,8 @@ static range range_of(const bt_guard *g, const bt_world *w)
     return r;
 }
 
-/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them only where they stand.
+/// Beyond a wall? A body that has left by an open edge may go round behind the walls of the others: it is beyond them
+/// only where they stand.
 static bool beyond(const range *r, double x, double y)
 {
     const double out[2] = {bt_max(r->low[0] - x, x - r->high[0]), bt_max(r->low[1] - y, y - r->high[1])};
@@ -141,16 +154,16 @@ static void look_at(const bt_world *w, const range *r, bt_idx first, bt_idx end,
 
 static bool look_at_bodies(bt_guard *g, const bt_world *w, bool all)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const range r = range_of(g, w);
     double broken = -1, gone = -1;
     const bt_idx n = all ? ts->n : ts->n_busy;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_TILES))
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : broken, gone) if (BT_MANY(n, BT_FEW_CELLS))
     for (bt_idx j = 0; j < n; j++) {
         const bt_idx k = all ? j : ts->busy[j];
-        // As in the step: what drifts with water at rest has not moved. BT_REST_NEW has, and has come to rest in it.
-        const bool moved = k == ts->n - 1 || ts->rest[k] != BT_REST_KNOWN || ts->awake[k] || !ts->still;
-        if (ts->tile[k].own && (moved || all)) look_at(w, &r, ts->tile[k].first, ts->tile[k].end, &broken, &gone);
+        // As in the step: what drifts with water at rest has not moved. BT_ASLEEP_NEW has, and has come to rest in it.
+        const bool moved = k == ts->n - 1 || ts->asleep[k] != BT_ASLEEP || ts->awake[k] || !ts->still;
+        if (ts->cell[k].own && (moved || all)) look_at(w, &r, ts->cell[k].first, ts->cell[k].end, &broken, &gone);
     }
     g->broken = broken;
     g->gone = gone;
@@ -206,8 +219,9 @@ static bool numbers_of_sample(const bt_world *w, const bt_sample *s, bt_errors *
                   "step %" PRId64 ": %s (%s) is %s; "
                   "take a smaller run.dt, and check masses, stiffness and speeds of the case",
                   w->step, f->name, f->description,
-                  isnan(x) ? "not a number, or came from some too large to be summed up"
-                  : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure" : "beyond all numbers of a run");
+                  isnan(x)                   ? "not a number, or came from some too large to be summed up"
+                  : fabs(x) < BT_SAMPLE_MOST ? "a number where there is nothing to measure"
+                                             : "beyond all numbers of a run");
     return false;
 }
 
@@ -231,16 +245,18 @@ bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_
     if (g->energy > 0 && s->kinetic_energy > g->energy) {
         sound = false;
         bt_errors_add(err,
-                      "step %" PRId64 ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
+                      "step %" PRId64
+                      ": the bodies have %.4g J of kinetic energy, more than the %.4g J that guard.energy allows; "
                       "take a smaller run.dt or a smaller solver.tolerance, and check the forces of the case",
                       w->step, s->kinetic_energy, g->energy);
     }
     if (g->unconverged > 0 && g->in_a_row >= g->unconverged) {
         sound = false;
-        bt_errors_add(err,
-                      "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
-                      "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
-                      w->step, g->in_a_row);
+        bt_errors_add(
+            err,
+            "step %" PRId64 ": %" PRId64 " steps in a row did not converge (guard.unconverged); "
+            "take a smaller run.dt or more solver.max_sweeps, or consider ice.crushing.pressure where ice jams",
+            w->step, g->in_a_row);
     }
     return sound ? BT_OK : BT_ERR_NUMERIC;
 }

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: MIT
-// Guards of a run: what no sound run does ends it with exit code 5 and the state before the step, instead of a result nobody should use.
+// Guards of a run: what no sound run does ends it with exit code 5 and the state before the step, instead of a result
+// nobody should use.
 //
 //     guard.overlap       deepest overlap of two bodies / mean floe size
 //     guard.energy        kinetic energy of all bodies / the energy that the scene can drive them to
 //     guard.unconverged   steps in a row that met the sweep limit
 //     guard.escape        a body whose centroid is beyond a wall
-// and, always, a number that is none, or a number where there can be none: in poses and velocities, in tow, window and collisions, in what the series
-// take (bt_sample_fault). 0 or false switches the others off. The limits are assumed: far beyond what a run with warnings
-// shows (overlap of 30 % of a floe, 1,000 unconverged steps in a jam), and short of what happens before numbers overflow.
+// and, always, a number that is none, or a number where there can be none: in poses and velocities, in tow, window and
+// collisions, in what the series take (bt_sample_fault). 0 or false switches the others off. The limits are assumed:
+// far beyond what a run with warnings shows (overlap of 30 % of a floe, 1,000 unconverged steps in a jam), and short of
+// what happens before numbers overflow.
 //
-// Every guard looks at every step, and at the state after the last one. Bodies are looked at where their tile may have moved: a field at rest
-// costs a look at its tiles. What leaves the domain does so by moving; at the end all bodies are looked at all the same.
+// Every guard looks at every step, and at the state after the last one. Bodies are looked at where their cell may have
+// moved: a field at rest costs a look at its cells. What leaves the domain does so by moving; at the end all bodies are
+// looked at all the same.
 //
 // Energy. The limit is guard.energy × (E_0 + Σ ½ M v²), E_0 the kinetic energy that the case starts with and v the
 // speed that the body can be driven to:
-//     v = max(v_p, U_w + v_a + v_s)        v_p: tow, closing walls, reference speed of the solver; U_w: fastest current, twice where Coriolis acts about it
+//     v = max(v_p, U_w + v_a + v_s + v_l)  v_p: tow, closing walls, reference speed of the solver; U_w: fastest
+//     current, twice where Coriolis acts about it
 // Contacts take energy out, so no distribution of it among the bodies exceeds the sum, but for the work of what has a
 // prescribed velocity and of the line, both of the order of v_p; guard.energy leaves room for that, as for the speed of
 // a floe squeezed out of a wedge.
@@ -26,7 +30,8 @@
 // Rejected: U_a itself, which is a bound, too, but fifty times what ice does in wind: energy of 10⁴ times that is a
 // pack at a hundred times the speed of the wind.
 // Slope. An acceleration a = g |∇η| against drag ends at √(M a / k_w), or after the run at a T: v_s is the smaller one,
-// at least a Δt; k_w for the least width that the outline can have, area over diameter.
+// at least a Δt; k_w for the least width that the outline can have, area over diameter. Explicit forces of other laws
+// (forces.h), as they are at the start, add to a; a linear one draws the body to the velocity v_l = |j|/g.
 //
 // The state before the step. No step keeps one, which would cost more than a step where ice rests. A run repeats itself
 // to the bit, so the state is made again, from the last checkpoint or from the start, up to the step before (run.c).
@@ -48,13 +53,15 @@ typedef struct bt_guard {
     bt_gid n_floes;
     double size;            ///< mean floe size, m
     int64_t in_a_row;       ///< state: steps in a row that did not converge
-    double broken, gone;    ///< of the last look: highest id on this rank of a body that is not finite, that is beyond a wall; −1 = none
+    /// of the last look: highest id on this rank of a body that is not finite, that is beyond a wall; −1 = none
+    double broken, gone;
 } bt_guard;
 
 /// Collective. Limits for the world of a case, all of whose bodies have been dealt.
 void bt_guard_begin(bt_guard *g, const bt_case *c, const bt_world *w, bt_gid n_floes, double mean_size);
 
-/// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors: BT_ERR_NUMERIC.
+/// After a step, whose sample is s. Not collective: ranks agree on the status, and then call bt_guard_name. Errors:
+/// BT_ERR_NUMERIC.
 bt_status bt_guard_check(bt_guard *g, const bt_world *w, const bt_sample *s, bt_errors *err);
 
 /// The same for the state after the last step: every body, and the deepest overlap there, m.

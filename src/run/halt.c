@@ -10,15 +10,20 @@
 #include "base/fileio.h"
 
 #define STOP_FILE "stop"
-#define LOOK_SECONDS 0.25 // wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
-static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50; // below them a bit for each signal
+#define LOOK_SECONDS                                                                                                   \
+    0.25 // wall time between looks for the stop file: a look is a call of the system, on a cluster one of the network
+// below them a bit for each signal
+static const uint64_t by_file = UINT64_C(1) << 48, by_clock = UINT64_C(1) << 49, save = UINT64_C(1) << 50;
 
 static volatile sig_atomic_t stop_signal, save_signal;
 
 static void on_stop(int number) { stop_signal = number; }
 static void on_save(int number) { save_signal = number; }
 
-static const struct { int number; void (*handler)(int); } caught[BT_N_CAUGHT] = {{SIGINT, on_stop}, {SIGTERM, on_stop}, {SIGUSR2, on_stop}, {SIGUSR1, on_save}};
+static const struct {
+    int number;
+    void (*handler)(int);
+} caught[BT_N_CAUGHT] = {{SIGINT, on_stop}, {SIGTERM, on_stop}, {SIGUSR2, on_stop}, {SIGUSR1, on_save}};
 
 void bt_halt_begin(bt_halt *h)
 {

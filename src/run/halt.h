@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // What a run is asked for from outside while it steps: checkpoints by signal, steps and wall time, and stops.
 //
-//     SIGINT, SIGTERM, SIGUSR2   checkpoint and stop      (mpirun hands on SIGUSR1 and SIGUSR2; at the others it kills the ranks a second later)
+//     SIGINT, SIGTERM, SIGUSR2   checkpoint and stop      (mpirun hands on SIGUSR1 and SIGUSR2; at the others it kills
+//     the ranks a second later)
 //     SIGUSR1                    checkpoint and go on
 //     DIR/stop                   checkpoint and stop; the file is removed
 //     --max-wall                 the same after that time
 //     output.checkpoint_steps, output.checkpoint_wall       checkpoint and go on
 //
-// Every rank may meet a signal; files and clocks are looked at by rank 0. What the ranks have met is joined once a step, as bits, so that
-// all do the same after the same step.
+// Every rank may meet a signal; files and clocks are looked at by rank 0. What the ranks have met is joined once a
+// step, as bits, so that all do the same after the same step.
 #ifndef BT_HALT_H
 #define BT_HALT_H
 

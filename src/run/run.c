@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 // One run: field, world, step loop, record.
 //
-// Ranks. Whatever can differ between ranks (an error, a signal) is agreed on once a step, after the sample and before the
-// frame, so that all leave the loop after the same step; every other collective call is made with an agreed status.
+// Ranks. Whatever can differ between ranks (an error, a signal) is agreed on once a step, after the sample and before
+// the frame, so that all leave the loop after the same step; every other collective call is made with an agreed status.
 #include "bergtow/run.h"
 
 #include <inttypes.h>
@@ -22,7 +22,7 @@
 #include "output/observe.h"
 #include "solve/solver.h"
 #include "output/stall.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "case/case_check.h"
 #include "case/cost.h"
 #include "partition/domain.h"
@@ -34,13 +34,15 @@
 
 typedef bt_running run;
 
-/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it. lead: on rank 0.
+/// Collective. Rank 0 makes or reads the field, with all its threads, and opens the lead in it; then every rank has it.
+/// lead: on rank 0.
 static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, bt_lead_stats *lead, bt_errors *err)
 {
     bt_status status = BT_OK;
     if (comm->rank == 0) status = bt_cost_fits(c, bt_case_expected_floes(c) + c->n_floes, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_field_load(c, f, err);
-    if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err); // a field that was read has only now a number
+    // a field that was read has only now a number
+    if (comm->rank == 0 && status == BT_OK) status = bt_cost_fits(c, f->n, comm, bt_cost_machine(), err);
     if (comm->rank == 0 && status == BT_OK) status = bt_lead_open(c, f, lead, err);
     bt_comm_rest(comm);
     status = bt_comm_agree(comm, status);
@@ -54,7 +56,8 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     bt_record_bodies b;
     bt_status status = bt_handover_bodies(r->comm, r->w, &r->roster, &b, err);
     if (status != BT_OK) return status;
-    status = (kept ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
+    status =
+        (kept ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
     bt_handover_free(&b);
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
@@ -123,24 +126,25 @@ static void add_phases(bt_phases *p, const bt_step_stats *st)
     p->exchange += st->exchange_s;
 }
 
-/// Collective. Peak memory of all ranks, and the bytes of units and velocities that belong to a contact point.
+/// Collective. Peak memory of all ranks, and the bytes of contacts and velocities that belong to a contact point.
 static void measure_memory(run *r)
 {
-    const bt_tiles *t = r->w->tiles;
+    const bt_cells *t = r->w->cells;
     struct rusage u;
     getrusage(RUSAGE_SELF, &u);
-    double units = 0, points = 0;
+    double contacts = 0, points = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        units += t->tile[k].n_units;
-        points += (double)t->tile[k].n_points;
+        contacts += t->cell[k].n_contacts;
+        points += (double)t->cell[k].n_points;
     }
     bt_sum sums[3] = {{0}, {0}, {0}};
     bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
-    bt_sum_add(&sums[1], units * (double)(sizeof(bt_unit) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
+    bt_sum_add(&sums[1], contacts * (double)(sizeof(bt_contact) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
     bt_sum_add(&sums[2], points);
     bt_comm_reduce(r->comm, sums, 3, NULL, 0, NULL, 0);
     r->totals.memory = bt_sum_value(&sums[0]);
-    r->totals.sweep_bytes_per_contact = bt_sum_value(&sums[2]) > 0 ? bt_sum_value(&sums[1]) / bt_sum_value(&sums[2]) : NAN;
+    r->totals.sweep_bytes_per_contact =
+        bt_sum_value(&sums[2]) > 0 ? bt_sum_value(&sums[1]) / bt_sum_value(&sums[2]) : NAN;
 }
 
 /// A frame at the first step at or after each multiple of the interval, and at the end.
@@ -167,7 +171,8 @@ static bt_status loop(run *r, bt_errors *err)
         bt_observe(w, r->reference_speed, &s);
         bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
         const bt_status sound = bt_guard_check(&r->guard, w, &s, err);
-        const bool writable = !bt_sample_fault(&s, bt_observe_applies(w)); // what is not has been told, and the series hold numbers only
+        // what is not has been told, and the series hold numbers only
+        const bool writable = !bt_sample_fault(&s, bt_observe_applies(w));
         if (status == BT_OK && writable) status = bt_record_sample(r->record, &s, err);
         if (status == BT_OK) status = bt_record_events(r->record, &w->events, err);
         if (status == BT_OK) status = sound;
@@ -175,7 +180,8 @@ static bt_status loop(run *r, bt_errors *err)
         if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, w, err);
         if (status == BT_OK) status = frame_if_due(r, s.time, err);
         const bool last = w->step == r->end_step || bt_halt_stops(r->asked); // then one is written anyway
-        if (status == BT_OK && bt_halt_saves(r->asked) && !last) status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
+        if (status == BT_OK && bt_halt_saves(r->asked) && !last)
+            status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
         bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
         r->totals.phases.output += bt_clock() - t0;
     }
@@ -196,8 +202,9 @@ static void total_up(run *r)
     note_division(r);
 }
 
-/// Collective. Guards and deepest overlap of the state that the last step has left, which no further step looks at. Its contacts are looked for as the
-/// next step would, so the number is the same after any resume and on any ranks; the state has been saved, and none of it is written from here on.
+/// Collective. Guards and deepest overlap of the state that the last step has left, which no further step looks at. Its
+/// contacts are looked for as the next step would, so the number is the same after any resume and on any ranks; the
+/// state has been saved, and none of it is written from here on.
 static bt_status look_last(run *r, bt_errors *err)
 {
     const double overlap = bt_contacts_overlap(r->w);
@@ -207,8 +214,8 @@ static bt_status look_last(run *r, bt_errors *err)
     return status;
 }
 
-/// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order. The result takes its place before the checkpoint, which
-/// counts on it.
+/// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order. The result takes its
+/// place before the checkpoint, which counts on it.
 static bt_status finish(run *r, bt_errors *err)
 {
     char stopped[96] = "";
@@ -228,7 +235,8 @@ static bt_status finish(run *r, bt_errors *err)
     bt_snapshot_free(&s);
     status = bt_comm_agree(r->comm, status);
     if (status == BT_OK && *stopped) {
-        bt_errors_add(err, "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped, r->o->dir, r->o->dir);
+        bt_errors_add(err, "stopped by %s; %s holds everything up to there, and `bergtow resume %s` goes on", stopped,
+                      r->o->dir, r->o->dir);
         status = BT_ERR_SIGNAL;
     }
     return status;
@@ -339,7 +347,13 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     const int threads = bt_run_threads(comm, c, o->threads);
     start_threads(threads);
     run r = {.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c)};
-    r.halt = (bt_halt){.steps = c->output.checkpoint_steps, .wall = c->output.checkpoint_wall, .max_wall = o->max_wall, .dir = o->dir, .told = o->told, .first = comm->rank == 0, .started = m->start};
+    r.halt = (bt_halt){.steps = c->output.checkpoint_steps,
+                       .wall = c->output.checkpoint_wall,
+                       .max_wall = o->max_wall,
+                       .dir = o->dir,
+                       .told = o->told,
+                       .first = comm->rank == 0,
+                       .started = m->start};
     r.until = m->until;
     m->failed = -1;
     bt_field f;
@@ -354,7 +368,7 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
             status = bt_running_load(&r, kept, err);
         } else {
             bt_domain_create(r.w, comm);
-            bt_tiles_begin(r.w);
+            bt_cells_begin(r.w);
         }
         r.first_step = r.w->step;
         // Only now: a case that is refused leaves nothing behind.
@@ -370,7 +384,8 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     return status;
 }
 
-/// Collective. A step was not sound: the state before it, made again from the last checkpoint (or the one of o->from, or the start), goes to failure.h5.
+/// Collective. A step was not sound: the state before it, made again from the last checkpoint (or the one of o->from,
+/// or the start), goes to failure.h5.
 static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, bt_errors *err)
 {
     bt_run_options quiet = *o;
@@ -381,16 +396,21 @@ static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
     bt_errors unheard = {0};
     int from = 0;
     if (comm->rank == 0 && o->from) from = bt_snapshot_read(&s, o->from, &unheard) == BT_OK;
-    else if (comm->rank == 0 && bt_checkpoint_there(o->dir)) from = bt_checkpoint_read(&s, o->dir, &path, &said, &unheard) == BT_OK;
+    else if (comm->rank == 0 && bt_checkpoint_there(o->dir))
+        from = bt_checkpoint_read(&s, o->dir, &path, &said, &unheard) == BT_OK;
     bt_comm_bcast(comm, &from, sizeof from);
     if (from) bt_snapshot_share(comm, &s);
     s.err = &unheard;
     manner m = {.kept = from ? &s : NULL, .start = bt_clock(), .until = step - 1, .held = true};
     const bt_status status = run_case(comm, c, &quiet, &m, &unheard);
     if (status == BT_OK)
-        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir, BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
-    else if (status == BT_ERR_SIGNAL) bt_errors_add(err, "the state before that step was not made again: stopped meanwhile");
-    else for (size_t k = 0; k < unheard.n; k++) bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
+        bt_errors_add(err, "%s/%s holds the state before that step; `bergtow resume %s/%s` meets it again", o->dir,
+                      BT_FAILURE_FILE, o->dir, BT_FAILURE_FILE);
+    else if (status == BT_ERR_SIGNAL)
+        bt_errors_add(err, "the state before that step was not made again: stopped meanwhile");
+    else
+        for (size_t k = 0; k < unheard.n; k++)
+            bt_errors_add(err, "the state before that step could not be kept: %s", unheard.text[k]);
     bt_errors_free(&unheard);
     bt_snapshot_free(&s);
     free(path);
@@ -398,7 +418,8 @@ static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_opt
 }
 
 /// Collective. A run, and what is kept of it when it fails. held: the caller has locked the folder.
-static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept, bool held, double start, bt_errors *err)
+static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_snapshot *kept,
+                             bool held, double start, bt_errors *err)
 {
     manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     const bt_status status = run_case(comm, c, o, &m, err);
@@ -410,7 +431,10 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err)
 {
     if (comm->size > 1 && o->dump_step >= 0) {
-        bt_errors_add(err, "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the step is the same)", comm->size);
+        bt_errors_add(err,
+                      "--dump-contacts: the contacts of %d ranks lie apart; start bergtow without mpirun for this (the "
+                      "step is the same)",
+                      comm->size);
         return BT_ERR_USAGE;
     }
     return run_guarded(comm, c, o, NULL, false, bt_clock(), err);
@@ -424,7 +448,8 @@ static bt_status start_again(const bt_comm *comm, const bt_run_options *o, doubl
     char *path = bt_file_join(o->dir, "case.resolved.yml");
     bt_case c;
     bt_status status = bt_comm_agree(comm, bt_case_read(&c, path, NULL, 0, err));
-    if (status == BT_OK && comm->rank == 0 && !o->quiet) printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
+    if (status == BT_OK && comm->rank == 0 && !o->quiet)
+        printf("%s holds no checkpoint: the run starts at time zero\n", o->dir);
     if (status == BT_OK) status = run_guarded(comm, &c, o, NULL, true, start, err);
     bt_case_free(&c);
     free(path);
@@ -438,8 +463,10 @@ static void tell(const bt_snapshot *s, const char *said)
     if (said) bt_errors_add(&warnings, "warning: %s", said);
     const bt_item *i = bt_snapshot_find(s, "about/revision");
     if (i && i->type == BT_ITEM_TEXT && strcmp(i->data, BT_REVISION))
-        bt_errors_add(&warnings, "warning: %s was written by revision %s of the program, and this is %s: the run may go on otherwise than it would have", s->path,
-                      (const char *)i->data, BT_REVISION);
+        bt_errors_add(&warnings,
+                      "warning: %s was written by revision %s of the program, and this is %s: the run may go on "
+                      "otherwise than it would have",
+                      s->path, (const char *)i->data, BT_REVISION);
     bt_errors_print(&warnings);
     bt_errors_free(&warnings);
 }
@@ -450,7 +477,8 @@ static bt_status go_on(const bt_comm *comm, bt_snapshot *s, const bt_run_options
     bt_status status = bt_comm_agree(comm, bt_running_load_case(&c, s, err));
     const int64_t step = bt_snapshot_int(s, "world/step");
     const bool finished = status == BT_OK && step >= bt_case_steps(&c);
-    if (finished && comm->rank == 0 && !o->quiet) printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, step);
+    if (finished && comm->rank == 0 && !o->quiet)
+        printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, step);
     if (status == BT_OK && !finished) status = run_guarded(comm, &c, o, s, true, start, err);
     bt_case_free(&c);
     return status;
@@ -464,7 +492,8 @@ bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors 
     bt_status status = BT_OK;
     int lock = -1, fresh = 0;
     if (comm->rank == 0) {
-        fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") && !bt_file_there(o->dir, "summary.json");
+        fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
+                !bt_file_there(o->dir, "summary.json");
         if (!bt_file_there(o->dir, ".")) {
             bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", o->dir);
             status = BT_ERR_IO;

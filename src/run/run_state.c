@@ -18,7 +18,10 @@
 
 enum { N_PHASES = sizeof(bt_phases) / sizeof(double) };
 
-double bt_running_frame_interval(const bt_case *c) { return c->output.frame_interval > 0 ? c->output.frame_interval : c->run.duration / FRAMES_BY_DEFAULT; }
+double bt_running_frame_interval(const bt_case *c)
+{
+    return c->output.frame_interval > 0 ? c->output.frame_interval : c->run.duration / FRAMES_BY_DEFAULT;
+}
 
 /// Where the state comes from; for people and for the comparison of programs, not for the run.
 static void save_origin(const bt_running *r, bt_snapshot *s)
@@ -82,7 +85,8 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
 static void check_table(const bt_table *t, const char *name, bt_snapshot *s)
 {
     bt_snapshot_want(s, t->n <= BT_MOST_ROWS, name, -1, "has more rows than a table can have");
-    for (int64_t i = 0; i < t->n && !s->faulty; i++) bt_snapshot_want(s, bt_table_row_sound(t, i), name, i, "is not after the one before, or no velocity");
+    for (int64_t i = 0; i < t->n && !s->faulty; i++)
+        bt_snapshot_want(s, bt_table_row_sound(t, i), name, i, "is not after the one before, or no velocity");
 }
 
 bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err)
@@ -118,12 +122,20 @@ static void check_counters(const bt_running *r, bt_snapshot *s)
 {
     const bt_phases *p = &r->totals.phases;
     const bt_stall *t = &r->totals.stall;
-    const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12), time = (double)bt_snapshot_int(s, "world/step") * r->c->run.dt, due = (double)r->frames_due;
-    bt_snapshot_want(s, r->frames_due >= 1 && (due - 1) * interval <= time && time < due * interval, "run/frames_due", -1, "is not the number of the next frame");
-    bt_snapshot_want(s, r->frames >= 1 && r->frames <= r->frames_due + 1, "record/frames", -1, "is no number of frames up to here");
-    bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1, "is no number of steps");
-    bt_snapshot_want(s, t->windows >= 0 && t->windows <= BT_MOST_STEPS && isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y), "stall/windows", -1, "and what else tells whether the body stood still are no counts and numbers");
-    bt_snapshot_want(s, isfinite(p->detect + p->colour + p->forces + p->solve + p->advance + p->exchange + p->output), "clock/phases", -1, "are not all finite");
+    const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12),
+                 time = (double)bt_snapshot_int(s, "world/step") * r->c->run.dt, due = (double)r->frames_due;
+    bt_snapshot_want(s, r->frames_due >= 1 && (due - 1) * interval <= time && time < due * interval, "run/frames_due",
+                     -1, "is not the number of the next frame");
+    bt_snapshot_want(s, r->frames >= 1 && r->frames <= r->frames_due + 1, "record/frames", -1,
+                     "is no number of frames up to here");
+    bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1,
+                     "is no number of steps");
+    bt_snapshot_want(s,
+                     t->windows >= 0 && t->windows <= BT_MOST_STEPS &&
+                         isfinite(t->time + t->asked + t->spent + t->from_x + t->from_y),
+                     "stall/windows", -1, "and what else tells whether the body stood still are no counts and numbers");
+    bt_snapshot_want(s, isfinite(p->detect + p->colour + p->forces + p->solve + p->advance + p->exchange + p->output),
+                     "clock/phases", -1, "are not all finite");
     bt_snapshot_want(s, isfinite(r->totals.wall_time), "clock/wall_time", -1, "is not finite");
 }
 

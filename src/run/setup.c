@@ -19,7 +19,8 @@
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
-#define LARGE_RATIO 8.0         // a floe with more than this times the mean radius is in no tile: tiles fit the largest of the others
+#define LARGE_RATIO                                                                                                    \
+    8.0 // a floe with more than this times the mean radius is in no cell: cells fit the largest of the others
 
 bt_params bt_setup_params(const bt_case *c, double size)
 {
@@ -30,7 +31,8 @@ bt_params bt_setup_params(const bt_case *c, double size)
     double water[2], air[2]; // at time zero; where they change, each step sets its own
     bt_environment_at(c, true, 0, water);
     bt_environment_at(c, false, 0, air);
-    const double rise = c->ice.density * (1 - c->ice.density / c->water.density) * GRAVITY; // of potential energy: contact/raft.h
+    // of potential energy: contact/raft.h
+    const double rise = c->ice.density * (1 - c->ice.density / c->water.density) * GRAVITY;
     bt_params p = {
         .dt = c->run.dt,
         .x0 = c->domain.x0,
@@ -42,7 +44,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .warm_start = c->solver.warm_start,
         .plain_sweeps = c->solver.plain,
         .inner_sweeps = c->solver.inner_sweeps,
-        .tile = c->solver.tile,
+        .cell = c->solver.cell,
         .slop = c->solver.slop * size,
         .position_sweeps = c->solver.position_sweeps,
         .rest_speed = c->solver.rest_speed,
@@ -96,7 +98,8 @@ static void add_field(const bt_case *c, const bt_field *f, bt_world *w, bt_roste
         floe_def(c, n, f->vertices + 2 * first, f->thickness[i], &d);
         // The parts follow from the outline alone: the same on every rank, and nothing that a field file need hold.
         bt_parts parts;
-        if (f->outlines.split && !bt_outline_convex(n, d.vertices) && bt_outline_split(n, d.vertices, &parts)) d.parts = &parts;
+        if (f->outlines.split && !bt_outline_convex(n, d.vertices) && bt_outline_split(n, d.vertices, &parts))
+            d.parts = &parts;
         d.large = sqrt(f->area[i] / BT_PI) > 0.5 * LARGE_RATIO * r->mean_size;
         r->thickness[bt_world_add(w, &d)] = f->thickness[i];
     }
@@ -140,8 +143,9 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
         .inertia = mass * m.polar / m.area * (1 + c->body.added_inertia),
         .friction = c->body.friction,
         .restitution = c->body.restitution,
-        .drag = bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
-                               c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
+        .drag =
+            bt_forces_drag(&m, c->body.draft, c->body.sail, c->water.density, c->air.density, c->body.drag.water_form,
+                           c->body.drag.water_skin, c->body.drag.air_form, c->body.drag.air_skin),
     };
     bt_tow *t = w->tow = bt_setup_tow(c);
     if (prescribed) {
@@ -154,11 +158,19 @@ static void add_towed_body(const bt_case *c, bt_world *w, bt_roster *r)
     r->thickness[w->towed] = c->body.draft + c->body.sail;
 }
 
-static void add_wall(const bt_case *c, bt_world *w, double x, double y, double half_x, double half_y, double vx, double vy)
+static void add_wall(const bt_case *c, bt_world *w, double x, double y, double half_x, double half_y, double vx,
+                     double vy)
 {
     const double v[8] = {-half_x, -half_y, half_x, -half_y, half_x, half_y, -half_x, half_y};
-    bt_body_def d = {.motion = vx != 0 || vy != 0 ? BT_KINEMATIC : BT_STATIC, .large = true, .n_vertices = 4, .vertices = v,
-                     .x = x, .y = y, .vx = vx, .vy = vy, .friction = c->domain.wall_friction,
+    bt_body_def d = {.motion = vx != 0 || vy != 0 ? BT_KINEMATIC : BT_STATIC,
+                     .large = true,
+                     .n_vertices = 4,
+                     .vertices = v,
+                     .x = x,
+                     .y = y,
+                     .vx = vx,
+                     .vy = vy,
+                     .friction = c->domain.wall_friction,
                      .restitution = c->domain.wall_restitution};
     bt_world_add(w, &d);
 }
@@ -170,8 +182,9 @@ static bool begins_adrift(const bt_case *c, const bt_world *w, bt_idx i, bt_idx 
     return i < n_field || (i == w->towed ? isnan(c->body.vx) : isnan(c->floes[i - n_field].vx));
 }
 
-/// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given. Ice between walls has nowhere to
-/// drift across them: it has been there for long, and lies against one of them. False when it was not found.
+/// Free drift to the floes [0, n_field) of the field, and to floes by hand and a free body whose velocity is not given.
+/// Ice between walls has nowhere to drift across them: it has been there for long, and lies against one of them. False
+/// when it was not found.
 static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors *err)
 {
     bt_bodies *b = &w->bodies;
@@ -185,7 +198,9 @@ static bool begin_drift(const bt_case *c, bt_world *w, bt_idx n_field, bt_errors
         b->vel[i] = b->vel_start[i] = b->vel_free[i] = (bt_vel){.x = u[0], .y = u[1], .w = b->vel[i].w};
     }
     if (lost > 0)
-        bt_errors_add(err, "%s: ice.start: for %d bodies no velocity was found at which wind, water, Coriolis and slope balance; set it to rest, or check drag, current and wind",
+        bt_errors_add(err,
+                      "%s: ice.start: for %d bodies no velocity was found at which wind, water, Coriolis and slope "
+                      "balance; set it to rest, or check drag, current and wind",
                       c->path ? c->path : "case", (int)lost);
     return lost == 0;
 }
@@ -196,6 +211,7 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
     if (c->ice.start != BT_START_DRIFT) return;
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
+    bt_forces_setup(w, c);
     double v[2 * BT_MAX_VERTICES], thicknesses[2];
     bt_shape_regular(24, BT_PI / 4 * size * size, v);
     bt_body_def d = {.motion = BT_DYNAMIC};
@@ -205,7 +221,8 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
     if (c->body.shape != BT_BODY_ABSENT) add_towed_body(c, w, &(bt_roster){.thickness = thicknesses});
     if (begin_drift(c, w, 1, &unfound)) {
         floe[0] = w->bodies.vel[0].x, floe[1] = w->bodies.vel[0].y;
-        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1)) body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
+        if (c->body.shape != BT_BODY_ABSENT && begins_adrift(c, w, 1, 1))
+            body[0] = w->bodies.vel[1].x, body[1] = w->bodies.vel[1].y;
     }
     bt_errors_free(&unfound);
     bt_world_free(w);
@@ -237,7 +254,8 @@ static int add_walls(const bt_case *c, bt_world *w, const char *names[4])
     return n;
 }
 
-/// Are a, displaced by from, and b apart, also while a moves on by (dx, dy) relative to b? Separating axes of the convex hull of both ends of the
+/// Are a, displaced by from, and b apart, also while a moves on by (dx, dy) relative to b? Separating axes of the
+/// convex hull of both ends of the
 /// path: edge normals of a and of b, and the normal of the path.
 static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double from[2], double dx, double dy)
 {
@@ -249,7 +267,8 @@ static bool apart_on_path(const bt_world *w, bt_idx a, bt_idx b, const double fr
     for (int64_t k = 0; k <= na + nb; k++) {
         double nx = -dy, ny = dx;
         if (k < na + nb) {
-            const int64_t first = k < na ? bd->offset[a] : bd->offset[b], m = k < na ? na : nb, at = k < na ? k : k - na;
+            const int64_t first = k < na ? bd->offset[a] : bd->offset[b], m = k < na ? na : nb,
+                          at = k < na ? k : k - na;
             const double *p = bd->outline + 2 * (first + at), *q = bd->outline + 2 * (first + (at + 1) % m);
             nx = q[1] - p[1], ny = p[0] - q[0];
         }
@@ -308,9 +327,12 @@ static bool check_prescribed(const bt_case *c, const bt_world *w, const bt_roste
             if (j == w->towed || j >= first_wall) {
                 // Walls that stand may hold fixed bodies (piers) and were checked with the tow.
                 if (!meet(c, w, i, j, j >= first_wall)) continue;
-                bt_errors_add(err, "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
-                              "fixed floe, or tow on a line", c->path ? c->path : "case", r->names[j - r->n_floes],
-                              towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");
+                bt_errors_add(
+                    err,
+                    "%s: %s meets %s, which cannot give way, on its prescribed path; shorten the run, move the "
+                    "fixed floe, or tow on a line",
+                    c->path ? c->path : "case", r->names[j - r->n_floes],
+                    towed && j != w->towed ? "the towed body" : "a fixed floe of the list floes");
                 sound = false;
             }
         }
@@ -331,9 +353,11 @@ static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall
     bool sound = true;
     for (int k = 0; k < 2; k++)
         if (periods[k] > 0 && need >= periods[k]) {
-            bt_errors_add(err, "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
-                          "turn, %.4g m; enlarge it or take smaller bodies", c->path ? c->path : "case", k ? "width" : "length",
-                          periods[k], need);
+            bt_errors_add(
+                err,
+                "%s: domain.%s: the period of %g m has no room for the two largest bodies side by side as they "
+                "turn, %.4g m; enlarge it or take smaller bodies",
+                c->path ? c->path : "case", k ? "width" : "length", periods[k], need);
             sound = false;
         }
     return sound;
@@ -343,10 +367,13 @@ static bool check_periods(const bt_case *c, const bt_world *w, bt_idx first_wall
 static bool check_inside(const bt_case *c, const bt_field *f, bt_errors *err)
 {
     // A managed lead may cut a floe that reaches over an open edge, and leave a piece beyond it.
-    const bool over_x = c->lead.mode == BT_LEAD_MANAGED && c->domain.ends == BT_BOUND_OPEN, over_y = c->lead.mode == BT_LEAD_MANAGED && c->domain.sides == BT_BOUND_OPEN;
+    const bool over_x = c->lead.mode == BT_LEAD_MANAGED && c->domain.ends == BT_BOUND_OPEN,
+               over_y = c->lead.mode == BT_LEAD_MANAGED && c->domain.sides == BT_BOUND_OPEN;
     for (bt_idx i = 0; i < f->n; i++) {
         const double x = f->pose[3 * (size_t)i], y = f->pose[3 * (size_t)i + 1];
-        if ((over_x || (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length)) && (over_y || (y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width))) continue;
+        if ((over_x || (x >= c->domain.x0 && x <= c->domain.x0 + c->domain.length)) &&
+            (over_y || (y >= c->domain.y0 && y <= c->domain.y0 + c->domain.width)))
+            continue;
         bt_errors_add(err, "%s: floe %d at (%g, %g) m is outside the domain; make the field for this domain",
                       c->ice.field ? c->ice.field : c->path ? c->path : "case", (int)i, x, y);
         return false;
@@ -372,7 +399,8 @@ static bool check_apart(const bt_case *c, const bt_field *f, bt_world *w, const 
     name_body(f, r, o.a < o.b ? o.a : o.b, a);
     name_body(f, r, o.a < o.b ? o.b : o.a, b);
     bt_errors_add(err,
-                  "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g m), deepest %s and %s; move or "
+                  "%s: %lld pair%s of floes, towed body or walls overlap by up to %.3g m at the start (allowed: %.3g "
+                  "m), deepest %s and %s; move or "
                   "shrink the floes given by hand, or make the field for this body and domain",
                   c->path ? c->path : "case", (long long)o.pairs, o.pairs == 1 ? "" : "s", o.deepest, allowed, a, b);
     return false;
@@ -392,6 +420,7 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     bt_params p = bt_setup_params(c, size);
     bt_world *w = bt_world_create(&p);
     w->environment = bt_environment_create(c);
+    bt_forces_setup(w, c);
     const bt_idx others = c->n_floes + 5; // floes by hand, body, four walls
     bt_bodies_reserve(&w->bodies, f->n + others, (f->n > 0 ? f->offsets[f->n] : 0) + (int64_t)others * 16);
     const bool with_body = c->body.shape != BT_BODY_ABSENT;
@@ -416,9 +445,11 @@ bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **out, bt
     const bool paths = check_prescribed(c, w, r, first_wall, err), periods = check_periods(c, w, first_wall, err);
     if (!paths || !periods) return BT_ERR_CASE;
 
-    // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls may not be.
+    // Generated fields are free of overlap by construction; a field that was read, floes given by hand, body and walls
+    // may not be.
     if (!check_apart(c, f, w, r, err)) return BT_ERR_CASE;
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n); // all have just been looked at: what rests needs no first step to show it
+    // all have just been looked at: what rests needs no first step to show it
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     return BT_OK;
 }
 

@@ -20,8 +20,12 @@ bt_tow *bt_setup_tow(const bt_case *c)
         .speed = c->tow.speed,
         .ramp = c->tow.ramp,
         .n_branches = line ? (int)c->tow.line.branches : 0,
-        .branch[0] = {.length0 = c->tow.line_length, .k = line ? c->tow.line_stiffness / c->tow.line_length : 0, .c = c->tow.line_damping,
-                      .hull_x = c->tow.hull_x, .hull_y = c->tow.hull_y, .breaking = c->tow.line.breaking_load},
+        .branch[0] = {.length0 = c->tow.line_length,
+                      .k = line ? c->tow.line_stiffness / c->tow.line_length : 0,
+                      .c = c->tow.line_damping,
+                      .hull_x = c->tow.hull_x,
+                      .hull_y = c->tow.hull_y,
+                      .breaking = c->tow.line.breaking_load},
         .dt = c->run.dt,
         .carriage_x = start[0],
         .carriage_y = start[1],
@@ -29,8 +33,12 @@ bt_tow *bt_setup_tow(const bt_case *c)
         .travel_y = c->body.y,
     };
     if (t->n_branches > 1)
-        t->branch[1] = (bt_branch){.length0 = c->tow.branch2.length, .k = c->tow.branch2.stiffness / c->tow.branch2.length, .c = c->tow.branch2.damping,
-                                   .hull_x = c->tow.branch2.hull_x, .hull_y = c->tow.branch2.hull_y, .breaking = c->tow.branch2.breaking_load};
+        t->branch[1] = (bt_branch){.length0 = c->tow.branch2.length,
+                                   .k = c->tow.branch2.stiffness / c->tow.branch2.length,
+                                   .c = c->tow.branch2.damping,
+                                   .hull_x = c->tow.branch2.hull_x,
+                                   .hull_y = c->tow.branch2.hull_y,
+                                   .breaking = c->tow.branch2.breaking_load};
     if (c->tow.n_programme > 0) {
         t->n_programme = c->tow.n_programme;
         t->programme = bt_alloc((size_t)t->n_programme, 2 * sizeof *t->programme);
@@ -41,9 +49,14 @@ bt_tow *bt_setup_tow(const bt_case *c)
     if (c->tow.n_waypoints > 0 || thrust) bt_case_tow_path(c, &t->path, why);
     if (thrust) {
         const double speed = bt_tow_speed(t, 0);
-        t->vessel = (bt_vessel){.mass = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass), .bollard_pull = c->tow.vessel.bollard_pull,
-                                .free_speed = c->tow.vessel.free_speed, .free_resistance = c->tow.vessel.free_resistance,
-                                .lateral = c->tow.vessel.lateral_drag, .lookahead = c->tow.vessel.lookahead, .vx = speed * t->ux, .vy = speed * t->uy};
+        t->vessel = (bt_vessel){.mass = c->tow.vessel.mass * (1 + c->tow.vessel.added_mass),
+                                .bollard_pull = c->tow.vessel.bollard_pull,
+                                .free_speed = c->tow.vessel.free_speed,
+                                .free_resistance = c->tow.vessel.free_resistance,
+                                .lateral = c->tow.vessel.lateral_drag,
+                                .lookahead = c->tow.vessel.lookahead,
+                                .vx = speed * t->ux,
+                                .vy = speed * t->uy};
     }
     return t;
 }

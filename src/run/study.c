@@ -16,7 +16,8 @@
 #include "base/tree.h"
 #include "case/value.h"
 
-static const char *const words[] = {"title", "base", "set", "parameters", "variants", "with", "sampling", "samples", "repeats", "seed", "fields", "ranks", NULL};
+static const char *const words[] = {"title",   "base",    "set",  "parameters", "variants", "with", "sampling",
+                                    "samples", "repeats", "seed", "fields",     "ranks",    NULL};
 static const char *const samplings[] = {"grid", "latin-hypercube", NULL};
 static const char *const fields[] = {"own", "common", NULL};
 
@@ -57,7 +58,8 @@ static bool scalar(const reader *r, const bt_node *node, int line, const char *n
     return false;
 }
 
-static void read_whole(const reader *r, const bt_node *node, int line, const char *name, int64_t lo, int64_t hi, int64_t *out)
+static void read_whole(const reader *r, const bt_node *node, int line, const char *name, int64_t lo, int64_t hi,
+                       int64_t *out)
 {
     if (!scalar(r, node, line, name)) return;
     char *end;
@@ -74,11 +76,13 @@ static int find_key(const reader *r, int line, const char *where, const char *na
     const int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
-        if (bt_schema_is_section(name)) COMPLAIN(r, line, "%s%.64s: is a section; write its keys with a dot, as in ice.concentration", where, name);
+        if (bt_schema_is_section(name))
+            COMPLAIN(r, line, "%s%.64s: is a section; write its keys with a dot, as in ice.concentration", where, name);
         else if (near) COMPLAIN(r, line, "%s%.64s: unknown key; did you mean %s?", where, name, near);
         else COMPLAIN(r, line, "%s%.64s: unknown key; see bergtow --list-keys", where, name);
     } else if (!strcmp(name, "ice.seed")) {
-        COMPLAIN(r, line, "%sice.seed: the fields of a study take their seeds from `seed` and `repeats`; remove it here", where);
+        COMPLAIN(r, line,
+                 "%sice.seed: the fields of a study take their seeds from `seed` and `repeats`; remove it here", where);
         return -1;
     } else if (!strcmp(name, "run.threads")) {
         COMPLAIN(r, line, "%srun.threads: is chosen for all members by --threads; remove it here", where);
@@ -127,14 +131,16 @@ static void read_list(const reader *r, const bt_node *list, int line, bt_study_p
 {
     if (list->n == 0) COMPLAIN(r, line, "%s: the list is empty; give at least one value", p->name);
     if (list->n > BT_MOST_VALUES) { // each is compared with all before it
-        COMPLAIN(r, line, "%s: %d values, at most %d are read; take fewer, or a range", p->name, list->n, BT_MOST_VALUES);
+        COMPLAIN(r, line, "%s: %d values, at most %d are read; take fewer, or a range", p->name, list->n,
+                 BT_MOST_VALUES);
         return;
     }
     p->value = bt_alloc((size_t)list->n, sizeof *p->value);
     for (int i = 0; i < list->n; i++) {
         if (!check_value(r, list->item[i]->line, p->name, p->key, list->item[i])) continue;
         for (int j = 0; j < p->n; j++)
-            if (!strcmp(p->value[j], list->item[i]->text)) COMPLAIN(r, list->item[i]->line, "%s: %s stands twice in the list; remove one", p->name, p->value[j]);
+            if (!strcmp(p->value[j], list->item[i]->text))
+                COMPLAIN(r, list->item[i]->line, "%s: %s stands twice in the list; remove one", p->name, p->value[j]);
         p->value[p->n++] = strdup(list->item[i]->text);
     }
 }
@@ -173,9 +179,13 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
             bt_case scratch;
             bt_case_defaults(&scratch);
             char why[BT_WHY];
-            const bool read = value->kind == BT_NODE_SCALAR && bt_value_read(key, &scratch, value->text, value->plain, why);
-            if (!read) COMPLAIN(r, at, "%s.%s: %s", p->name, map->key[i], value->kind == BT_NODE_SCALAR ? why : "needs a single value");
-            else if (key->type == BT_KEY_REAL) memcpy(&end[map->key[i][0] == 't'], (const char *)&scratch + key->offset, sizeof(double));
+            const bool read =
+                value->kind == BT_NODE_SCALAR && bt_value_read(key, &scratch, value->text, value->plain, why);
+            if (!read)
+                COMPLAIN(r, at, "%s.%s: %s", p->name, map->key[i],
+                         value->kind == BT_NODE_SCALAR ? why : "needs a single value");
+            else if (key->type == BT_KEY_REAL)
+                memcpy(&end[map->key[i][0] == 't'], (const char *)&scratch + key->offset, sizeof(double));
             else {
                 int64_t whole;
                 memcpy(&whole, (const char *)&scratch + key->offset, sizeof whole);
@@ -188,15 +198,18 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
         } else if (!strcmp(map->key[i], "scale")) {
             if (!scalar(r, value, at, "scale")) continue;
             p->logarithmic = !strcmp(value->text, "log");
-            if (!p->logarithmic && strcmp(value->text, "linear")) COMPLAIN(r, at, "%s.scale: %.40s: give linear or log", p->name, value->text);
+            if (!p->logarithmic && strcmp(value->text, "linear"))
+                COMPLAIN(r, at, "%s.scale: %.40s: give linear or log", p->name, value->text);
         } else {
             const char *near = bt_suggest(map->key[i], known);
-            COMPLAIN(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i], near ? "did you mean " : "a range has from, to, n and scale", near ? near : "");
+            COMPLAIN(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i],
+                     near ? "did you mean " : "a range has from, to, n and scale", near ? near : "");
         }
     }
     p->from = end[0], p->to = end[1];
     if (good && !(p->from < p->to)) COMPLAIN(r, line, "%s: needs from and to, from below to", p->name);
-    else if (good && p->logarithmic && !(p->from > 0)) COMPLAIN(r, line, "%s: a logarithmic range begins above zero; raise from", p->name);
+    else if (good && p->logarithmic && !(p->from > 0))
+        COMPLAIN(r, line, "%s: a logarithmic range begins above zero; raise from", p->name);
     else if (good) {
         p->value = bt_alloc((size_t)n, sizeof *p->value);
         for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
@@ -207,7 +220,8 @@ static bt_study_parameter *add_parameter(const reader *r, int line, const char *
 {
     bt_study *s = r->s;
     for (int i = 0; i < s->n_set; i++)
-        if (!strncmp(s->set[i], name, strlen(name)) && s->set[i][strlen(name)] == '=') COMPLAIN(r, line, "%s: is varied and stands in `set` too; remove it there", name);
+        if (!strncmp(s->set[i], name, strlen(name)) && s->set[i][strlen(name)] == '=')
+            COMPLAIN(r, line, "%s: is varied and stands in `set` too; remove it there", name);
     if (s->n_parameters == BT_MAX_PARAMETERS) {
         COMPLAIN(r, line, "more than %d parameters; make several studies", BT_MAX_PARAMETERS);
         return NULL;
@@ -220,7 +234,8 @@ static bt_study_parameter *add_parameter(const reader *r, int line, const char *
 static void read_parameters(const reader *r, const bt_node *map, int line)
 {
     if (map->kind != BT_NODE_MAP) {
-        COMPLAIN(r, line, "parameters: needs keys with lists or ranges; write parameters: {ice.concentration: [0.2, 0.5, 0.8]}");
+        COMPLAIN(r, line,
+                 "parameters: needs keys with lists or ranges; write parameters: {ice.concentration: [0.2, 0.5, 0.8]}");
         return;
     }
     for (int i = 0; i < map->n; i++) {
@@ -230,7 +245,10 @@ static void read_parameters(const reader *r, const bt_node *map, int line)
         if (!p) return;
         if (map->item[i]->kind == BT_NODE_LIST) read_list(r, map->item[i], at, p);
         else if (map->item[i]->kind == BT_NODE_MAP) read_range(r, map->item[i], at, p);
-        else COMPLAIN(r, at, "%s: needs a list [a, b] or a range {from: a, to: b, n: 3}; a single value belongs into `set`", p->name);
+        else
+            COMPLAIN(r, at,
+                     "%s: needs a list [a, b] or a range {from: a, to: b, n: 3}; a single value belongs into `set`",
+                     p->name);
     }
 }
 
@@ -270,9 +288,11 @@ static void read_with(const reader *r, const bt_node *map, int line)
         for (int p = 0; p < s->n_parameters; p++)
             for (int v = 0; v < s->parameter[p].n && !known; v++) {
                 const size_t n = strlen(s->parameter[p].name);
-                known = !strncmp(map->key[i], s->parameter[p].name, n) && map->key[i][n] == '=' && !strcmp(map->key[i] + n + 1, s->parameter[p].value[v]);
+                known = !strncmp(map->key[i], s->parameter[p].name, n) && map->key[i][n] == '=' &&
+                        !strcmp(map->key[i] + n + 1, s->parameter[p].value[v]);
             }
-        if (!known) COMPLAIN(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list", where);
+        if (!known)
+            COMPLAIN(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list", where);
         bt_study_variant *v = &s->with[s->n_with++];
         v->name = strdup(map->key[i]);
         read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
@@ -280,7 +300,10 @@ static void read_with(const reader *r, const bt_node *map, int line)
 }
 
 /// The numbers of parameter p in condition c.
-static bt_rng draw(const bt_study *s, int p, int64_t c) { return bt_rng_start(s->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p); }
+static bt_rng draw(const bt_study *s, int p, int64_t c)
+{
+    return bt_rng_start(s->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p);
+}
 
 typedef struct {
     uint64_t key;
@@ -316,9 +339,12 @@ static void count_conditions(const reader *r)
     s->n_conditions = 1;
     if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) s->n_conditions = s->samples;
     else
-        for (int i = 0; i < s->n_parameters && s->n_conditions <= BT_MAX_MEMBERS; i++) s->n_conditions *= s->parameter[i].n;
+        for (int i = 0; i < s->n_parameters && s->n_conditions <= BT_MAX_MEMBERS; i++)
+            s->n_conditions *= s->parameter[i].n;
     if (s->n_conditions > BT_MAX_MEMBERS || s->n_conditions * s->repeats > BT_MAX_MEMBERS)
-        bt_errors_add(r->err, "%s: more than %d members; take shorter lists, fewer repeats, or sampling: latin-hypercube", s->path, BT_MAX_MEMBERS);
+        bt_errors_add(r->err,
+                      "%s: more than %d members; take shorter lists, fewer repeats, or sampling: latin-hypercube",
+                      s->path, BT_MAX_MEMBERS);
     if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE && s->n_parameters == 0)
         bt_errors_add(r->err, "%s: sampling: latin-hypercube: there is nothing to sample; give parameters", s->path);
 }
@@ -354,16 +380,19 @@ static void read_entries(const reader *r, const bt_node *root)
         for (int j = 0; words[j] && !known; j++) known = !strcmp(words[j], root->key[i]);
         if (known) continue;
         const char *near = bt_suggest(root->key[i], words);
-        COMPLAIN(r, root->key_line[i], "%.60s: unknown key of a study; %s%s", root->key[i], near ? "did you mean " : "see include/bergtow/study.h", near ? near : "");
+        COMPLAIN(r, root->key_line[i], "%.60s: unknown key of a study; %s%s", root->key[i],
+                 near ? "did you mean " : "see include/bergtow/study.h", near ? near : "");
     }
     const bt_node *node = entry(root, "title", &line);
     if (node && scalar(r, node, line, "title")) s->title = strdup(node->text);
     if ((node = entry(root, "base", &line)) && scalar(r, node, line, "base")) {
         const char *slash = strrchr(s->path, '/');
         s->base_name = strdup(node->text);
-        s->base = slash && node->text[0] != '/' ? print("%.*s/%s", (int)(slash - s->path), s->path, node->text) : strdup(node->text);
+        s->base = slash && node->text[0] != '/' ? print("%.*s/%s", (int)(slash - s->path), s->path, node->text)
+                                                : strdup(node->text);
     } else if (!node) {
-        bt_errors_add(r->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml", s->path);
+        bt_errors_add(r->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml",
+                      s->path);
     }
     if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->set_at, &s->n_set);
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
@@ -373,7 +402,8 @@ static void read_entries(const reader *r, const bt_node *root)
     s->common_fields = read_choice(r, root, "fields", fields) == 1;
     const int64_t most = BT_MAX_MEMBERS;
     if ((node = entry(root, "samples", &line))) read_whole(r, node, line, "samples", 1, most, &s->samples);
-    else if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) bt_errors_add(r->err, "%s: samples: missing; a Latin hypercube needs the number of its conditions", s->path);
+    else if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
+        bt_errors_add(r->err, "%s: samples: missing; a Latin hypercube needs the number of its conditions", s->path);
     if ((node = entry(root, "repeats", &line))) read_whole(r, node, line, "repeats", 1, most, &s->repeats);
     if ((node = entry(root, "seed", &line))) read_whole(r, node, line, "seed", 0, INT64_MAX, &s->seed);
     if ((node = entry(root, "ranks", &line))) read_whole(r, node, line, "ranks", 1, 1 << 20, &s->ranks);
@@ -388,7 +418,8 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
     if (status != BT_OK) return status;
     const reader r = {s, err};
     bt_node *root = bt_tree_parse(s->text, size, path, err);
-    if (root && (root->kind != BT_NODE_MAP || !root->n)) bt_errors_add(err, "%s: is not a study; it needs at least base: CASE.yml", path);
+    if (root && (root->kind != BT_NODE_MAP || !root->n))
+        bt_errors_add(err, "%s: is not a study; it needs at least base: CASE.yml", path);
     else if (root) read_entries(&r, root);
     bt_tree_free(root);
     if (err->n == before) count_conditions(&r);
@@ -476,11 +507,13 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
             char *given = print("%s=%s", s->parameter[p].name, out->value[p]);
             add_override(out, given, s->parameter[p].at);
             for (int i = 0; i < s->n_with; i++)
-                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++) add_override(out, strdup(s->with[i].set[k]), s->with[i].at[k]);
+                for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++)
+                    add_override(out, strdup(s->with[i].set[k]), s->with[i].at[k]);
             continue;
         }
         for (int i = 0; i < s->n_variants; i++)
-            for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++) add_override(out, strdup(s->variant[i].set[k]), s->variant[i].at[k]);
+            for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++)
+                add_override(out, strdup(s->variant[i].set[k]), s->variant[i].at[k]);
     }
     add_override(out, print("ice.seed=%" PRId64, out->seed), NULL);
 }
@@ -513,19 +546,22 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     size_t size;
     FILE *out = open_memstream(&text, &size);
     if (!out) abort();
-    fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, samplings[s->sampling], s->n_conditions,
-            s->common_fields ? "fields: common\n" : "");
+    fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
+                 "study.\n");
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, samplings[s->sampling],
+            s->n_conditions, s->common_fields ? "fields: common\n" : "");
     for (int p = 0; p < s->n_parameters; p++) {
         fprintf(out, "%s:", s->parameter[p].name);
         if (s->parameter[p].continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
-            fprintf(out, " %s from %.17g to %.17g", s->parameter[p].logarithmic ? "log" : "linear", s->parameter[p].from, s->parameter[p].to);
+            fprintf(out, " %s from %.17g to %.17g", s->parameter[p].logarithmic ? "log" : "linear",
+                    s->parameter[p].from, s->parameter[p].to);
         else
             for (int i = 0; i < s->parameter[p].n; i++) fprintf(out, "%s %s", i ? "," : "", s->parameter[p].value[i]);
         fputc('\n', out);
     }
     for (int i = 0; i < s->n_variants; i++)
-        for (int k = 0; k < s->variant[i].n_set; k++) fprintf(out, "variant %s: %s\n", s->variant[i].name, s->variant[i].set[k]);
+        for (int k = 0; k < s->variant[i].n_set; k++)
+            fprintf(out, "variant %s: %s\n", s->variant[i].name, s->variant[i].set[k]);
     for (int i = 0; i < s->n_with; i++)
         for (int k = 0; k < s->with[i].n_set; k++) fprintf(out, "with %s: %s\n", s->with[i].name, s->with[i].set[k]);
     fprintf(out, "# base case with `set`\n%s", base);

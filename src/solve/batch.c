@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Batches of four units; what for, in batch.h. The arithmetic is that of bt_update_unit (kernel.h), four at a time.
+// Batches of four contacts; what for, in batch.h. The arithmetic is that of bt_update_contact (kernel.h), four at a
+// time.
 #include "solve/batch.h"
 
 #include <math.h>
@@ -8,20 +9,20 @@
 
 #include "solve/kernel.h"
 
-enum { LANES = 4, OPEN = 8 }; // OPEN: batches that wait for more units, when a tile is packed
+enum { LANES = 4, OPEN = 8 }; // OPEN: batches that wait for more contacts, when a cell is packed
 
 typedef double vec __attribute__((vector_size(LANES * sizeof(double))));
 typedef int64_t mask __attribute__((vector_size(LANES * sizeof(int64_t))));
 
 typedef enum { RIGID, BOUNDED, SHEETS } kind_of_units; // of a batch
 
-/// Names as in bt_unit; lanes without a unit are zero.
+/// Names as in bt_contact; lanes without a contact are zero.
 typedef struct bt_batch {
     vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2], mu;
     vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
     vec x[3], before[3], y[3]; // impulses: now, before the last sweep, after the move
     vec bound[2];              // of the normals; bound[0] of sheets: the radius of their disc
-    bt_idx a[LANES], b[LANES], unit[LANES];
+    bt_idx a[LANES], b[LANES], contact[LANES];
     bool moves_a[LANES], moves_b[LANES];
     int n;
     kind_of_units kind;
@@ -36,13 +37,13 @@ typedef struct bt_batch {
 #endif
 #define INLINE static inline __attribute__((always_inline))
 
-bool bt_batch_is_for(const bt_tile *tile) { return !(tile->limits && tile->rising) && tile->phase != BT_COLOURS; }
+bool bt_batch_is_for(const bt_cell *cell) { return !(cell->limits && cell->rising) && cell->phase != BT_COLOURS; }
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
-static kind_of_units kind_of(const bt_tile *tile, const bt_unit *u)
+static kind_of_units kind_of(const bt_cell *cell, const bt_contact *u)
 {
-    return !tile->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
+    return !cell->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
 }
 
 static bool holds(const bt_batch *o, bt_idx body)
@@ -52,9 +53,9 @@ static bool holds(const bt_batch *o, bt_idx body)
     return false;
 }
 
-static void put(bt_batch *o, const bt_tile *tile, bt_idx i, const bt_inv *inv)
+static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
 {
-    const bt_unit *u = &tile->units[i];
+    const bt_contact *u = &cell->contacts[i];
     const int l = o->n++;
     o->nx[l] = u->nx, o->ny[l] = u->ny;
     for (int c = 0; c < 2; c++) {
@@ -66,78 +67,78 @@ static void put(bt_batch *o, const bt_tile *tile, bt_idx i, const bt_inv *inv)
     o->w12[l] = u->w12, o->per_det[l] = u->per_det;
     o->wt[l] = u->wt, o->mt[l] = u->mt, o->mu[l] = u->mu;
     o->x[2][l] = u->lt;
-    for (int c = 0; c < 3; c++) o->before[c][l] = tile->before[i][c];
+    for (int c = 0; c < 3; c++) o->before[c][l] = cell->before[i][c];
     o->ma[l] = inv[u->a].m, o->ia[l] = inv[u->a].i, o->mb[l] = inv[u->b].m, o->ib[l] = inv[u->b].i;
-    for (int c = 0; tile->limits && c < 2; c++) o->bound[c][l] = tile->limits[i].flat[c];
-    o->a[l] = u->a, o->b[l] = u->b, o->unit[l] = i;
+    for (int c = 0; cell->limits && c < 2; c++) o->bound[c][l] = cell->limits[i].flat[c];
+    o->a[l] = u->a, o->b[l] = u->b, o->contact[l] = i;
     o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
 }
 
-static bt_batch *begin_batch(bt_tile *tile, const bt_unit *u)
+static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u)
 {
-    if (tile->n_batches == tile->cap_batches) {
-        const bt_idx cap = bt_max(LANES, 2 * tile->cap_batches);
+    if (cell->n_batches == cell->cap_batches) {
+        const bt_idx cap = bt_max(LANES, 2 * cell->cap_batches);
         bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
-        if (tile->n_batches > 0) memcpy(more, tile->batch, (size_t)tile->n_batches * sizeof *more);
-        free(tile->batch);
-        tile->batch = more;
-        tile->cap_batches = cap;
+        if (cell->n_batches > 0) memcpy(more, cell->batch, (size_t)cell->n_batches * sizeof *more);
+        free(cell->batch);
+        cell->batch = more;
+        cell->cap_batches = cap;
     }
-    bt_batch *o = &tile->batch[tile->n_batches++];
+    bt_batch *o = &cell->batch[cell->n_batches++];
     memset(o, 0, sizeof *o);
-    o->kind = kind_of(tile, u);
+    o->kind = kind_of(cell, u);
     for (int l = 0; l < LANES; l++) o->a[l] = u->a, o->b[l] = u->b; // of lanes that stay empty: read, never written
     return o;
 }
 
-/// May a unit stand in a batch?
-static bool fits(const bt_batch *o, const bt_unit *u, kind_of_units kind, const bt_inv *inv)
+/// May a contact stand in a batch?
+static bool fits(const bt_batch *o, const bt_contact *u, kind_of_units kind, const bt_inv *inv)
 {
     return o->kind == kind && !(inv[u->a].m > 0 && holds(o, u->a)) && !(inv[u->b].m > 0 && holds(o, u->b));
 }
 
-/// Each unit goes into the first of the last OPEN batches that is not full, is of its kind and has none of its bodies.
-/// Those that filled up leave the window.
-static void pack(bt_tile *tile, const bt_inv *inv)
+/// Each contact goes into the first of the last OPEN batches that is not full, is of its kind and has none of its
+/// bodies. Those that filled up leave the window.
+static void pack(bt_cell *cell, const bt_inv *inv)
 {
     bt_idx open[OPEN];
     int n_open = 0;
-    tile->n_batches = 0;
-    tile->packed = true;
-    for (bt_idx j = 0; j < tile->n_list; j++) {
-        const bt_unit *u = &tile->units[tile->list[j]];
+    cell->n_batches = 0;
+    cell->packed = true;
+    for (bt_idx j = 0; j < cell->n_list; j++) {
+        const bt_contact *u = &cell->contacts[cell->list[j]];
         int k = 0;
-        const kind_of_units kind = kind_of(tile, u);
-        while (k < n_open && !fits(&tile->batch[open[k]], u, kind, inv)) k++;
+        const kind_of_units kind = kind_of(cell, u);
+        while (k < n_open && !fits(&cell->batch[open[k]], u, kind, inv)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
-            begin_batch(tile, u);
-            open[n_open++] = tile->n_batches - 1;
+            begin_batch(cell, u);
+            open[n_open++] = cell->n_batches - 1;
         }
-        bt_batch *o = &tile->batch[open[k]];
-        put(o, tile, tile->list[j], inv);
+        bt_batch *o = &cell->batch[open[k]];
+        put(o, cell, cell->list[j], inv);
         if (o->n < LANES) continue;
         n_open--;
         memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
     }
 }
 
-void bt_batch_order(const bt_tile *tile, bt_idx *unit)
+void bt_batch_order(const bt_cell *cell, bt_idx *contact)
 {
-    for (bt_idx k = 0; k < tile->n_batches; k++)
-        for (int l = 0; l < tile->batch[k].n; l++) *unit++ = tile->batch[k].unit[l];
+    for (bt_idx k = 0; k < cell->n_batches; k++)
+        for (int l = 0; l < cell->batch[k].n; l++) *contact++ = cell->batch[k].contact[l];
 }
 
-void bt_batch_unpack(bt_tile *tile)
+void bt_batch_unpack(bt_cell *cell)
 {
-    if (!tile->packed) return;
-    tile->packed = false;
-    for (bt_idx k = 0; k < tile->n_batches; k++) {
-        const bt_batch *o = &tile->batch[k];
+    if (!cell->packed) return;
+    cell->packed = false;
+    for (bt_idx k = 0; k < cell->n_batches; k++) {
+        const bt_batch *o = &cell->batch[k];
         for (int l = 0; l < o->n; l++) {
-            bt_unit *u = &tile->units[o->unit[l]];
+            bt_contact *u = &cell->contacts[o->contact[l]];
             u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
-            for (int c = 0; c < 3; c++) tile->before[o->unit[l]][c] = o->before[c][l];
+            for (int c = 0; c < 3; c++) cell->before[o->contact[l]][c] = o->before[c][l];
         }
     }
 }
@@ -242,7 +243,7 @@ INLINE void bound_normals(const bt_batch *o, const motion *p, const motion *q, v
     *l2 = choose(over & ~one, l[1], *l2);
 }
 
-/// As bt_update_sheets; lanes without a unit have a disc of 0 and no step.
+/// As bt_update_sheets; lanes without a contact have a disc of 0 and no step.
 INLINE vec update_sheets(bt_batch *o, bt_vel *v)
 {
     motion a = load(v, o->a), b = load(v, o->b);
@@ -267,7 +268,7 @@ INLINE vec update_sheets(bt_batch *o, bt_vel *v)
     return larger(size_of(dx), size_of(dy)) * o->wt;
 }
 
-/// As bt_update_unit; the largest corrections, m/s.
+/// As bt_update_contact; the largest corrections, m/s.
 INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
 {
     motion a = load(v, o->a), b = load(v, o->b);
@@ -311,8 +312,10 @@ FOR_EACH_CPU
 static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
 {
     vec most = {0};
-    for (bt_idx k = 0; k < n; k++)
-        most = larger(most, batch[k].kind == SHEETS ? update_sheets(&batch[k], v) : update(&batch[k], v, true));
+    for (bt_idx k = 0; k < n; k++) {
+        bt_batch *o = &batch[k];
+        most = larger(most, o->kind == SHEETS ? update_sheets(o, v) : update(o, v, true));
+    }
     return largest_lane(most);
 }
 
@@ -341,16 +344,16 @@ static double against(const bt_batch *batch, bt_idx n)
     return sum[0] + sum[1] + sum[2] + sum[3];
 }
 
-double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
                       int64_t *done, double *most)
 {
-    if (!tile->packed) pack(tile, inv);
-    if (s->moves) move(tile->batch, tile->n_batches, s->beta);
+    if (!cell->packed) pack(cell, inv);
+    if (s->moves) move(cell->batch, cell->n_batches, s->beta);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
-        last = (tile->limits ? pass_bounded : pass)(tile->batch, tile->n_batches, v);
+        last = (cell->limits ? pass_bounded : pass)(cell->batch, cell->n_batches, v);
         if (n == 0) *most = last;
-        *done += tile->n_list;
+        *done += cell->n_list;
     }
-    return s->moves ? against(tile->batch, tile->n_batches) : 0;
+    return s->moves ? against(cell->batch, cell->n_batches) : 0;
 }

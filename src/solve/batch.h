@@ -1,40 +1,42 @@
 // SPDX-License-Identifier: MIT
-// Listed units of a tile in batches of four that share no body, swept with vector instructions (private to the solver).
+// Listed contacts of a cell in batches of four that share no body, swept with vector instructions (private to the
+// solver).
 //
-//     units   [0] [1] [2] [3] [4] [5] ...      a unit a row; half of them bear no load and are not listed
+//     contacts   [0] [1] [2] [3] [4] [5] ...      a contact a row; half of them bear no load and are not listed
 //     list     0       2   3       5  ...
-//     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four units, ny of four units, ...
+//     batch   {0 2 5 9} {3 7 8 11} ...         a batch is an array of vectors: nx of four contacts, ny of four
+//     contacts, ...
 //
-// A sweep goes through the batches of a tile in sequence, and updates the four units of each at once: as they share no
-// body that can be moved, that is the same as one after the other. So the order of a tile's updates is that of its
+// A sweep goes through the batches of a cell in sequence, and updates the four contacts of each at once: as they share
+// no body that can be moved, that is the same as one after the other. So the order of a cell's updates is that of its
 // batches, the same everywhere.
 //
 // Vectors are the compiler's (four doubles each): IEEE arithmetic, element by element, without contraction, whatever
 // instructions it is translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for
 // AVX2 and for any, and the loader takes the one that fits. The scalar update of src/solve/kernel.h remains for
 // contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch holds
-// units of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
+// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
 //
 // Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
-// units.
+// contacts.
 #ifndef BERGTOW_BATCH_H
 #define BERGTOW_BATCH_H
 
 #include "solve/rounds.h"
 
-/// Are the units of this tile swept in batches?
-bool bt_batch_is_for(const bt_tile *tile);
+/// Are the contacts of this cell swept in batches?
+bool bt_batch_is_for(const bt_cell *cell);
 
-/// One visit of a sweep to the tile: its move, and passes: at least one, at most `times`, and none after one that
+/// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
 /// first pass in *most. Returns how far it turned against its move, J.
-double bt_batch_sweep(bt_tile *tile, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
+double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
                       int64_t *done, double *most);
 
-/// The units of the list in the order in which they are swept, [n_list]; of a tile that has been swept.
-void bt_batch_order(const bt_tile *tile, bt_idx *unit);
+/// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
+void bt_batch_order(const bt_cell *cell, bt_idx *contact);
 
-/// Impulses back into the units; nothing when they are there.
-void bt_batch_unpack(bt_tile *tile);
+/// Impulses back into the contacts; nothing when they are there.
+void bt_batch_unpack(bt_cell *cell);
 
 #endif

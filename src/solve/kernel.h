@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The innermost arithmetic of a sweep: one unit, two bodies (private to the solver).
+// The innermost arithmetic of a sweep: one contact, two bodies (private to the solver).
 #ifndef BERGTOW_KERNEL_H
 #define BERGTOW_KERNEL_H
 
@@ -13,7 +13,7 @@
 /// by one they need 2 to 10 times the sweeps on rows of floes lying edge to edge. When the coupling is singular (points
 /// that coincide) the first of the single cases that holds is taken; so it is for one point, whose second has no mass
 /// (mn 0).
-static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
+static inline void bt_solve_normals(const bt_contact *u, const bt_vel *va, const bt_vel *vb, double *l1, double *l2)
 {
     const double dx = vb->x - va->x, dy = vb->y - va->y, un = u->nx * dx + u->ny * dy;
     const double u1 = un + u->rbn[0] * vb->w - u->ran[0] * va->w + u->bias[0];
@@ -34,7 +34,7 @@ static inline void bt_solve_normals(const bt_unit *u, const bt_vel *va, const bt
 /// the points are the same (manifold.c), so only the sum of their friction has an effect, bounded by μ (λ1 + λ2). Two
 /// separate unknowns would drift apart along their null space and eat up the friction cone. Returns the largest
 /// correction, m/s.
-static inline double bt_take_normals(bt_unit *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v,
+static inline double bt_take_normals(bt_contact *u, double l1, double l2, bt_vel va, bt_vel vb, bt_vel *v,
                                      const bt_inv *inv)
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
@@ -57,7 +57,7 @@ static inline void bt_onto_disc(double radius, double *x, double *y)
 }
 
 /// What the friction of sheets would be after a step of its own (contact/raft.h).
-static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x,
+static inline void bt_sheets_map(const bt_contact *u, const bt_limit *k, const bt_vel *va, const bt_vel *vb, double *x,
                                  double *y)
 {
     *x = u->ln[0] - bt_normal_velocity(u, 0, va, vb) * u->mn[0];
@@ -65,7 +65,7 @@ static inline void bt_sheets_map(const bt_unit *u, const bt_limit *k, const bt_v
     bt_onto_disc(k->flat[0], x, y);
 }
 
-static inline double bt_update_sheets(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+static inline double bt_update_sheets(bt_contact *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
     const bt_inv ia = inv[u->a], ib = inv[u->b];
     bt_vel va = v[u->a], vb = v[u->b];
@@ -80,7 +80,7 @@ static inline double bt_update_sheets(bt_unit *u, const bt_limit *k, bt_vel *v, 
 }
 
 /// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
-static inline double bt_update_unit(bt_unit *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
+static inline double bt_update_contact(bt_contact *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
     if (k && u->n == 0) return bt_update_sheets(u, k, v, inv);
     const bt_vel va = v[u->a], vb = v[u->b];
@@ -91,13 +91,13 @@ static inline double bt_update_unit(bt_unit *u, const bt_limit *k, bt_vel *v, co
 }
 
 /// What the normal impulse of point i would be with all others held.
-static inline double bt_normal_map(const bt_unit *u, const bt_limit *k, int i, const bt_vel *va, const bt_vel *vb)
+static inline double bt_normal_map(const bt_contact *u, const bt_limit *k, int i, const bt_vel *va, const bt_vel *vb)
 {
     const double w = bt_normal_velocity(u, i, va, vb) + u->bias[i];
     return k ? bt_limit_point(k, u, i, w - u->w[i] * u->ln[i]) : bt_max(0, u->ln[i] - w * u->mn[i]);
 }
 
-static inline double bt_sheets_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+static inline double bt_sheets_residual(const bt_contact *u, const bt_limit *k, const bt_vel *v, double *sum)
 {
     double x, y;
     bt_sheets_map(u, k, &v[u->a], &v[u->b], &x, &y);
@@ -106,9 +106,9 @@ static inline double bt_sheets_residual(const bt_unit *u, const bt_limit *k, con
     return isfinite(x + y) ? bt_max(fabs(x), fabs(y)) : INFINITY;
 }
 
-/// Natural-map residual of a unit, m/s; into *sum the squares over its rows (a normal one a point, one tangential; two
-/// of sheets).
-static inline double bt_unit_residual(const bt_unit *u, const bt_limit *k, const bt_vel *v, double *sum)
+/// Natural-map residual of a contact, m/s; into *sum the squares over its rows (a normal one a point, one tangential;
+/// two of sheets).
+static inline double bt_contact_residual(const bt_contact *u, const bt_limit *k, const bt_vel *v, double *sum)
 {
     if (k && u->n == 0) return bt_sheets_residual(u, k, v, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Normal impulses of a unit under bounds (private to the solver); the shape of a bound is in contact/law.h.
+// Normal impulses of a contact under bounds (private to the solver); the shape of a bound is in contact/law.h.
 #ifndef BERGTOW_LIMIT_H
 #define BERGTOW_LIMIT_H
 
@@ -12,14 +12,14 @@
 /// part of the bound, λ = base − slope (w − bias + place), meets it at λ = (base − slope (b − bias + place)) / (1 +
 /// slope W), where it is above the flat part exactly when that is so at the solution. `place` and not the bias: a
 /// rebound is no crushing.
-static inline double bt_limit_point(const bt_limit *l, const bt_unit *u, int i, double b)
+static inline double bt_limit_point(const bt_limit *l, const bt_contact *u, int i, double b)
 {
     const double rising = (l->base[i] - l->slope[i] * (b - u->bias[i] + l->place[i])) / (1 + l->slope[i] * u->w[i]);
     return bt_max(0, bt_min(-b * u->mn[i], bt_min(l->most[i], bt_max(l->flat[i], rising))));
 }
 
 /// Bound of point i at these velocities, N s.
-static inline double bt_limit_bound(const bt_limit *l, const bt_unit *u, int i, const bt_vel *v)
+static inline double bt_limit_bound(const bt_limit *l, const bt_contact *u, int i, const bt_vel *v)
 {
     const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
     return bt_min(l->most[i], bt_max(l->flat[i], l->base[i] + l->slope[i] * bt_max(0, approach)));
@@ -27,7 +27,7 @@ static inline double bt_limit_bound(const bt_limit *l, const bt_unit *u, int i, 
 
 /// Least ½ λᵀ W λ + bᵀ λ on the rim of the box 0 <= λ <= c, where the solution is when it is not inside: the side whose
 /// multiplier has the right sign, and of sides that rounding leaves in doubt the one of least value.
-static inline void bt_limit_rim(const bt_unit *u, const double b[2], const double c[2], double l[2])
+static inline void bt_limit_rim(const bt_contact *u, const double b[2], const double c[2], double l[2])
 {
     double least = INFINITY;
     for (int side = 0; side < 4; side++) {
@@ -47,7 +47,7 @@ static inline void bt_limit_rim(const bt_unit *u, const double b[2], const doubl
 
 /// Both impulses of a manifold. Exact where neither bound is reached, and where both bounds are flat; otherwise point
 /// by point, a few times: the sweeps do the rest.
-static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const double b[2], double l[2])
+static inline void bt_limit_two(const bt_limit *k, const bt_contact *u, const double b[2], double l[2])
 {
     enum { TURNS = 4 };
     l[0] = (u->w12 * b[1] - u->w[1] * b[0]) * u->per_det;
@@ -64,7 +64,7 @@ static inline void bt_limit_two(const bt_limit *k, const bt_unit *u, const doubl
 
 /// Both normal impulses under bounds from the velocities, l: what they would be without; nearly everywhere that is
 /// below the flat parts.
-static inline void bt_limit_normals(const bt_limit *k, const bt_unit *u, const bt_vel *va, const bt_vel *vb,
+static inline void bt_limit_normals(const bt_limit *k, const bt_contact *u, const bt_vel *va, const bt_vel *vb,
                                     double l[2])
 {
     if (!(l[0] > k->flat[0] || l[1] > k->flat[1])) return;

@@ -3,9 +3,9 @@
 //
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M⁻¹ J_nᵀ p with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction, in rounds over the points that push or overlap (rounds.h). Touching contacts (g2 ≥ −slop) take part, so that pushing two floes apart
-// does not press either into a third. Velocity-level correction (Baumgarte) would add kinetic energy and load that
-// is not there (Metrikin 2014).
+// by the same rows without friction, in rounds over the points that push or overlap (rounds.h). Touching contacts (g2 ≥
+// −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
+// (Baumgarte) would add kinetic energy and load that is not there (Metrikin 2014).
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,39 +20,40 @@
 static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)context;
-    bt_tile *tile = &w->tiles->tile[k];
-    bt_rounds_list(tile);
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_unit *u = &tile->units[j];
-        bt_gaps *g = &tile->gaps[j];
-        for (int i = 0; i < 3; i++) tile->before[j][i] = 0;
+    bt_cell *cell = &w->cells->cell[k];
+    bt_rounds_list(cell);
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
+        bt_gaps *g = &cell->gaps[j];
+        for (int i = 0; i < 3; i++) cell->before[j][i] = 0;
         for (int i = 0; i < u->n; i++) {
             g->push[i] = 0;
             g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (tile->limits) g->after[i] += tile->limits[j].grown[i]; // what has given way in this step
+            if (cell->limits) g->after[i] += cell->limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->after[i]);
         }
     }
 }
 
 /// How far point i is open beyond the slop, m.
-static double opening(const bt_world *w, const bt_unit *u, const bt_gaps *g, int i, const bt_vel *da, const bt_vel *db)
+static double opening(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, const bt_vel *da,
+                      const bt_vel *db)
 {
     return bt_normal_velocity(u, i, da, db) + g->after[i] + w->par.slop;
 }
 
-static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_problem *p = context;
-    bt_tile *tile = &w->tiles->tile[k];
+    bt_cell *cell = &w->cells->cell[k];
     const bt_vel *d = w->solver->shift;
     const double near = BT_NEAR * p->tolerance;
     double sum = 0;
     int64_t rows = 0, bad = 0;
-    bt_rounds_list(tile);
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_unit *u = &tile->units[j];
-        const bt_gaps *g = &tile->gaps[j];
+    bt_rounds_list(cell);
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
+        const bt_gaps *g = &cell->gaps[j];
         double worst = 0;
         bool on = p->plain;
         for (int i = 0; i < u->n; i++) {
@@ -60,17 +61,17 @@ static void look_at_tile(bt_world *w, bt_idx k, const void *context, bt_totals *
             const double r = fabs(bt_max(0, g->push[i] - open * u->mn[i]) - g->push[i]) * u->w[i];
             worst = bt_max(worst, r);
             sum += r * r;
-            on = on || g->push[i] > 0 || g->push[i] != tile->before[j][i] || !(open >= 0);
+            on = on || g->push[i] > 0 || g->push[i] != cell->before[j][i] || !(open >= 0);
         }
         t->most = bt_max(t->most, worst);
         bad += worst > near;
         rows += u->n;
-        if (on) tile->list[tile->n_list++] = j;
+        if (on) cell->list[cell->n_list++] = j;
     }
-    bt_rounds_found(p, tile, sum, rows, bad, t);
+    bt_rounds_found(p, cell, sum, rows, bad, t);
 }
 
-static void push_unit(bt_world *w, const bt_unit *u, bt_gaps *g, double *most)
+static void push_contact(bt_world *w, const bt_contact *u, bt_gaps *g, double *most)
 {
     bt_vel *d = w->solver->shift, da = d[u->a], db = d[u->b];
     const bt_inv *inv = w->bodies.inv;
@@ -88,29 +89,33 @@ static void push_unit(bt_world *w, const bt_unit *u, bt_gaps *g, double *most)
     bt_store(&d[u->b], inv[u->b], &db);
 }
 
-static void push_tile(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_sweep *o = context;
-    bt_tile *tile = &w->tiles->tile[k];
-    if (tile->n_list == 0) return;
+    bt_cell *cell = &w->cells->cell[k];
+    if (cell->n_list == 0) return;
     bt_moved moved;
-    if (o->moves) bt_moved_begin(&moved, tile);
-    for (bt_idx j = 0; o->moves && j < tile->n_list; j++) bt_rounds_move(o, tile->gaps[tile->list[j]].push, tile->before[tile->list[j]], moved.y[j], 2);
-    for (bt_idx j = 0; j < tile->n_list; j++) push_unit(w, &tile->units[tile->list[j]], &tile->gaps[tile->list[j]], &t->most);
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], tile->n_list);
+    if (o->moves) bt_moved_begin(&moved, cell);
+    for (bt_idx j = 0; o->moves && j < cell->n_list; j++)
+        bt_rounds_move(o, cell->gaps[cell->list[j]].push, cell->before[cell->list[j]], moved.y[j], 2);
+    for (bt_idx j = 0; j < cell->n_list; j++)
+        push_contact(w, &cell->contacts[cell->list[j]], &cell->gaps[cell->list[j]], &t->most);
+    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->n_list);
     if (!o->moves) return;
     double against = 0;
-    for (bt_idx j = 0; j < tile->n_list; j++) {
-        const bt_idx u = tile->list[j];
-        for (int i = 0; i < 2; i++) against += bt_rounds_against(tile->units[u].w[i], tile->gaps[u].push[i], tile->before[u][i], moved.y[j][i]);
+    for (bt_idx j = 0; j < cell->n_list; j++) {
+        const bt_idx u = cell->list[j];
+        for (int i = 0; i < 2; i++)
+            against +=
+                bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->before[u][i], moved.y[j][i]);
     }
-    bt_moved_end(&moved, tile, o, against, t);
+    bt_moved_end(&moved, cell, o, against, t);
 }
 
 void bt_solver_project(bt_world *w)
 {
     bt_solver *s = w->solver;
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     bt_step_stats *st = &w->stats;
     st->position_sweeps = 0;
     st->projected = true;
@@ -127,16 +132,23 @@ void bt_solver_project(bt_world *w)
     }
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
-        if (k == ts->n - 1 || bt_tiles_moves(ts, k))
-            memset(s->shift + ts->tile[k].first, 0, (size_t)(ts->tile[k].end - ts->tile[k].first) * sizeof *s->shift);
+        if (k == ts->n - 1 || bt_cells_moves(ts, k))
+            memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
     }
-    bt_problem p = {.look = look_at_tile, .sweep = push_tile, .vel = s->shift, .tolerance = 0.1 * w->par.slop, .cap = 0.9, .length = 25,
-                    .limit = (double)w->par.position_sweeps, .plain = w->par.plain_sweeps};
+    bt_problem p = {.look = look_at_cell,
+                    .sweep = push_cell,
+                    .vel = s->shift,
+                    .tolerance = 0.1 * w->par.slop,
+                    .cap = 0.9,
+                    .length = 25,
+                    .limit = (double)w->par.position_sweeps,
+                    .plain = w->par.plain_sweeps};
     bt_rounds_scale(&p, ts->heaviest);
     bt_work work = {0};
     bt_rounds_look(w, &p, false, &work);
     if (p.plain) // the reference, and what fields are shaken with: no look at the points, it ends with the updates
-        while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance)) work.residual = bt_rounds_sweep(w, &p, &work);
+        while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
+            work.residual = bt_rounds_sweep(w, &p, &work);
     else bt_rounds_run(w, &p, &work);
     st->position_sweeps = work.sweeps;
     st->projected = work.residual <= p.tolerance;

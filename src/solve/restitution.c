@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Islands of touching bodies, over ranks too, and the work of their contacts.
 //
-// An island is named by the least gid in it as its rank sees it. Where islands of several ranks meet in a body that both hold, the names
-// belong together: every rank gathers these few (name here, name there) links and joins them by the same union-find; works of
-// islands that reach over ranks are added as exact sums.
+// An island is named by the least gid in it as its rank sees it. Where islands of several ranks meet in a body that
+// both hold, the names belong together: every rank gathers these few (name here, name there) links and joins them by
+// the same union-find; works of islands that reach over ranks are added as exact sums.
 #include "solve/restitution.h"
 
 #include <math.h>
@@ -11,8 +11,9 @@
 
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "partition/domain.h"
+#include "contact/work.h"
 #include "contact/pack.h"
 
 typedef struct bt_islands {
@@ -42,25 +43,27 @@ static bt_idx root_of(islands *s, bt_idx i)
     return i;
 }
 
-static bt_idx island_of(const bt_world *w, const bt_unit *u)
+static bt_idx island_of(const bt_world *w, const bt_contact *u)
 {
     return root_of(w->solver->islands, w->bodies.inv[u->a].m > 0 ? u->a : u->b);
 }
 
 bool bt_restitution_begin(bt_world *w)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     islands *s = w->solver->islands;
     if (!ts->rebounds) return false;
     double any = 0;
     for (bt_idx k = 0; k < ts->n && any == 0; k++)
-        for (bt_idx i = 0; i < ts->tile[k].n_units && any == 0; i++) any = b->restitution[ts->tile[k].units[i].b] > 0;
+        for (bt_idx i = 0; i < ts->cell[k].n_contacts && any == 0; i++)
+            any = b->restitution[ts->cell[k].contacts[i].b] > 0;
     bt_domain_maxima(w, &any, 1);
     if (any == 0) return false;
-    // Units of an earlier detection in this step may still have the lowered restitution of its solution.
+    // Contacts of an earlier detection in this step may still have the lowered restitution of its solution.
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; i < ts->tile[k].n_units; i++) bt_pack_bias(w, &ts->tile[k].units[i], &ts->tile[k].gaps[i], 1);
+        for (bt_idx i = 0; i < ts->cell[k].n_contacts; i++)
+            bt_pack_bias(w, &ts->cell[k].contacts[i], &ts->cell[k].gaps[i], 1);
 
     if (b->n > s->cap) {
         s->cap = b->n;
@@ -75,8 +78,8 @@ bool bt_restitution_begin(bt_world *w)
         s->share[i] = 1;
     }
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
-            const bt_unit *u = &ts->tile[k].units[j];
+        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
+            const bt_contact *u = &ts->cell[k].contacts[j];
             if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;
             const bt_idx p = root_of(s, u->a), q = root_of(s, u->b);
             if (p == q) continue;
@@ -96,14 +99,14 @@ bool bt_restitution_begin(bt_world *w)
 
 bool bt_restitution_lower(bt_world *w)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     islands *s = w->solver->islands;
     const double allowed = w->stats.residual + 1e-12;
     for (bt_idx i = 0; i < b->n; i++) s->surplus[i] = (bt_sum){0};
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
-            const bt_unit *u = &ts->tile[k].units[j];
+        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
+            const bt_contact *u = &ts->cell[k].contacts[j];
             const double normal = u->ln[0] + u->ln[1];
             if (normal == 0 || u->n == 0) continue; // what sheets take must not cover what rebounds give
             bt_sum_add(&s->surplus[island_of(w, u)], bt_contacts_work(w, u) - allowed * (normal + fabs(u->lt)));
@@ -118,10 +121,10 @@ bool bt_restitution_lower(bt_world *w)
     bt_domain_maxima(w, &any, 1);
     if (any == 0) return false;
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx j = 0; j < ts->tile[k].n_units; j++) {
-            bt_unit *u = &ts->tile[k].units[j];
+        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
+            bt_contact *u = &ts->cell[k].contacts[j];
             const double share = s->share[island_of(w, u)];
-            if (share < 1) bt_pack_bias(w, u, &ts->tile[k].gaps[j], share);
+            if (share < 1) bt_pack_bias(w, u, &ts->cell[k].gaps[j], share);
         }
     return true;
 }

@@ -15,12 +15,12 @@
 #define WIDER 1.5
 #define LEAST_CAP 0.3   // less is none
 #define CALM 0.1         // of the limit of work, beyond it
-#define LEAST_SWEEP 0.01 // of the units, that a sweep counts for against the limit of work at least
+#define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
 
-// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What a tile adds ends
-// at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one unit
-// at convergence, so that 10²⁷ times that still fits.
+// Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What
+// a cell adds ends at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the
+// quantum 2⁻⁶⁴ is 10⁻¹⁰ of the energy of one contact at convergence, so that 10²⁷ times that still fits.
 void bt_rounds_scale(bt_problem *p, double heaviest)
 {
     const double energy = heaviest * p->tolerance * p->tolerance;
@@ -30,82 +30,84 @@ void bt_rounds_scale(bt_problem *p, double heaviest)
 
 // --- looks -----------------------------------------------------------------------------------------------------------
 
-void bt_rounds_list(bt_tile *tile)
+void bt_rounds_list(bt_cell *cell)
 {
-    tile->n_list = 0;
-    tile->bad = false;
-    if (tile->n_units <= tile->cap_list) return;
-    tile->cap_list = tile->n_units + tile->n_units / 4;
-    free(tile->list);
-    free(tile->before);
-    tile->list = bt_alloc((size_t)tile->cap_list, sizeof *tile->list);
-    tile->before = bt_alloc((size_t)tile->cap_list, sizeof *tile->before);
+    cell->n_list = 0;
+    cell->bad = false;
+    if (cell->n_contacts <= cell->cap_list) return;
+    cell->cap_list = cell->n_contacts + cell->n_contacts / 4;
+    free(cell->list);
+    free(cell->before);
+    cell->list = bt_alloc((size_t)cell->cap_list, sizeof *cell->list);
+    cell->before = bt_alloc((size_t)cell->cap_list, sizeof *cell->before);
 }
 
-void bt_rounds_found(const bt_problem *p, bt_tile *tile, double squares, int64_t rows, int64_t bad, bt_totals *t)
+void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t)
 {
-    tile->bad = bad > 0;
+    cell->bad = bad > 0;
     bt_sum_add(&t->sum[BT_LOOK_SQUARES], bt_min(squares * p->per_square, 0x1p45));
     bt_sum_add(&t->sum[BT_LOOK_ROWS], (double)rows);
-    bt_sum_add(&t->sum[BT_LOOK_UNITS], tile->n_units);
-    bt_sum_add(&t->sum[BT_LOOK_LISTED], tile->n_list);
+    bt_sum_add(&t->sum[BT_LOOK_CONTACTS], cell->n_contacts);
+    bt_sum_add(&t->sum[BT_LOOK_LISTED], cell->n_list);
     bt_sum_add(&t->sum[BT_LOOK_BAD], (double)bad);
 }
 
-/// The bodies of the tile of body i may be moved.
-static void mark_tile_of(bt_world *w, bt_idx i)
+/// The bodies of the cell of body i may be moved.
+static void mark_cell_of(bt_world *w, bt_idx i)
 {
-    const int32_t *at = w->bodies.tile[i];
-    if (!w->bodies.large[i]) w->tiles->tile[bt_tiles_at(w->tiles, at[0], at[1])].swept = true;
+    const int32_t *at = w->bodies.cell[i];
+    if (!w->bodies.large[i]) w->cells->cell[bt_cells_at(w->cells, at[0], at[1])].swept = true;
 }
 
-/// Bodies of the block of tile (x, y) may be moved.
-static void mark_block(bt_tiles *t, int32_t x, int32_t y, double listed)
+/// Bodies of the block of cell (x, y) may be moved.
+static void mark_block(bt_cells *t, int32_t x, int32_t y, double listed)
 {
     for (int j = 0; listed > 0 && j < 4; j++) {
-        const bt_idx k = bt_tiles_at(t, x + (j & 1), y + (j >> 1));
-        if (k >= 0) t->tile[k].swept = true;
+        const bt_idx k = bt_cells_at(t, x + (j & 1), y + (j >> 1));
+        if (k >= 0) t->cell[k].swept = true;
     }
 }
 
-/// Tell the value of each tile that has work, 1 or 0, to `take`, which spreads it to the tiles around; on all ranks. Collective.
-static void spread(bt_world *w, double (*value_of)(const bt_tile *tile), bt_take_tile *take)
+/// Tell the value of each cell that has work, 1 or 0, to `take`, which spreads it to the cells around; on all ranks.
+/// Collective.
+static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take_cell *take)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     double *value = w->domain ? bt_alloc((size_t)t->n, sizeof *value) : NULL;
     for (bt_idx i = 0; i < t->n_order; i++) {
         const bt_idx k = t->order[i];
-        const double x = value_of(&t->tile[k]);
+        const double x = value_of(&t->cell[k]);
         if (value) value[k] = x;
-        if (k < t->n - 1) take(t, t->tile[k].x, t->tile[k].y, x);
+        if (k < t->n - 1) take(t, t->cell[k].x, t->cell[k].y, x);
     }
-    if (value) bt_domain_tell_tiles(w, value, take);
+    if (value) bt_domain_tell_cells(w, value, take);
     free(value);
 }
 
-static double has_list(const bt_tile *tile) { return tile->n_list > 0; }
-static double is_bad(const bt_tile *tile) { return tile->bad; }
+static double has_list(const bt_cell *cell) { return cell->n_list > 0; }
+static double is_bad(const bt_cell *cell) { return cell->bad; }
 
-/// Mark the tiles whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body always. Exactly
-/// these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the marks must not depend on ranks. Collective.
+/// Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body
+/// always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the
+/// marks must not depend on ranks. Collective.
 static void mark_swept(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_idx last = t->n - 1;
-    const bt_tile *large = &t->tile[last];
+    const bt_cell *large = &t->cell[last];
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
         if (k == last) continue;
-        t->tile[k].still = !t->tile[k].swept;
-        t->tile[k].swept = false;
+        t->cell[k].still = !t->cell[k].swept;
+        t->cell[k].swept = false;
     }
     spread(w, has_list, mark_block);
-    t->tile[last].swept = large->own;
-    for (bt_idx j = 0; large->own && j < large->n_units; j++) {
-        mark_tile_of(w, large->units[j].a);
-        mark_tile_of(w, large->units[j].b);
+    t->cell[last].swept = large->own;
+    for (bt_idx j = 0; large->own && j < large->n_contacts; j++) {
+        mark_cell_of(w, large->contacts[j].a);
+        mark_cell_of(w, large->contacts[j].b);
     }
-    bt_domain_beside_large(w, mark_tile_of);
+    bt_domain_beside_large(w, mark_cell_of);
 }
 
 static void lists_are_new(bt_world *w)
@@ -123,33 +125,35 @@ void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work
     work->residual = t.most;
     work->squares = bt_sum_value(&t.sum[BT_LOOK_SQUARES]) / p->per_square;
     work->rows = (int64_t)bt_sum_value(&t.sum[BT_LOOK_ROWS]);
-    work->units = (int64_t)bt_sum_value(&t.sum[BT_LOOK_UNITS]);
+    work->contacts = (int64_t)bt_sum_value(&t.sum[BT_LOOK_CONTACTS]);
     work->listed = (int64_t)bt_sum_value(&t.sum[BT_LOOK_LISTED]);
     work->bad = (int64_t)bt_sum_value(&t.sum[BT_LOOK_BAD]);
-    work->looks += (settle && p->settle ? 2 : 1) * work->units;
+    work->looks += (settle && p->settle ? 2 : 1) * work->contacts;
     lists_are_new(w);
 }
 
-// --- rounds over a part of the field -------------------------------------------------------------------------------------
+// --- rounds over a part of the field
+// -------------------------------------------------------------------------------------
 
-/// The tile at (x, y) is bad: its list and those beside it stay.
-static void keep_beside(bt_tiles *t, int32_t x, int32_t y, double bad)
+/// The cell at (x, y) is bad: its list and those beside it stay.
+static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
 {
     for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
         for (int32_t dx = -1; dx <= 1; dx++) {
-            const bt_idx k = bt_tiles_at(t, x + dx, y + dy);
-            if (k >= 0) t->tile[k].kept = true;
+            const bt_idx k = bt_cells_at(t, x + dx, y + dy);
+            if (k >= 0) t->cell[k].kept = true;
         }
 }
 
-/// Empty the lists of tiles that are neither bad nor beside one that is; the contacts of large bodies reach anywhere and stay. Collective.
+/// Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach anywhere
+/// and stay. Collective.
 static void keep_near_bad(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
-    for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].kept = t->order[i] == t->n - 1;
+    bt_cells *t = w->cells;
+    for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].kept = t->order[i] == t->n - 1;
     spread(w, is_bad, keep_beside);
     for (bt_idx i = 0; i < t->n_order; i++)
-        if (!t->tile[t->order[i]].kept) t->tile[t->order[i]].n_list = 0;
+        if (!t->cell[t->order[i]].kept) t->cell[t->order[i]].n_list = 0;
     lists_are_new(w);
 }
 
@@ -164,15 +168,16 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
 {
     (void)t;
     const body_move *m = context;
-    bt_tile *tile = &w->tiles->tile[k];
-    if (!tile->swept) return;
-    const double beta = tile->still ? 0 : m->beta;
-    tile->still = false;
-    for (bt_idx i = tile->first; i < tile->end; i++) {
+    bt_cell *cell = &w->cells->cell[k];
+    if (!cell->swept) return;
+    const double beta = cell->still ? 0 : m->beta;
+    cell->still = false;
+    for (bt_idx i = cell->first; i < cell->end; i++) {
         const bt_vel now = m->vel[i];
         if (beta > 0) {
             const bt_vel *before = &m->before[i];
-            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y), now.w + beta * (now.w - before->w), 0};
+            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y),
+                                 now.w + beta * (now.w - before->w), 0};
         }
         m->before[i] = now;
     }
@@ -202,7 +207,7 @@ double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work)
 static double spent(const bt_problem *p, const bt_work *k)
 {
     if (p->plain) return (double)k->sweeps;
-    return (double)(k->updates + k->looks) + (1 + LEAST_SWEEP * (double)k->units) * (double)k->sweeps;
+    return (double)(k->updates + k->looks) + (1 + LEAST_SWEEP * (double)k->contacts) * (double)k->sweeps;
 }
 
 typedef struct {
@@ -224,7 +229,8 @@ static void move_on(bt_world *w, const bt_problem *p, double cap, momentum *m)
 }
 
 /// With `on`, the momentum of the round before goes on. Returns true when the last update was small.
-static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m, bt_work *work)
+static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, bool on, double limit, momentum *m,
+                      bt_work *work)
 {
     const double small = p->plain ? p->tolerance : BT_NEAR * p->tolerance;
     if (!on) *m = (momentum){.theta = 1};
@@ -268,8 +274,9 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     }
     pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
     momentum m = {.theta = 1};
-    const double all_work = p->limit * (p->plain ? 1 : (double)(work->units + 1));
-    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work); // between them no momentum
+    const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
+    // between them no momentum
+    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {

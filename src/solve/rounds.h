@@ -1,50 +1,61 @@
 // SPDX-License-Identifier: MIT
-// Rounds of sweeps with momentum over the units that matter (private to the solver): one iteration for contacts and for the position projection.
+// Rounds of sweeps with momentum over the contacts that matter (private to the solver): one iteration for contacts and
+// for the position projection.
 //
-// Half and more of the units of a jam bear no load and open: their update changes nothing. So a look over all units finds the largest residual
-// and lists, tile by tile, the units that bear load or close; a round of sweeps goes over the lists only; then all units are looked at
-// again. What has opened leaves the lists then, what has closed meanwhile enters them.
+// Half and more of the contacts of a jam bear no load and open: their update changes nothing. So a look over all
+// contacts finds the largest residual and lists, cell by cell, the contacts that bear load or close; a round of sweeps
+// goes over the lists only; then all contacts are looked at again. What has opened leaves the lists then, what has
+// closed meanwhile enters them.
 //
-// Between two sweeps of a round everything is moved on along its last change (Nesterov 1983, Soviet Math. Dokl. 27; Beck & Teboulle 2009,
-// SIAM J. Imaging Sci. 2; for contacts Mazhar et al. 2015, ACM Trans. Graph. 34):
-//     x_{k+1} = sweep(y_k),   y_{k+1} = x_{k+1} + β (x_{k+1} − x_k),   β = min(cap, (θ_k − 1)/θ_{k+1}),   θ_{k+1} = (1 + √(1 + 4 θ_k²))/2
-// and where the sweep turned against the move, Σ W (y_k − x_{k+1}) (x_{k+1} − x_k) > 0, it starts anew with θ = 1, β = 0 (O'Donoghue & Candès 2015,
-// Found. Comput. Math. 15). Velocities are linear in the impulses: those of y are the same combination, so each body needs but its velocity before, no
-// impulse is applied again, and ghosts, which have the same velocities, are moved alike without a message.
+// Between two sweeps of a round everything is moved on along its last change (Nesterov 1983, Soviet Math. Dokl. 27;
+// Beck & Teboulle 2009, SIAM J. Imaging Sci. 2; for contacts Mazhar et al. 2015, ACM Trans. Graph. 34):
+//     x_{k+1} = sweep(y_k),   y_{k+1} = x_{k+1} + β (x_{k+1} − x_k),   β = min(cap, (θ_k − 1)/θ_{k+1}),   θ_{k+1} = (1
+//     + √(1 + 4 θ_k²))/2
+// and where the sweep turned against the move, Σ W (y_k − x_{k+1}) (x_{k+1} − x_k) > 0, it starts anew with θ = 1, β =
+// 0 (O'Donoghue & Candès 2015, Found. Comput. Math. 15). Velocities are linear in the impulses: those of y are the same
+// combination, so each body needs but its velocity before, no impulse is applied again, and ghosts, which have the same
+// velocities, are moved alike without a message.
 //
-// The momentum goes on from round to round: a unit that leaves or enters the lists, and a floe that they newly reach, is at rest then. It starts anew
-// where velocities have been formed from the impulses, and around a round over a part of the field.
+// The momentum goes on from round to round: a contact that leaves or enters the lists, and a floe that they newly
+// reach, is at rest then. It starts anew where velocities have been formed from the impulses, and around a round over a
+// part of the field.
 //
-// The problem is only piecewise smooth, and a Gauss–Seidel sweep is not a gradient step: with a fixed cap some jams run in circles (contacts that
-// open and close, stick and slip by turns). So the cap follows what it brings. Three rounds that take a fifth off the sum of squares bring it nearer
-// to 1, and make rounds longer; others take it half as far away again, down to none below 0.3. If that does not help either, three
-// rounds of 400 sweeps follow without a cap: chains of many floes, and heavy bodies that press on light ones, are not circling but
-// slow, and converge with β near 1 alone (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain ones need more than 500,000).
-// What has not converged within the limit of work gets a tenth of it more without momentum, which circles far from the solution where it does not converge.
+// The problem is only piecewise smooth, and a Gauss–Seidel sweep is not a gradient step: with a fixed cap some jams run
+// in circles (contacts that open and close, stick and slip by turns). So the cap follows what it brings. Three rounds
+// that take a fifth off the sum of squares bring it nearer to 1, and make rounds longer; others take it half as far
+// away again, down to none below 0.3. If that does not help either, three rounds of 400 sweeps follow without a cap:
+// chains of many floes, and heavy bodies that press on light ones, are not circling but slow, and converge with β near
+// 1 alone (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain ones need more than 500,000). What
+// has not converged within the limit of work gets a tenth of it more without momentum, which circles far from the
+// solution where it does not converge.
 //
-// When few units are left that are far from the tolerance, every second round is over the tiles about them alone.
+// When few contacts are left that are far from the tolerance, every second round is over the cells about them alone.
 //
-// The limit is one of work: updates of units and looks at them, and something for the sweep itself, so that sweeps over a few units end, too.
+// The limit is one of work: updates of contacts and looks at them, and something for the sweep itself, so that sweeps
+// over a few contacts end, too.
 //
-// Order-free decisions. Tiles form their parts of the sums in plain arithmetic, in the order of their units, which is the same everywhere; the parts
-// are added in 128-bit fixed point (bergtow/sum.h). So every decision is the same for any number of threads and ranks.
+// Order-free decisions. Cells form their parts of the sums in plain arithmetic, in the order of their contacts, which
+// is the same everywhere; the parts are added in 128-bit fixed point (bergtow/sum.h). So every decision is the same for
+// any number of threads and ranks.
 //
-// Rejected: Anderson acceleration around the sweep, over all units or the listed ones (0.6 to 1.8 times the time of the plain sweep in
-// dense ice; histories of 240 B a contact and 96 B a floe, against 72 a listed contact, 24 a contact and 32 a floe here); over-relaxation (1.3 helps without momentum and hurts with it);
-// momentum with a step of its own for each tile or unit; sweeps in alternating direction; proximal Newton steps over the listed units (M + Jᵀ D J of the
-// velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which a handful of contacts is left, but where a
-// wedge drives its impulses up over thousands of sweeps a Newton step takes as long as a hundred sweeps and the wedge needs as many steps as contacts
-// change their state. At equal work more steps missed the tolerance with them than without.
+// Rejected: Anderson acceleration around the sweep, over all contacts or the listed ones (0.6 to 1.8 times the time of
+// the plain sweep in dense ice; histories of 240 B a contact and 96 B a floe, against 72 a listed contact, 24 a contact
+// and 32 a floe here); over-relaxation (1.3 helps without momentum and hurts with it); momentum with a step of its own
+// for each cell or contact; sweeps in alternating direction; proximal Newton steps over the listed contacts (M + Jᵀ D J
+// of the velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which
+// a handful of contacts is left, but where a wedge drives its impulses up over thousands of sweeps a Newton step takes
+// as long as a hundred sweeps and the wedge needs as many steps as contacts change their state. At equal work more
+// steps missed the tolerance with them than without.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 
 #include <stdlib.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "space/phases.h"
 
 /// Totals of a look; the largest residual is `most`.
-enum { BT_LOOK_SQUARES, BT_LOOK_ROWS, BT_LOOK_UNITS, BT_LOOK_LISTED, BT_LOOK_BAD, BT_LOOK_N };
+enum { BT_LOOK_SQUARES, BT_LOOK_ROWS, BT_LOOK_CONTACTS, BT_LOOK_LISTED, BT_LOOK_BAD, BT_LOOK_N };
 /// Totals of a sweep; the largest update is `most`.
 enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
@@ -52,8 +63,8 @@ enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
 /// What is iterated.
 typedef struct bt_problem {
-    bt_visit *look;       ///< list the units of a tile (bt_rounds_list) and add up BT_LOOK_...; context: this
-    bt_visit *sweep;      ///< sweep the list of a tile, after its move; context: bt_sweep
+    bt_visit *look;       ///< list the contacts of a cell (bt_rounds_list) and add up BT_LOOK_...; context: this
+    bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
     void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
     double tolerance;     ///< of the residual
@@ -61,11 +72,11 @@ typedef struct bt_problem {
     double per_energy;    ///< and on products of moves
     double cap;           ///< of the momentum at the start
     int length;           ///< sweeps of a round at the start
-    double limit;         ///< of the work, in updates of every unit; of plain ones, in sweeps
-    bool plain;           ///< sweeps over all units, without momentum
+    double limit;         ///< of the work, in updates of every contact; of plain ones, in sweeps
+    bool plain;           ///< sweeps over all contacts, without momentum
 } bt_problem;
 
-/// A sweep, as the tiles see it.
+/// A sweep, as the cells see it.
 typedef struct bt_sweep {
     const bt_problem *problem;
     bool moves;           ///< keep what was before the sweep, and add up BT_SWEEP_AGAINST
@@ -75,55 +86,56 @@ typedef struct bt_sweep {
 /// Work done.
 typedef struct bt_work {
     int64_t sweeps;
-    int64_t updates;      ///< of units
-    int64_t moves;        ///< of units by momentum
-    int64_t looks;        ///< at units
+    int64_t updates;      ///< of contacts
+    int64_t moves;        ///< of contacts by momentum
+    int64_t looks;        ///< at contacts
     // what the last look has found
     double residual;      ///< largest
     double squares;       ///< sum over the rows
-    int64_t rows, units, listed, bad;
+    int64_t rows, contacts, listed, bad;
 } bt_work;
 
 /// Scales of the exact sums for a tolerance of the residual, and the largest mass, kg.
 void bt_rounds_scale(bt_problem *p, double heaviest);
 
-/// Room for the list of a tile: what a look calls before it lists.
-void bt_rounds_list(bt_tile *tile);
+/// Room for the list of a cell: what a look calls before it lists.
+void bt_rounds_list(bt_cell *cell);
 
-/// A look at all units, after a settling if so, and what it found, into *work. Collective.
+/// A look at all contacts, after a settling if so, and what it found, into *work. Collective.
 void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
 
 /// One sweep over the lists, without momentum; returns the largest update. Collective.
 double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// Rounds until the residual is within the tolerance, or the limit of work is reached; after a look that has found it not to be. Collective.
+/// Rounds until the residual is within the tolerance, or the limit of work is reached; after a look that has found it
+/// not to be. Collective.
 void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// What a look has found in a tile: squares of the residual and rows, units far from the tolerance.
-void bt_rounds_found(const bt_problem *p, bt_tile *tile, double squares, int64_t rows, int64_t bad, bt_totals *t);
+/// What a look has found in a cell: squares of the residual and rows, contacts far from the tolerance.
+void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t);
 
 enum { BT_MOVED_FEW = 192 };
-/// Unknowns of the listed units of a tile after their move.
+/// Unknowns of the listed contacts of a cell after their move.
 typedef struct bt_moved {
     double few[BT_MOVED_FEW][3];
     double (*y)[3];       ///< [n_list]
 } bt_moved;
 
-static inline void bt_moved_begin(bt_moved *m, const bt_tile *tile)
+static inline void bt_moved_begin(bt_moved *m, const bt_cell *cell)
 {
-    m->y = tile->n_list > BT_MOVED_FEW ? bt_alloc((size_t)tile->n_list, sizeof *m->y) : m->few;
+    m->y = cell->n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->n_list, sizeof *m->y) : m->few;
 }
 
-/// Into the totals of the sweep: what the tile turned against its move, J, and how many units were moved.
-static inline void bt_rounds_moved(const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+/// Into the totals of the sweep: what the cell turned against its move, J, and how many contacts were moved.
+static inline void bt_rounds_moved(const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)
 {
     bt_sum_add(&t->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * s->problem->per_energy)));
-    if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], tile->n_list);
+    if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], cell->n_list);
 }
 
-static inline void bt_moved_end(bt_moved *m, const bt_tile *tile, const bt_sweep *s, double against, bt_totals *t)
+static inline void bt_moved_end(bt_moved *m, const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)
 {
-    bt_rounds_moved(tile, s, against, t);
+    bt_rounds_moved(cell, s, against, t);
     if (m->y != m->few) free(m->y);
 }
 
@@ -139,6 +151,9 @@ static inline void bt_rounds_move(const bt_sweep *s, double *x, double *before, 
 }
 
 /// How far the sweep turned one unknown against its move: Σ W (y − x') (x' − x), J.
-static inline double bt_rounds_against(double weight, double x, double before, double y) { return weight * (y - x) * (x - before); }
+static inline double bt_rounds_against(double weight, double x, double before, double y)
+{
+    return weight * (y - x) * (x - before);
+}
 
 #endif

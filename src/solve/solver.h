@@ -3,37 +3,42 @@
 //
 //     w = J U2 + b,   M (U2 − U*) = Jᵀ λ,   0 ≤ λ_n ⟂ w_n ≥ 0,   |λ_t| ≤ μ λ_n, λ_t opposes slip       (1)–(3)
 //
-// A sweep updates units one after the other (a unit is a manifold: the normals of its two points are solved together, and their friction as
-// one), tile by tile in the order of tiles.h, with the velocities as they stand. Contacts with large movable bodies (the berg on a line has
-// hundreds) follow in sequence, and the tow line after them.
+// A sweep updates contacts one after the other (a contact is a manifold: the normals of its two points are solved
+// together, and their friction as one), cell by cell in the order of cells.h, with the velocities as they stand.
+// Contacts with large movable bodies (the berg on a line has hundreds) follow in sequence, and the tow line after them.
 //
-// Data flow of a step. units (bt_tile.units, with the impulses of the last step) and vel_free -> vel -> look -> lists -> sweeps -> vel, units:
-//   look     reads all units and vel; writes bt_tile.list (units that bear load or close), the residual, and what is bad;
-//   sweep    goes over the lists only, inner_sweeps times a tile before the next has its turn: its data are then in the first-level cache, and
-//            between ranks nothing need be exchanged. The listed units are packed for it, four a batch, and their impulses put back
-//            before the next look (src/solve/batch.h); those of large bodies and with bounds are swept where they are;
+// Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel -> look ->
+//   lists -> sweeps -> vel, contacts:
+//   look     reads all contacts and vel; writes bt_cell.list (contacts that bear load or close), the residual, and what
+//   is bad;
+//   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
+//            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
+//            four a batch, and their impulses put back before the next look (src/solve/batch.h); those of large bodies
+//            and with bounds are swept where they are;
 //   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
 //   settle   at the end: vel anew from vel_free and the impulses, then a look: the residual that is reported.
-// Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the same, with displacements in
-// place of velocities.
+// Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the
+// same, with displacements in place of velocities.
 //
-// Why momentum: a plain sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and ~m_berg/m_floe where a heavy
-// berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over all units, as the reference; both end
-// on a projected sweep, with velocities formed anew from the impulses, and the same criterion.
+// Why momentum: a plain sweep needs ~n² sweeps on a chain of n floes (more where friction makes it bend) and
+// ~m_berg/m_floe where a heavy berg squeezes light floes against a wall. `plain_sweeps` keeps the plain iteration, over
+// all contacts, as the reference; both end on a projected sweep, with velocities formed anew from the impulses, and the
+// same criterion.
 //
-// Where a contact law applies (contact/law.h) the normal impulses have an upper bound, too, λ_n <= L(w_n) (src/solve/limit.h), and in the natural map
-// the projection is on [0, L].
+// Where a contact law applies (contact/law.h) the normal impulses have an upper bound, too, λ_n <= L(w_n)
+// (src/solve/limit.h), and in the natural map the projection is on [0, L].
 //
 // Convergence is judged on the natural map of (1): the largest of
 //     |λ_n − max(0, λ_n − w_n/W_nn)| W_nn   and   |λ_t − proj_[−μλ_n, μλ_n](λ_t − w_t/W_tt)| W_tt,   m/s
 // which is zero exactly at a solution. The sweep's own largest update is the same quantity seen while velocities
-// still change; it only says when the true map is worth its price. Its root mean square over all rows is reported beside it.
+// still change; it only says when the true map is worth its price. Its root mean square over all rows is reported
+// beside it.
 #ifndef BERGTOW_SOLVER_H
 #define BERGTOW_SOLVER_H
 
 #include "contact/contacts.h"
 #include "contact/work.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "bergtow/world.h"
 
@@ -53,7 +58,7 @@ bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
 /// Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
-/// U2, units and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// U2, contacts and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive.
@@ -63,7 +68,8 @@ void bt_solver_solve(bt_world *w);
 /// rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *w);
 
-/// Natural-map residual at the present velocities and impulses: largest, and root mean square (or NULL), m/s. Collective.
+/// Natural-map residual at the present velocities and impulses: largest, and root mean square (or NULL), m/s.
+/// Collective.
 double bt_solver_residual(bt_world *w, double *rms);
 
 /// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.

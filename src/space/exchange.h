@@ -1,27 +1,27 @@
 // SPDX-License-Identifier: MIT
 // What space asks of the division among ranks: a table of operations that partition/ fills in when a world is divided.
 //
-// Space is below the division: it knows that some tiles and bodies may be elsewhere, and not how they get there. On one
+// Space is below the division: it knows that some cells and bodies may be elsewhere, and not how they get there. On one
 // rank there is no table (w->exchange == NULL), and nothing to ask.
 #ifndef BERGTOW_EXCHANGE_H
 #define BERGTOW_EXCHANGE_H
 
-#include "space/tiles.h"
+#include "space/cells.h"
 
 typedef struct bt_exchange {
     /// Maxima of x [n] over the ranks. Collective.
     void (*maxima)(const bt_world *w, double *x, int n);
-    /// Does this rank answer for the contacts of tile (x, y); for those of the large movable bodies?
-    bool (*owns_tile)(const bt_world *w, int32_t x, int32_t y);
+    /// Does this rank answer for the contacts of cell (x, y); for those of the large movable bodies?
+    bool (*owns_cell)(const bt_world *w, int32_t x, int32_t y);
     bool (*owns_large)(const bt_world *w);
     /// Is a new division due?
     bool (*due)(const bt_world *w);
     /// After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong now.
     /// Takes and returns the memory. Collective.
-    bt_trace *(*migrate)(bt_world *w, bt_trace *trace, int64_t *n);
-    /// After the tiles have been made: what is exchanged with whom. Collective.
+    bt_memory *(*migrate)(bt_world *w, bt_memory *trace, int64_t *n);
+    /// After the cells have been made: what is exchanged with whom. Collective.
     void (*connect)(bt_world *w);
-    /// After a phase: send what its border tiles changed in v (an array over the bodies), and receive what others did.
+    /// After a phase: send what its border cells changed in v (an array over the bodies), and receive what others did.
     void (*send)(bt_world *w, int phase, bt_vel *v);
     void (*receive)(bt_world *w, int phase, bt_vel *v);
 } bt_exchange;

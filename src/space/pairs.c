@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Broad phase: the list of a tile's pairs near enough to be looked at, kept over many steps.
+// Broad phase: the list of a cell's pairs near enough to be looked at, kept over many steps.
 //
-// Boxes of the bodies of the tile's block are compared all with all; a tile has some dozens, and comparing boxes that lie in a row in
-// memory is quicker than any finer grid. The list holds while no body of the block has travelled (path of its fastest point) farther than
-// its share of the clearance; then it is made anew. A large body that cannot be moved (a wall, a berg at a set speed) pairs with the
-// floes of the tile itself; one that can be moved has its pairs in the last tile.
+// Boxes of the bodies of the cell's block are compared all with all; a cell has some dozens, and comparing boxes that
+// lie in a row in memory is quicker than any finer grid. The list holds while no body of the block has travelled (path
+// of its fastest point) farther than its share of the clearance; then it is made anew. A large body that cannot be
+// moved (a wall, a berg at a set speed) pairs with the floes of the cell itself; one that can be moved has its pairs in
+// the last cell.
 //
-// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so far towards each
-// other, a step looks at these near ones alone.
+// Few pairs of a list are nearer than a twentieth of a floe beyond the margin. Until bodies of the block have moved so
+// far towards each other, a step looks at these near ones alone.
 #include "space/pairs.h"
 
 #include <math.h>
@@ -42,10 +43,14 @@ static void box_of_part(const bt_bodies *b, bt_idx i, int part, int n, double bo
     }
 }
 
-static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX]) { box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box); }
+static void box_of(const bt_bodies *b, bt_idx i, double box[N_BOX])
+{
+    box_of_part(b, i, 0, (int)(b->offset[i + 1] - b->offset[i]), box);
+}
 
-/// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the nearest image
-/// of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole period.
+/// Do two boxes come within clearance? With periodic images a long wall can reach round: its box is compared at the
+/// nearest image of the centroids, which holds for bodies shorter than half a period, and for walls that span the whole
+/// period.
 static inline bool near(const bt_params *p, const double *a, const double *b, double clearance)
 {
     const double dx = bt_nearest_image(b[X] - a[X], p->period_x), dy = bt_nearest_image(b[Y] - a[Y], p->period_y);
@@ -55,8 +60,10 @@ static inline bool near(const bt_params *p, const double *a, const double *b, do
 
 static void append_parts(bt_pair_scratch *s, size_t *n, bt_idx a, bt_idx b, int part_a, int part_b)
 {
-    if (*n == s->cap_found) s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
-    s->found[(*n)++] = (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
+    if (*n == s->cap_found)
+        s->found = bt_realloc(s->found, s->cap_found = s->cap_found ? 2 * s->cap_found : 256, sizeof *s->found);
+    s->found[(*n)++] =
+        (bt_pair){.a = a, .b = b, .part = {(uint16_t)part_a, (uint16_t)part_b}, .axis = -1, .reach = -INFINITY};
 }
 
 /// Bodies i and j, whose boxes come within clearance; where one of them is not convex, those of its parts that do.
@@ -82,11 +89,11 @@ static void append(const bt_world *w, bt_pair_scratch *s, size_t *n, bt_idx i, b
     }
 }
 
-/// Boxes of the bodies of tile k, after those there are; returns their number then.
+/// Boxes of the bodies of cell k, after those there are; returns their number then.
 static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t n)
 {
     if (k < 0) return n;
-    const bt_tile *t = &w->tiles->tile[k];
+    const bt_cell *t = &w->cells->cell[k];
     const size_t most = n + (size_t)(t->end - t->first);
     if (most > s->cap_boxes) {
         s->cap_boxes = 2 * most;
@@ -100,66 +107,74 @@ static size_t add_boxes(const bt_world *w, bt_idx k, bt_pair_scratch *s, size_t 
     return n;
 }
 
-static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, size_t j0, size_t j1, double clearance, size_t *n)
+static void among(const bt_world *w, bt_pair_scratch *s, size_t i0, size_t i1, size_t j0, size_t j1, double clearance,
+                  size_t *n)
 {
     for (size_t i = i0; i < i1; i++)
         for (size_t j = j0 == i0 ? i + 1 : j0; j < j1; j++)
-            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance)) append(w, s, n, s->body[i], s->body[j], clearance);
+            if (near(&w->par, s->box + N_BOX * i, s->box + N_BOX * j, clearance))
+                append(w, s, n, s->body[i], s->body[j], clearance);
 }
 
-static size_t pairs_of_block(const bt_world *w, const bt_tile *t, bt_idx k, double clearance, double clearance_large, bt_pair_scratch *s)
+static size_t pairs_of_block(const bt_world *w, const bt_cell *t, bt_idx k, double clearance, double clearance_large,
+                             bt_pair_scratch *s)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
-    const size_t own = add_boxes(w, k, s, 0), right = add_boxes(w, t->right, s, own), above = add_boxes(w, t->above, s, right),
-                 diagonal = add_boxes(w, t->diagonal, s, above);
+    const size_t own = add_boxes(w, k, s, 0), right = add_boxes(w, t->right, s, own),
+                 above = add_boxes(w, t->above, s, right), diagonal = add_boxes(w, t->diagonal, s, above);
     among(w, s, 0, own, 0, own, clearance, &n);
     among(w, s, 0, own, own, diagonal, clearance, &n);
     among(w, s, own, right, right, above, clearance, &n);
-    for (bt_idx l = ts->n_tiled; l < b->n; l++) {
+    for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
         if (b->motion[l] == BT_DYNAMIC) continue;
         double box[N_BOX];
         box_of(b, l, box);
         for (size_t i = 0; i < own; i++)
-            if (near(&w->par, box, s->box + N_BOX * i, clearance_large)) append(w, s, &n, l, s->body[i], clearance_large);
+            if (near(&w->par, box, s->box + N_BOX * i, clearance_large))
+                append(w, s, &n, l, s->body[i], clearance_large);
     }
     return n;
 }
 
-/// Row or column of tiles at a distance from their corner, m; a body may be farther off than tiles can be counted.
+/// Row or column of cells at a distance from their corner, m; a body may be farther off than cells can be counted.
 static int32_t line_at(double distance, double side)
 {
     const double fence = 1e9;
     return (int32_t)bt_max(-fence, bt_min(fence, floor(distance / side)));
 }
 
-bt_tile_range bt_pairs_range(const bt_world *w, bt_idx i, double pad)
+bt_cell_range bt_pairs_range(const bt_world *w, bt_idx i, double pad)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     double box[N_BOX];
     box_of(&w->bodies, i, box);
     const double x = box[X] - t->x0, y = box[Y] - t->y0;
-    bt_tile_range r = {
+    bt_cell_range r = {
         .x0 = line_at(x + box[LOW_X] - pad, t->side_x), .x1 = line_at(x + box[HIGH_X] + pad, t->side_x),
         .y0 = line_at(y + box[LOW_Y] - pad, t->side_y), .y1 = line_at(y + box[HIGH_Y] + pad, t->side_y),
     };
-    // Within the tiles there are, and each of them once.
+    // Within the cells there are, and each of them once.
     if (t->wrap_x && r.x1 - r.x0 >= t->wrap_x - 1) r.x0 = 0, r.x1 = t->wrap_x - 1;
     if (t->wrap_y && r.y1 - r.y0 >= t->wrap_y - 1) r.y0 = 0, r.y1 = t->wrap_y - 1;
     if (t->wrap_x == 1) r.x0 = r.x1 = 0;
     if (t->wrap_y == 1) r.y0 = r.y1 = 0;
-    if (!t->wrap_x) r.x0 = r.x0 > t->low_x - 2 ? r.x0 : t->low_x - 2, r.x1 = r.x1 < t->low_x + t->n_x + 1 ? r.x1 : t->low_x + t->n_x + 1;
-    if (!t->wrap_y) r.y0 = r.y0 > t->low_y - 2 ? r.y0 : t->low_y - 2, r.y1 = r.y1 < t->low_y + t->n_y + 1 ? r.y1 : t->low_y + t->n_y + 1;
+    if (!t->wrap_x)
+        r.x0 = r.x0 > t->low_x - 2 ? r.x0 : t->low_x - 2,
+        r.x1 = r.x1 < t->low_x + t->n_x + 1 ? r.x1 : t->low_x + t->n_x + 1;
+    if (!t->wrap_y)
+        r.y0 = r.y0 > t->low_y - 2 ? r.y0 : t->low_y - 2,
+        r.y1 = r.y1 < t->low_y + t->n_y + 1 ? r.y1 : t->low_y + t->n_y + 1;
     return r;
 }
 
 static size_t pairs_of_large(const bt_world *w, double clearance_small, double clearance_large, bt_pair_scratch *s)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_bodies *b = &w->bodies;
     size_t n = 0;
-    for (bt_idx l = ts->n_tiled; l < b->n; l++) {
+    for (bt_idx l = ts->n_in_cells; l < b->n; l++) {
         double box[N_BOX];
         box_of(b, l, box);
         for (bt_idx o = l + 1; o < b->n; o++) {
@@ -168,14 +183,15 @@ static size_t pairs_of_large(const bt_world *w, double clearance_small, double c
             if (near(&w->par, box, other, clearance_large)) append(w, s, &n, l, o, clearance_large);
         }
         if (b->motion[l] != BT_DYNAMIC) continue;
-        const bt_tile_range r = bt_pairs_range(w, l, clearance_small + ts->reach + ts->allowance);
+        const bt_cell_range r = bt_pairs_range(w, l, clearance_small + ts->reach + ts->allowance);
         for (int32_t y = r.y0; y <= r.y1; y++)
             for (int32_t x = r.x0; x <= r.x1; x++) {
-                const bt_idx k = bt_tiles_at(ts, x, y);
+                const bt_idx k = bt_cells_at(ts, x, y);
                 if (k < 0) continue;
                 const size_t end = add_boxes(w, k, s, 0);
                 for (size_t i = 0; i < end; i++)
-                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small)) append(w, s, &n, l, s->body[i], clearance_small);
+                    if (near(&w->par, box, s->box + N_BOX * i, clearance_small))
+                        append(w, s, &n, l, s->body[i], clearance_small);
             }
     }
     return n;
@@ -192,7 +208,7 @@ static int by_gids(const void *p, const void *q, void *gids)
 }
 
 /// What the old list knew of the pairs that stay: both lists are sorted, one walk matches them.
-static void replace(bt_world *w, bt_tile *t, bt_pair_scratch *s, size_t n)
+static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
 {
     bt_gid *gid = w->bodies.gid;
     if (n > 0) qsort_r(s->found, n, sizeof *s->found, by_gids, gid);
@@ -210,10 +226,10 @@ static void replace(bt_world *w, bt_tile *t, bt_pair_scratch *s, size_t n)
     t->n_pairs = (bt_idx)n;
 }
 
-/// What moves the bodies of the pairs of tile k, m: of its four tiles, or of any for the last one; and large bodies.
-static void paths_of(const bt_world *w, bt_idx k, const bt_tile *t, double moved[4], double *large)
+/// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.
+static void paths_of(const bt_world *w, bt_idx k, const bt_cell *t, double moved[4], double *large)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bool last = k == ts->n - 1;
     const bt_idx block[4] = {k, t->right, t->above, t->diagonal};
     for (int i = 0; i < 4; i++) moved[i] = last ? ts->moved_any : block[i] >= 0 ? ts->moved[block[i]] : 0;
@@ -222,7 +238,7 @@ static void paths_of(const bt_world *w, bt_idx k, const bt_tile *t, double moved
 
 double bt_pairs_near_gap(const bt_world *w) { return 0.05 * w->par.size; }
 
-bool bt_pairs_near(const bt_world *w, bt_idx k, bt_tile *t, double margin)
+bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin)
 {
     double moved[4], large, most;
     paths_of(w, k, t, moved, &large);
@@ -238,7 +254,7 @@ bool bt_pairs_near(const bt_world *w, bt_idx k, bt_tile *t, double margin)
     return false;
 }
 
-void bt_pairs_add_near(bt_tile *t, bt_idx i)
+void bt_pairs_add_near(bt_cell *t, bt_idx i)
 {
     if (t->n_near == t->cap_near) {
         t->cap_near = t->cap_near ? 2 * t->cap_near : 16;
@@ -247,9 +263,9 @@ void bt_pairs_add_near(bt_tile *t, bt_idx i)
     t->near[t->n_near++] = i;
 }
 
-void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s)
+void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_scratch *s)
 {
-    bt_tiles *ts = w->tiles;
+    bt_cells *ts = w->cells;
     const bool last = k == ts->n - 1;
     const double skin = 0.2 * w->par.size, skin_large = w->par.size;
     double moved[4], large_moved;
@@ -258,7 +274,8 @@ void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_s
     for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->moved_listed[i] > 0.5 * skin;
     if (!stale) return;
     const double large = margin + 0.5 * skin + 0.5 * skin_large;
-    const size_t n = last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
+    const size_t n =
+        last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
     replace(w, t, s, n);
     t->listed = true;
     t->margin_listed = margin;

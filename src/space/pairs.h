@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// The pair list of one tile (private to the detection).
+// The pair list of one cell (private to the detection).
 #ifndef BERGTOW_PAIRS_H
 #define BERGTOW_PAIRS_H
 
-#include "space/tiles.h"
+#include "space/cells.h"
 
 /// Room that one thread works in.
 typedef struct bt_pair_scratch {
@@ -14,19 +14,20 @@ typedef struct bt_pair_scratch {
     size_t cap_found;
 } bt_pair_scratch;
 
-/// Make the list of tile k, kept in t, anew unless it holds for this margin.
-void bt_pairs_update(bt_world *w, bt_idx k, bt_tile *t, double margin, bt_pair_scratch *s);
+/// Make the list of cell k, kept in t, anew unless it holds for this margin.
+void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_scratch *s);
 
-/// Do the near pairs of tile k hold for this margin? If not, they are to be found anew: clears them, and keeps what has moved by now.
-bool bt_pairs_near(const bt_world *w, bt_idx k, bt_tile *t, double margin);
+/// Do the near pairs of cell k hold for this margin? If not, they are to be found anew: clears them, and keeps what has
+/// moved by now.
+bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin);
 /// Pair i is near when it has less than this between its bodies beyond the margin, m.
 double bt_pairs_near_gap(const bt_world *w);
-void bt_pairs_add_near(bt_tile *t, bt_idx i);
+void bt_pairs_add_near(bt_cell *t, bt_idx i);
 
 void bt_pair_scratch_free(bt_pair_scratch *s);
 
-/// Tiles (unwrapped coordinates) that the box of body i covers, widened by pad, m.
-typedef struct bt_tile_range { int32_t x0, x1, y0, y1; } bt_tile_range;
-bt_tile_range bt_pairs_range(const bt_world *w, bt_idx i, double pad);
+/// Cells (unwrapped coordinates) that the box of body i covers, widened by pad, m.
+typedef struct bt_cell_range { int32_t x0, x1, y0, y1; } bt_cell_range;
+bt_cell_range bt_pairs_range(const bt_world *w, bt_idx i, double pad);
 
 #endif

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Passes over the active tiles by threads, with the exchange between ranks under way.
+// Passes over the active cells by threads, with the exchange between ranks under way.
 #include "space/phases.h"
 
 #include <omp.h>
@@ -18,23 +18,24 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from)
 
 // --- who does what ---------------------------------------------------------------------------------------------------
 
-/// Has this rank work in tile k?
+/// Has this rank work in cell k?
 static bool has_work(const bt_world *w, bt_idx k)
 {
-    const bt_tiles *t = w->tiles;
-    return t->tile[k].own && (t->tile[k].n_units > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
+    const bt_cells *t = w->cells;
+    return t->cell[k].own && (t->cell[k].n_contacts > 0 || (k == t->n - 1 && bt_tow_has_line(w->tow)));
 }
 
-/// Stretches of tiles [begin, end) of the order with equal parts of the listed units, one a share. A tile itself costs something, too.
-static void deal_stretch(bt_tiles *t, bt_idx begin, bt_idx end, bt_share *share)
+/// Stretches of cells [begin, end) of the order with equal parts of the listed contacts, one a share. A cell itself
+/// costs something, too.
+static void deal_stretch(bt_cells *t, bt_idx begin, bt_idx end, bt_share *share)
 {
-    enum { TILE = 4 }; // units
+    enum { CELL = 4 }; // contacts
     int64_t all = 0, before = 0;
-    for (bt_idx i = begin; i < end; i++) all += TILE + t->tile[t->order[i]].n_list;
+    for (bt_idx i = begin; i < end; i++) all += CELL + t->cell[t->order[i]].n_list;
     bt_idx i = begin;
     for (bt_idx s = 0; s < t->n_shares; s++) {
         share[s].begin = i;
-        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += TILE + t->tile[t->order[i]].n_list;
+        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += CELL + t->cell[t->order[i]].n_list;
         share[s].end = i;
     }
     share[t->n_shares - 1].end = end;
@@ -42,10 +43,10 @@ static void deal_stretch(bt_tiles *t, bt_idx begin, bt_idx end, bt_share *share)
 
 void bt_phases_deal(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     int64_t listed = 0;
-    for (bt_idx i = 0; i < t->n_order; i++) listed += t->tile[t->order[i]].n_list;
-    const bt_idx n = BT_MANY(listed, BT_FEW_UNITS) ? omp_get_max_threads() : 1;
+    for (bt_idx i = 0; i < t->n_order; i++) listed += t->cell[t->order[i]].n_list;
+    const bt_idx n = BT_MANY(listed, BT_FEW_CONTACTS) ? omp_get_max_threads() : 1;
     if (n > t->cap_shares) {
         free(t->share);
         t->share = bt_alloc_aligned(BT_STRETCHES * (size_t)n, sizeof *t->share);
@@ -59,18 +60,18 @@ void bt_phases_deal(bt_world *w)
     }
 }
 
-/// Stretch of the order that tile k belongs to: of each phase first the tiles at the border of the rank.
+/// Stretch of the order that cell k belongs to: of each phase first the cells at the border of the rank.
 static int stretch_of(const bt_world *w, bt_idx k)
 {
-    const bt_tile *tile = &w->tiles->tile[k];
-    return 2 * tile->phase + !(w->exchange && tile->border);
+    const bt_cell *cell = &w->cells->cell[k];
+    return 2 * cell->phase + !(w->exchange && cell->border);
 }
 
 void bt_phases_order(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     bt_idx at[BT_STRETCHES + 1] = {0};
-    t->n_units = 0;
+    t->n_contacts = 0;
     for (bt_idx j = 0; j < t->n_busy; j++) at[stretch_of(w, t->busy[j]) + 1] += has_work(w, t->busy[j]);
     for (int s = 0; s < BT_STRETCHES; s++) at[s + 1] += at[s];
     for (int p = 0; p < BT_PHASES; p++) {
@@ -82,8 +83,8 @@ void bt_phases_order(bt_world *w)
         const bt_idx k = t->busy[j];
         if (!has_work(w, k)) continue;
         t->order[at[stretch_of(w, k)]++] = k;
-        t->n_units += t->tile[k].n_units;
-        t->tile[k].n_list = t->tile[k].n_units; // until they are listed
+        t->n_contacts += t->cell[k].n_contacts;
+        t->cell[k].n_list = t->cell[k].n_contacts; // until they are listed
     }
     bt_phases_deal(w);
 }
@@ -98,15 +99,17 @@ typedef struct {
     bt_totals own;
 } pass;
 
-static void open_shares(bt_tiles *t)
+static void open_shares(bt_cells *t)
 {
-    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++) atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
+    for (bt_idx s = 0; s < BT_STRETCHES * t->n_shares; s++)
+        atomic_store_explicit(&t->share[s].next, t->share[s].begin, memory_order_relaxed);
 }
 
-/// Tiles of one stretch of the order, which share no body: first those of this thread's share, then what others have not yet taken.
+/// Cells of one stretch of the order, which share no body: first those of this thread's share, then what others have
+/// not yet taken.
 static void visit_stretch(pass *o, int stretch)
 {
-    bt_tiles *t = o->w->tiles;
+    bt_cells *t = o->w->cells;
     bt_share *share = &t->share[stretch * t->n_shares];
     const bt_idx me = omp_get_thread_num();
     for (bt_idx n = 0; n < t->n_shares; n++) {
@@ -124,7 +127,7 @@ static void run_phases(pass *o, bt_vel *exchanged)
 {
     bt_world *w = o->w;
     const bool among = w->exchange != NULL;
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     for (int p = 0; p < BT_PHASES; p++) {
         if (among) {
             visit_stretch(o, 2 * p);
@@ -146,8 +149,8 @@ static void run_phases(pass *o, bt_vel *exchanged)
 
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
 {
-    open_shares(w->tiles);
-#pragma omp parallel num_threads(w->tiles->n_shares)
+    open_shares(w->cells);
+#pragma omp parallel num_threads(w->cells->n_shares)
     {
         pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
         run_phases(&o, exchanged);
@@ -158,8 +161,8 @@ void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *ex
 
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t)
 {
-    open_shares(w->tiles);
-#pragma omp parallel num_threads(w->tiles->n_shares)
+    open_shares(w->cells);
+#pragma omp parallel num_threads(w->cells->n_shares)
     {
         pass o = {.w = w, .visit = visit, .context = context, .own = {.n_sums = t->n_sums}};
         for (int s = 0; s < BT_STRETCHES; s++) visit_stretch(&o, s);
@@ -170,7 +173,7 @@ void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_t
 
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
 #pragma omp parallel for schedule(static) num_threads(ts->n_shares)
     for (bt_idx j = 0; j < ts->n_busy; j++) visit(w, ts->busy[j], context, NULL);
 }

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: MIT
-// One pass over the active tiles in the order of their phases (private to the solver).
+// One pass over the active cells in the order of their phases (private to the solver).
 //
-// What the result depends on is only this: of two tiles that share a body, the one of lower phase comes first (tiles.h), and a
-// pass ends before the next begins. So: all tiles of phase 0 at once, then all of phase 1, ..., with a barrier of the threads
-// after each. Each thread has a share of every phase, a stretch of neighbouring tiles with its part of the work, the same in
-// every pass, so that it finds in its caches what it left there; a thread that is done takes tiles from the others' shares.
-// Among ranks the tiles of a phase for which others wait come first, and their velocities travel while the rest is worked on.
+// What the result depends on is only this: of two cells that share a body, the one of lower phase comes first
+// (cells.h), and a pass ends before the next begins. So: all cells of phase 0 at once, then all of phase 1, ..., with a
+// barrier of the threads after each. Each thread has a share of every phase, a stretch of neighbouring cells with its
+// part of the work, the same in every pass, so that it finds in its caches what it left there; a thread that is done
+// takes cells from the others' shares. Among ranks the cells of a phase for which others wait come first, and their
+// velocities travel while the rest is worked on.
 //
 // Rejected: passes that follow each other through the field without barriers, so that what one has read from memory
-// serves the next. After every sweep there is a decision for the whole field (rounds.h), so that there is no next pass to go on with.
+// serves the next. After every sweep there is a decision for the whole field (rounds.h), so that there is no next pass
+// to go on with.
 #ifndef BERGTOW_PHASES_H
 #define BERGTOW_PHASES_H
 
@@ -17,10 +19,11 @@
 
 enum {
     BT_MAX_TOTALS = 12,
-    BT_FEW_UNITS = 700, ///< fewer units are swept faster by one thread: threads have to meet, which takes some microseconds
+    /// fewer contacts are swept faster by one thread: threads have to meet, which takes some microseconds
+    BT_FEW_CONTACTS = 700,
 };
 
-/// What a pass adds up over tiles, threads and ranks: exact sums, and one maximum.
+/// What a pass adds up over cells, threads and ranks: exact sums, and one maximum.
 typedef struct bt_totals {
     bt_sum sum[BT_MAX_TOTALS];
     int n_sums;
@@ -29,24 +32,26 @@ typedef struct bt_totals {
 
 void bt_totals_merge(bt_totals *into, const bt_totals *from);
 
-/// Work on one tile. Only the bodies of its block, its units and *t may be changed.
-typedef void bt_visit(bt_world *w, bt_idx tile, const void *context, bt_totals *t);
+/// Work on one cell. Only the bodies of its block, its contacts and *t may be changed.
+typedef void bt_visit(bt_world *w, bt_idx cell, const void *context, bt_totals *t);
 
-/// List the tiles of this rank with work in t->order, by phase, and deal them to threads. After the units have been made.
+/// List the cells of this rank with work in t->order, by phase, and deal them to threads. After the contacts have been
+/// made.
 void bt_phases_order(bt_world *w);
 
-/// Deal the tiles to threads by the units that are listed in them. No result depends on it.
+/// Deal the cells to threads by the contacts that are listed in them. No result depends on it.
 void bt_phases_deal(bt_world *w);
 
-/// Visit the tiles of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at once by threads and
-/// ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date on all ranks, while tiles that nobody
-/// waits for are still worked on. Collective.
+/// Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at
+/// once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date
+/// on all ranks, while cells that nobody waits for are still worked on. Collective.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
 
-/// Visit the tiles with work in any order, all at once.
+/// Visit the cells with work in any order, all at once.
 void bt_phases_any_order(bt_world *w, bt_visit *visit, const void *context, bt_totals *t);
 
-/// Visit all busy tiles, also those without contacts and of other ranks, for the sake of their bodies, in any order; no totals (NULL).
+/// Visit all busy cells, also those without contacts and of other ranks, for the sake of their bodies, in any order; no
+/// totals (NULL).
 void bt_phases_everywhere(bt_world *w, bt_visit *visit, const void *context);
 
 #endif

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 // One time step, equations (1)–(3) of Yulmetov & Løset 2017 in the order in which they are solved.
 #include <math.h>
+#include <string.h>
 
+#include "contact/work.h"
 #include "contact/contacts.h"
 #include "contact/law.h"
 #include "force/environment.h"
@@ -9,7 +11,7 @@
 #include "loads/impact.h"
 #include "solve/solver.h"
 #include "bergtow/sum.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
 #include "bergtow/world.h"
@@ -26,8 +28,8 @@ static double wrap(double x, double low, double period, int32_t *lap)
     return x;
 }
 
-/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there only for tiles
-/// that contacts may move: for others their array still holds what it held, maybe of other bodies.
+/// Move body i; returns the length of its path through the water's frame, m. Displacements of the projection are there
+/// only for cells that contacts may move: for others their array still holds what it held, maybe of other bodies.
 static double move(bt_world *w, bt_idx i, bool shifted)
 {
     bt_bodies *b = &w->bodies;
@@ -35,12 +37,12 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     const double dt = w->par.dt, drift_x = w->par.water_u, drift_y = w->par.water_v;
     double dx = dt * b->vel[i].x, dy = dt * b->vel[i].y, turn = dt * b->vel[i].w;
     double x = dt * (b->vel[i].x - drift_x), y = dt * (b->vel[i].y - drift_y);
-    b->stirred[i] = 0;
+    b->disturbed[i] = 0;
     if (shifted) {
         const bt_vel d = s->shift[i];
         dx += d.x, dy += d.y, turn += d.w;
         x += d.x, y += d.y;
-        b->stirred[i] = d.x != 0 || d.y != 0 || d.w != 0;
+        b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;
     }
     bt_pose *p = &b->pose[i];
     if (dx != 0 || dy != 0) {
@@ -52,7 +54,7 @@ static double move(bt_world *w, bt_idx i, bool shifted)
         p->yaw += turn;
         bt_bodies_turn(&w->bodies, i);
     }
-    if (w->tow && i >= w->tiles->n_tiled && i == bt_world_towed(w)) {
+    if (w->tow && i >= w->cells->n_in_cells && i == bt_world_towed(w)) {
         w->tow->travel_x += dx;
         w->tow->travel_y += dy;
     }
@@ -63,41 +65,44 @@ static double move(bt_world *w, bt_idx i, bool shifted)
     return path;
 }
 
-/// All bodies of tile k drift with the water, and nothing pushed them apart.
-static bool at_rest(const bt_world *w, const bt_tile *t)
+/// All bodies of cell k drift with the water, and nothing pushed them apart.
+static bool at_rest(const bt_world *w, const bt_cell *t)
 {
     const bt_bodies *b = &w->bodies;
     for (bt_idx i = t->first; i < t->end; i++)
-        if (b->stirred[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0) return false;
+        if (b->disturbed[i] || b->vel[i].x != w->par.water_u || b->vel[i].y != w->par.water_v || b->vel[i].w != 0)
+            return false;
     return true;
 }
 
 /// X2 = X1 + U2 Δt + D.
 static void advance(bt_world *w)
 {
-    bt_tiles *ts = w->tiles;
-    // Tiles move with the water where that is not periodic.
+    bt_cells *ts = w->cells;
+    // Cells move with the water where that is not periodic.
     bt_environment_advance(w);
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
+    const bool calm = bt_forces_rest(w);
     double farthest = 0, out = 0;
-#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+#pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
     for (bt_idx j = 0; j < ts->n_busy; j++) {
         const bt_idx k = ts->busy[j];
-        const bt_tile *t = &ts->tile[k];
-        const bool last = k == ts->n - 1, moves = last || bt_tiles_moves(ts, k);
+        const bt_cell *t = &ts->cell[k];
+        const bool last = k == ts->n - 1, moves = last || bt_cells_moves(ts, k);
         if (!moves && ts->still) continue;
         double path = 0;
         for (bt_idx i = t->first; i < t->end; i++) {
             const double way = move(w, i, w->solver->shifted && moves);
             path = bt_max(path, way);
-            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_tiles_outside(w, i)); // no farther than before
+            if (!last && (way > 0 || !ts->still)) out = bt_max(out, bt_cells_outside(w, i)); // no farther than before
         }
         ts->moved[k] += path;
         if (!last) farthest = bt_max(farthest, path);
         if (!moves || last) continue;
-        if (!ts->calm || !at_rest(w, t)) ts->rest[k] = BT_REST_NO;
-        else if (!ts->rest[k]) ts->rest[k] = BT_REST_NEW; // where forces have been told, they would find what they found
+        if (!calm || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
+        // where forces have been told, they would find what they found
+        else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
     }
     ts->moved_any += farthest;
     bt_domain_maxima(w, &out, 1);
@@ -108,11 +113,11 @@ static void advance(bt_world *w)
 enum { GAINED_X, GAINED_Y, APPLIED_X, APPLIED_Y, EXCHANGED, CARRIED, WORK, ENERGY, POINTS, ACTIVE, N_BALANCE };
 
 /// Momentum that bodies gained and impulses that came in from bodies of infinite mass, separately.
-static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
+static void balance_cell(bt_world *w, bt_idx k, bt_totals *t)
 {
     const bt_bodies *b = &w->bodies;
-    const bt_tile *tile = &w->tiles->tile[k];
-    for (bt_idx i = tile->first; i < tile->end; i++) {
+    const bt_cell *cell = &w->cells->cell[k];
+    for (bt_idx i = cell->first; i < cell->end; i++) {
         if (b->motion[i] != BT_DYNAMIC) continue;
         const bt_vel *v = &b->vel[i];
         const double dx = v->x - b->vel_free[i].x, dy = v->y - b->vel_free[i].y;
@@ -124,8 +129,8 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
         bt_sum_add(&t->sum[CARRIED], b->mass[i] * (fabs(v->x) + fabs(v->y)));
         bt_sum_add(&t->sum[ENERGY], 0.5 * (b->mass[i] * (v->x * v->x + v->y * v->y) + b->inertia[i] * v->w * v->w));
     }
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_unit *u = &tile->units[j];
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_contact *u = &cell->contacts[j];
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
         bt_sum_add(&t->sum[EXCHANGED], u->n > 0 ? normal : sqrt(normal * normal + u->lt * u->lt));
@@ -135,32 +140,32 @@ static void balance_tile(bt_world *w, bt_idx k, bt_totals *t)
         bt_sum_add(&t->sum[APPLIED_X], sign * (normal * u->nx - u->lt * u->ny));
         bt_sum_add(&t->sum[APPLIED_Y], sign * (normal * u->ny + u->lt * u->nx));
     }
-    bt_sum_add(&t->sum[POINTS], (double)tile->n_points);
-    t->most = bt_max(t->most, tile->overlap);
+    bt_sum_add(&t->sum[POINTS], (double)cell->n_points);
+    t->most = bt_max(t->most, cell->overlap);
 }
 
 /// Σ (M + Δt K) (U2 − U*) over dynamic bodies must equal the impulses that came in from bodies of infinite mass and the
 /// line; the difference over the momentum exchanged is the residual. Also work, energy, counts and overlap of the step.
 static void balance(bt_world *w)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     bt_step_stats *st = &w->stats;
     bt_totals all = {.n_sums = N_BALANCE};
-#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_TILES))
+#pragma omp parallel if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
     {
         bt_totals t = {.n_sums = N_BALANCE};
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx j = 0; j < ts->n_busy; j++) {
             const bt_idx k = ts->busy[j];
-            const bt_tile *tile = &ts->tile[k];
-            if (!tile->own) continue;
-            if (tile->active) bt_sum_add(&t.sum[ACTIVE], tile->end - tile->first);
-            if (k == ts->n - 1 || bt_tiles_moves(ts, k) || !ts->still) balance_tile(w, k, &t);
+            const bt_cell *cell = &ts->cell[k];
+            if (!cell->own) continue;
+            if (cell->active) bt_sum_add(&t.sum[ACTIVE], cell->end - cell->first);
+            if (k == ts->n - 1 || bt_cells_moves(ts, k) || !ts->still) balance_cell(w, k, &t);
         }
 #pragma omp critical
         bt_totals_merge(&all, &t);
     }
-    for (int k = 0; bt_tow_has_line(w->tow) && ts->tile[ts->n - 1].own && k < w->tow->n_branches; k++) {
+    for (int k = 0; bt_tow_has_line(w->tow) && ts->cell[ts->n - 1].own && k < w->tow->n_branches; k++) {
         const bt_branch *b = &w->tow->branch[k];
         bt_sum_add(&all.sum[APPLIED_X], b->lambda * b->lx);
         bt_sum_add(&all.sum[APPLIED_Y], b->lambda * b->ly);
@@ -199,7 +204,7 @@ static void solve_contacts(bt_world *w)
     bt_bodies *b = &w->bodies;
     double t0 = bt_clock();
     double fastest = bt_contacts_bound(w, b->vel_start, b->vel_free, false);
-    if (bt_tiles_update(w, bt_margin_for(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
+    if (bt_cells_update(w, bt_margin_for(w, fastest))) bt_contacts_bound(w, b->vel_start, b->vel_free, false);
     int64_t sweeps = 0, updates = 0, moves = 0;
     bool again = false;
     st->repeats = 0;
@@ -216,7 +221,7 @@ static void solve_contacts(bt_world *w)
         done = !st->outrun || !st->converged || st->repeats == MAX_REPEATS;
         if (!done) {
             st->repeats++;
-            again = !bt_tiles_update(w, bt_margin_for(w, fastest));
+            again = !bt_cells_update(w, bt_margin_for(w, fastest));
             if (!again) {
                 bt_contacts_bound(w, b->vel_start, b->vel_free, false);
                 bt_contacts_bound(w, b->vel, b->vel, true);
@@ -238,8 +243,10 @@ void bt_world_step(bt_world *w)
     double t0 = bt_clock();
     bt_environment_begin(w); // U_w, U_a
     bt_window_begin(w);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     clock_phase(w, &st->detect_s, &t0);
+    if (w->tow)
+        memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     clock_phase(w, &st->forces_s, &t0);
@@ -249,6 +256,7 @@ void bt_world_step(bt_world *w)
     bt_solver_project(w); // D
     balance(w);
     clock_phase(w, &st->solve_s, &t0);
+    bt_forces_record(w); // of the towed body, at X1
     bt_impacts_take(w); // of the towed body, at X1
     advance(w); // X2 = X1 + U2 Δt + D
     bt_window_advance(w);

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The moving window: what step/window.h says, step by step.
 //
-// Ranks. Which floes are due follows from their own state, so owners find them; the list of them, with the places they would take,
-// goes to all ranks, each of which tests the places against the bodies it owns. From there on everything is done alike by every
-// rank that holds a body, so copies stay copies; labels are renewed in the same step, which brings the floes to their new ranks.
+// Ranks. Which floes are due follows from their own state, so owners find them; the list of them, with the places they
+// would take, goes to all ranks, each of which tests the places against the bodies it owns. From there on everything is
+// done alike by every rank that holds a body, so copies stay copies; labels are renewed in the same step, which brings
+// the floes to their new ranks.
 #include "step/window.h"
 
 #include <math.h>
@@ -12,7 +13,7 @@
 
 #include "contact/contacts.h"
 #include "bergtow/forces.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "partition/domain.h"
 #include "geometry/apart.h"
@@ -30,7 +31,8 @@ typedef struct candidate {
     bool stays;
 } candidate;
 
-/// Mean floe: its drag as that of all floes together over their number. Mean width of a convex outline: perimeter / π (Cauchy).
+/// Mean floe: its drag as that of all floes together over their number, all of it in the skin's, since a floe that has
+/// no direction has a width of its own. Mean width of a convex outline: perimeter / π (Cauchy).
 static void mean_floe(const bt_world *w, bt_window *v)
 {
     const bt_bodies *b = &w->bodies;
@@ -42,15 +44,20 @@ static void mean_floe(const bt_world *w, bt_window *v)
         for (int64_t k = b->offset[i]; k < b->offset[i] + bt_body_corners(b, i); k++) perimeter += 1 / b->per_length[k];
         v->mass += b->mass[i];
         v->share += b->share[i] * b->mass[i];
-        v->water += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
-        v->air += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
+        v->inertia += b->inertia[i];
+        v->radius += b->radius[i];
+        v->area += b->area[i];
+        v->thickness += b->thickness[i];
+        v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
+        v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
         v->vel.x += b->vel[i].x;
         v->vel.y += b->vel[i].y;
         n++;
     }
     if (n == 0) return;
     v->share /= v->mass;
-    v->mass /= n, v->water /= n, v->air /= n;
+    v->mass /= n, v->drag.water_skin /= n, v->drag.air_skin /= n;
+    v->inertia /= n, v->radius /= n, v->area /= n, v->thickness /= n;
     v->vel.x /= n, v->vel.y /= n;
 }
 
@@ -111,7 +118,8 @@ static double into(double x, double low, double period, int32_t *turns)
     return x;
 }
 
-/// Place that floe i takes in the mother field around the period; *turns: periods that it lies from there without copies.
+/// Place that floe i takes in the mother field around the period; *turns: periods that it lies from there without
+/// copies.
 static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
 {
     const bt_window *v = w->window;
@@ -187,9 +195,13 @@ static candidate *find(candidate *list, size_t n, bt_gid gid)
     return n ? bsearch(&(candidate){.gid = gid}, list, n, sizeof *list, by_gid) : NULL;
 }
 
-/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as bt_part_first.
+/// First convex polygon of n vertices (the outline, or its first part), and the one after it, −1 = none: as
+/// bt_part_first.
 static int64_t first_polygon(const bt_mark *mark, int64_t n) { return mark[0].count < n ? mark[0].count : 0; }
-static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at) { return at + mark[at].count < n ? at + mark[at].count : -1; }
+static int64_t next_polygon(const bt_mark *mark, int64_t n, int64_t at)
+{
+    return at + mark[at].count < n ? at + mark[at].count : -1;
+}
 
 /// Depth to which candidate c at its place and body i, (dx, dy) from there, overlap, m; <= 0: they do not.
 static double depth(const bt_bodies *b, bt_idx i, const candidate *c, const shapes *s, double dx, double dy)
@@ -200,7 +212,9 @@ static double depth(const bt_bodies *b, bt_idx i, const candidate *c, const shap
     double deepest = 0;
     for (int64_t p = first_polygon(own, c->n); p >= 0; p = next_polygon(own, c->n, p))
         for (int64_t q = first_polygon(other, n); q >= 0; q = next_polygon(other, n, q))
-            deepest = bt_max(deepest, -bt_apart_of(own[p].count, own_vertex + 2 * p, other[q].count, other_vertex + 2 * q, dx, dy).gap);
+            deepest = bt_max(
+                deepest,
+                -bt_apart_of(own[p].count, own_vertex + 2 * p, other[q].count, other_vertex + 2 * q, dx, dy).gap);
     return deepest;
 }
 
@@ -212,15 +226,17 @@ static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t 
     const double slop = bt_max(w->par.slop, 1e-9 * w->par.size);
     for (size_t k = 0; k < n; k++) {
         const candidate *c = &list[k];
-        const double dx = bt_nearest_image(p->x - c->place.x, w->par.period_x), dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
+        const double dx = bt_nearest_image(p->x - c->place.x, w->par.period_x),
+                     dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
         const double reach = b->radius[i] + c->radius;
         if (dx * dx + dy * dy >= reach * reach || c->gid == b->gid[i]) continue;
         if (depth(b, i, c, s, dx, dy) > slop) blocked[k] = 1;
     }
 }
 
-/// Collective. Which candidates stay: those whose place is held by a body that is no candidate, then those whose place is held by one of
-/// these, and so on; what is left can go all at once. Each round, all that it can tell: the order of nothing matters.
+/// Collective. Which candidates stay: those whose place is held by a body that is no candidate, then those whose place
+/// is held by one of these, and so on; what is left can go all at once. Each round, all that it can tell: the order of
+/// nothing matters.
 static void settle_places(const bt_world *w, candidate *list, size_t n, const shapes *shape)
 {
     const bt_bodies *b = &w->bodies;
@@ -238,7 +254,8 @@ static void settle_places(const bt_world *w, candidate *list, size_t n, const sh
             if (c && !c->stays) continue;
             tested[i] = 1;
             if (b->motion[i] != BT_DYNAMIC && b->gid[i] != w->towed) continue; // walls leave room for the mother field
-            if (fabs(bt_nearest_image(b->pose[i].x - list[0].place.x, w->par.period_x)) > half + widest + b->radius[i]) continue;
+            if (fabs(bt_nearest_image(b->pose[i].x - list[0].place.x, w->par.period_x)) > half + widest + b->radius[i])
+                continue;
             obstruct(w, i, list, n, shape, blocked);
         }
         bt_domain_maxima(w, blocked, (int)n);
@@ -255,10 +272,10 @@ static void settle_places(const bt_world *w, candidate *list, size_t n, const sh
 /// What a contact knew of the last step is of the place the floe has left.
 static void forget_contacts(bt_world *w, const uint8_t *moved)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx j = 0; j < t->tile[k].n_pairs; j++) {
-            bt_pair *p = &t->tile[k].pairs[j];
+        for (bt_idx j = 0; j < t->cell[k].n_pairs; j++) {
+            bt_pair *p = &t->cell[k].pairs[j];
             if (moved[p->a] || moved[p->b]) p->n_points = 0;
         }
 }
@@ -273,7 +290,7 @@ static void put(bt_world *w, bt_idx i)
     h->copy += (int32_t)v->sign;
     h->lap = turns + h->copy;
     b->vel[i] = b->vel_start[i] = b->vel_free[i] = v->vel;
-    b->stirred[i] = 1;
+    b->disturbed[i] = 1;
     bt_bodies_turn(&w->bodies, i);
 }
 
@@ -306,7 +323,7 @@ static void renew(bt_world *w, const candidate *list, size_t n)
     }
     if (v->renewed_now > 0) {
         forget_contacts(w, moved);
-        w->tiles->relabel = true;
+        w->cells->relabel = true;
     }
     free(moved);
 }
@@ -358,31 +375,29 @@ void bt_window_begin(bt_world *w)
     let_go(w);
 }
 
-/// One step of the free drift of the mean floe, as bt_forces_predict does it for every floe: linearised drag, implicit; so what has the velocity
-/// of the water keeps it to the last bit.
+/// A step of the free drift of the mean floe by the table of force laws, as of every floe; so what has the velocity of
+/// the water keeps it to the last bit.
 void bt_window_advance(bt_world *w)
 {
     bt_window *v = w->window;
     if (!v) return;
-    const bt_params *p = &w->par;
-    bt_vel u = v->vel;
-    const double water = v->water * hypot(p->water_u - u.x, p->water_v - u.y), air = v->air * hypot(p->air_u - u.x, p->air_v - u.y);
-    const bt_turning r = bt_forces_turning(p, v->share);
-    bt_forces_turn(p, &r, &u);
-    if (water + air > 0) {
-        const double per_mass = 1 / (v->mass + p->dt * (water + air));
-        u.x = (v->mass * u.x + p->dt * (water * p->water_u + air * p->air_u)) * per_mass;
-        u.y = (v->mass * u.y + p->dt * (water * p->water_v + air * p->air_v)) * per_mass;
-    }
+    bt_pose nowhere = {NAN, NAN, NAN, NAN, NAN};
+    const bt_bodies one = {
+        .n = 1, .pose = &nowhere, .radius = &v->radius, .area = &v->area, .thickness = &v->thickness};
+    bt_force_body mean = {
+        .drag = &v->drag, .vel = v->vel, .mass = v->mass, .inertia = v->inertia, .share = v->share, .all = &one};
+    bt_vel u = bt_forces_drift(w, &mean);
+    u.w = 0;
     if (v->held) u.y = 0;
     v->vel = u;
-    v->drift_x += p->dt * u.x;
-    v->drift_y += p->dt * u.y;
+    v->drift_x += w->par.dt * u.x;
+    v->drift_y += w->par.dt * u.y;
 }
 
 uint64_t bt_window_hash(const bt_window *v)
 {
-    const double state[] = {v->rear, v->drift_x, v->drift_y, v->vel.x, v->vel.y, (double)v->renewed, (double)v->kept, (double)v->missed};
+    const double state[] = {v->rear,  v->drift_x,         v->drift_y,      v->vel.x,
+                            v->vel.y, (double)v->renewed, (double)v->kept, (double)v->missed};
     uint64_t h = 0, u;
     for (size_t k = 0; k < sizeof state / sizeof *state; k++) {
         memcpy(&u, &state[k], sizeof u);

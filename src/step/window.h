@@ -1,25 +1,28 @@
 // SPDX-License-Identifier: MIT
 // Moving window (domain.ends: moving): the domain goes with the towed body, ice enters ahead and is dropped behind.
 //
-// Space is periodic along x with the window's length L, as in ends: periodic, and the field is made for that: it has no seam. With s = σ x,
-// σ = ±1 the sign of the tow along x, the window covers [rear, rear + L) and `rear` follows the body, which so keeps its distance `ahead`
-// from the front. Every floe has a home: its pose in the field as made (the mother field), which goes on beyond the window, repeated with
-// L and drifting as undisturbed ice does:
+// Space is periodic along x with the window's length L, as in ends: periodic, and the field is made for that: it has no
+// seam. With s = σ x, σ = ±1 the sign of the tow along x, the window covers [rear, rear + L) and `rear` follows the
+// body, which so keeps its distance `ahead` from the front. Every floe has a home: its pose in the field as made (the
+// mother field), which goes on beyond the window, repeated with L and drifting as undisturbed ice does:
 //     X_i(t) = home_i + drift(t) + copy_i L
-// A floe is due when the rear has passed its home, σ X_i < rear, and itself, σ x_i < rear; one that the body has pushed ahead is taken from
-// inside by as much as it is late, rear − σ X_i, but not from the half next to the body of what lies behind it. It is renewed when its next place,
-// X_i + σL at the front, is free of all floes that stay: it is put there with the velocity of undisturbed ice. Floes whose places hold each other
-// go at once. So the number of bodies, their ids and the memory stay, and what enters is the mother field as it was made.
+// A floe is due when the rear has passed its home, σ X_i < rear, and itself, σ x_i < rear; one that the body has pushed
+// ahead is taken from inside by as much as it is late, rear − σ X_i, but not from the half next to the body of what
+// lies behind it. It is renewed when its next place, X_i + σL at the front, is free of all floes that stay: it is put
+// there with the velocity of undisturbed ice. Floes whose places hold each other go at once. So the number of bodies,
+// their ids and the memory stay, and what enters is the mother field as it was made.
 //
-// Around the period the rear and the front are neighbours. A floe that waits for its place lies, by the period, among the ice at the
-// front, acts there as any other, and keeps that ice complete. Within the front zone, half of `ahead` deep (assumed: far enough from the body to
-// be undisturbed), a place can still be taken late. Beyond:
+// Around the period the rear and the front are neighbours. A floe that waits for its place lies, by the period, among
+// the ice at the front, acts there as any other, and keeps that ice complete. Within the front zone, half of `ahead`
+// deep (assumed: far enough from the body to be undisturbed), a place can still be taken late. Beyond:
 //     kept    a floe that went round as it was: disturbed ice comes again
 //     missed  a place that stayed empty, because its floe is carried along by the body
-// Both are counted. Rejected: a pool of spare floes for the missed places (their outlines would have to change, or twice the
-// bodies be kept for a deficit that a longer window removes); a window with open ends (ice in front of a berg at 80 % would give way).
+// Both are counted. Rejected: a pool of spare floes for the missed places (their outlines would have to change, or
+// twice the bodies be kept for a deficit that a longer window removes); a window with open ends (ice in front of a berg
+// at 80 % would give way).
 //
-// Undisturbed ice drifts as the mean floe of the field does without contacts, by the equations of forces.h; between side walls only along x.
+// Undisturbed ice drifts as the mean floe of the field does without contacts, by the equations of forces.h; between
+// side walls only along x.
 #ifndef BERGTOW_WINDOW_H
 #define BERGTOW_WINDOW_H
 
@@ -33,7 +36,8 @@ typedef struct bt_window {
     double zone;          ///< depth of the front zone, m
     bt_gid n_floes;       ///< bodies below this id are renewed
     bool held;            ///< walls at the sides: the mother field does not drift across
-    double mass, water, air; ///< mean floe: kg; drag per squared velocity of water and air, kg/m
+    double mass, inertia, radius, area, thickness; ///< mean floe
+    bt_drag drag;         ///< its drag, that along the outline as part of the skin's
     double share;         ///< m/M of all floes together
     // state
     double start, rear;   ///< σx of the rear end at first and now, m
@@ -46,7 +50,8 @@ typedef struct bt_window {
     double brought[3];    ///< the same as they entered
 } bt_window;
 
-/// Let the window follow the towed body of a world whose bodies have all been added, before it is dealt to ranks: par.period_x is its length.
+/// Let the window follow the towed body of a world whose bodies have all been added, before it is dealt to ranks:
+/// par.period_x is its length.
 /// sign: of the tow along x; ahead: m; n_floes: bodies below this id are renewed; held: walls at the sides.
 void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes, bool held);
 

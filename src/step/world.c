@@ -7,10 +7,11 @@
 
 #include "body/bodies.h"
 #include "force/environment.h"
+#include "bergtow/forces.h"
 #include "loads/impact.h"
 #include "partition/domain.h"
 #include "solve/solver.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "step/window.h"
 #include "tow/tow.h"
 
@@ -20,8 +21,9 @@ bt_world *bt_world_create(const bt_params *p)
     w->par = *p;
     w->towed = -1;
     w->bodies.offset = bt_alloc(1, sizeof *w->bodies.offset);
-    w->tiles = bt_tiles_create();
+    w->cells = bt_cells_create();
     w->solver = bt_solver_create();
+    w->forces = bt_forces_create();
     return w;
 }
 
@@ -29,8 +31,9 @@ void bt_world_free(bt_world *w)
 {
     if (!w) return;
     bt_bodies_free(&w->bodies);
-    bt_tiles_free(w->tiles);
+    bt_cells_free(w->cells);
     bt_solver_free(w->solver);
+    bt_forces_free(w->forces);
     bt_domain_free(w->domain);
     bt_impacts_free(w->impacts);
     bt_environment_free(w->environment);
@@ -42,7 +45,7 @@ void bt_world_free(bt_world *w)
 
 bt_gid bt_world_add(bt_world *w, const bt_body_def *d)
 {
-    w->tiles->labelled = false;
+    w->cells->labelled = false;
     return bt_bodies_add(&w->bodies, d);
 }
 
@@ -65,7 +68,7 @@ static uint64_t mix_double(uint64_t h, double x)
 
 /// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
 /// names.
-static uint64_t hash_trace(const bt_trace *r)
+static uint64_t hash_trace(const bt_memory *r)
 {
     const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
     uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ where);
@@ -86,9 +89,9 @@ uint64_t bt_world_hash(const bt_world *w)
         if (w->window) h = mix(h ^ ((uint64_t)(uint32_t)b->home[i].copy << 32 | (uint32_t)b->home[i].lap));
         sum += h;
     }
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx i = 0; w->tiles->tile[k].own && i < w->tiles->tile[k].n_memory; i++)
-            sum += hash_trace(&w->tiles->tile[k].memory[i]);
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].n_memory; i++)
+            sum += hash_trace(&w->cells->cell[k].memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "case/speed_law.h"
 #include "tow/tow_rows.h"
 
 void bt_tow_free(bt_tow *t)
@@ -18,17 +19,12 @@ void bt_tow_free(bt_tow *t)
 
 double bt_tow_speed(const bt_tow *t, double time)
 {
-    if (t->n_programme > 0) {
-        const double *p = t->programme, *last = p + 2 * (t->n_programme - 1);
-        if (time <= p[0]) return p[1];
-        while (p < last && time >= p[2]) p += 2;
-        return p == last ? p[1] : p[1] + (p[3] - p[1]) * ((time - p[0]) / (p[2] - p[0]));
-    }
-    if (time <= 0) return t->ramp > 0 ? 0 : t->speed;
-    return t->ramp > 0 && time < t->ramp ? t->speed * (time / t->ramp) : t->speed;
+    return bt_speed_law_at(
+        &(bt_speed_law){.speed = t->speed, .ramp = t->ramp, .programme = t->programme, .n = t->n_programme}, time);
 }
 
-/// Course and speed that lead from (x, y) to where the path is one step further; on the course of the path while it stands still.
+/// Course and speed that lead from (x, y) to where the path is one step further; on the course of the path while it
+/// stands still.
 static void follow_path(bt_tow *t, double x, double y)
 {
     double to[2], tangent[2];

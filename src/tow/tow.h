@@ -1,34 +1,41 @@
 // SPDX-License-Identifier: MIT
 // How the body is towed: prescribed velocity, or one or two elastic lines to an end that follows a path or to a vessel.
 //
-// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs straight (no sag) from a point on the hull to the towing
-// end. T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more unilateral row of the solver, λ = Δt T ≥ 0:
+// Line. A branch of unstretched length L0, stiffness k = EA/L0 and damping c runs straight (no sag) from a point on the
+// hull to the towing end. T = max(0, k (l − L0) + c dl/dt). Within a step a branch is one more unilateral row of the
+//     solver, λ = Δt T ≥ 0:
 //     λ_i = max(0, a_i + b_i l̇2_i),   a = Δt k (l1 − L0),  b = Δt (k θ Δt + c),   l̇2 = l̂·(U_end,2 − v_hull,2)
-// (l̂: from hull to end at the start of the step). While l1 + Δt l̇* (at the free velocities) is still below L0, b has no c: a line damps
-// only when it is stretched. With X2 = X1 + Δt U2, θ = 0 is the symplectic Euler scheme: no numerical damping, stable for
-// h = Δt ω < 2, where ω² are the eigenvalues of K^½ W K^½, W_ij = ∂l̇_i/∂λ_j. The amplification matrix of a mode has determinant
-// 1/(1+θh²) and is stable for every h when h² ≤ 4 + 2θh². So θ = max(0, 1 − 2/h²) with the largest h, the same for both branches, that
-// their modes stay uncoupled: none while the oscillation is resolved (h ≤ √2), tending to backward Euler for a line too stiff for the
-// step; a slower mode has h²(1 − 2θ) ≤ 4 as well. Stable for any stiffness [D]. The turning of the line within a step is explicit:
-// its swing, ω² = T/(l M), is slow.
+// (l̂: from hull to end at the start of the step). While l1 + Δt l̇* (at the free velocities) is still below L0, b has
+// no c: a line damps only when it is stretched. With X2 = X1 + Δt U2, θ = 0 is the symplectic Euler scheme: no
+// numerical damping, stable for h = Δt ω < 2, where ω² are the eigenvalues of K^½ W K^½, W_ij = ∂l̇_i/∂λ_j. The
+// amplification matrix of a mode has determinant 1/(1+θh²) and is stable for every h when h² ≤ 4 + 2θh². So θ = max(0,
+// 1 − 2/h²) with the largest h, the same for both branches, that their modes stay uncoupled: none while the oscillation
+// is resolved (h ≤ √2), tending to backward Euler for a line too stiff for the step; a slower mode has h²(1 − 2θ) ≤ 4
+// as well. Stable for any stiffness [D]. The turning of the line within a step is explicit: its swing, ω² = T/(l M), is
+// slow.
 //
-// Vessel (mode thrust). A point of mass M (with added mass) that touches no ice [assumed], on the end of the line. Course d: towards the
-// point of the planned path that lies `lookahead` ahead of the vessel's own place on it (line-of-sight guidance, Fossen 2011). Relative to the water it has speed s
-// along d:
-//     drag     R = (R_f/s_f²) |u| u along d, `lateral` times as much across       R_f: resistance at the free-running speed s_f
-//     thrust   0 ≤ T ≤ T_b − (T_b − R_f)(s/s_f)²  along d                         T_b: bollard pull; at full power the net pull
-//                                                                                 T − R = T_b (1 − (s/s_f)²) [assumed parabola]
+// Vessel (mode thrust). A point of mass M (with added mass) that touches no ice [assumed], on the end of the line.
+// Course d: towards the point of the planned path that lies `lookahead` ahead of the vessel's own place on it
+// (line-of-sight guidance, Fossen 2011). Relative to the water it has speed s along d:
+//     drag     R = (R_f/s_f²) |u| u along d, `lateral` times as much across       R_f: resistance at the free-running
+//     speed s_f
+//     thrust   0 ≤ T ≤ T_b − (T_b − R_f)(s/s_f)²  along d                         T_b: bollard pull; at full power the
+//     net pull
+//                                                                                 T − R = T_b (1 − (s/s_f)²) [assumed
+//                                                                                 parabola]
 //     governor T is as large as it can be without the speed over ground along d exceeding the programme's; never astern
-// Drag and the fall of thrust are linearised about the speed at the start of the step and taken at U2, as in forces.h: with
-// K = R_f/s_f² |u1| and C = (T_b − R_f)/s_f² max(0, s1), full power is one more drag: (M + Δt (K + C)) U2 = M U1 + Δt (K + C) U_w + Δt T_b − Σ λ l̂.
-// So at U2 the vessel is one of three linear things along d, {full power, held at the programme's speed, without power}, and U_end,2 = f − V Σ λ l̂
-// with V = 0 along d when it is held. Steady states are those of the quadratic laws. Wind on the vessel and Coriolis are left out [assumed].
+// Drag and the fall of thrust are linearised about the speed at the start of the step and taken at U2, as in forces.h:
+// with K = R_f/s_f² |u1| and C = (T_b − R_f)/s_f² max(0, s1), full power is one more drag: (M + Δt (K + C)) U2 = M U1 +
+// Δt (K + C) U_w + Δt T_b − Σ λ l̂. So at U2 the vessel is one of three linear things along d, {full power, held at the
+// programme's speed, without power}, and U_end,2 = f − V Σ λ l̂ with V = 0 along d when it is held. Steady states are
+// those of the quadratic laws. Wind on the vessel and Coriolis are left out [assumed].
 //
-// Solution. Given the body's velocity, the two rows are solved together with the vessel, exactly: for each of its three states the 2×2
-// complementarity problem (I + diag(b) W) λ = a + b l̇0 by its four cases; full power when the speed stays below the programme's, else held when
-// that takes thrust, else none (the thrust that a speed takes grows with it: one of them fits). Tried in thought and rejected: the vessel as a body of
-// its own and rows one after the other; a stiff line between a heavy berg and a light vessel then takes hundreds of sweeps.
-// The vessel's velocity follows from λ alone, so only λ is carried between sweeps, accelerated and exchanged between ranks.
+// Solution. Given the body's velocity, the two rows are solved together with the vessel, exactly: for each of its three
+// states the 2×2 complementarity problem (I + diag(b) W) λ = a + b l̇0 by its four cases; full power when the speed
+// stays below the programme's, else held when that takes thrust, else none (the thrust that a speed takes grows with
+// it: one of them fits). Tried in thought and rejected: the vessel as a body of its own and rows one after the other; a
+// stiff line between a heavy berg and a light vessel then takes hundreds of sweeps. The vessel's velocity follows from
+// λ alone, so only λ is carried between sweeps, accelerated and exchanged between ranks.
 //
 // A branch whose tension (mean of a step) exceeds its breaking load is gone from the next step on.
 #ifndef BERGTOW_TOW_H
@@ -105,7 +112,10 @@ typedef struct bt_tow {
 void bt_tow_free(bt_tow *t);
 
 /// Does a line pull (modes line and thrust)?
-static inline bool bt_tow_has_line(const bt_tow *t) { return t && (t->mode == BT_TOW_LINE || t->mode == BT_TOW_THRUST); }
+static inline bool bt_tow_has_line(const bt_tow *t)
+{
+    return t && (t->mode == BT_TOW_LINE || t->mode == BT_TOW_THRUST);
+}
 
 /// Speed of the programme at this time, m/s.
 double bt_tow_speed(const bt_tow *t, double time);
@@ -113,7 +123,8 @@ double bt_tow_speed(const bt_tow *t, double time);
 /// At the start of a step: prescribed velocity into a kinematic body, end moved, line rows set up.
 void bt_tow_begin(bt_world *w);
 
-/// Exact solution of the line rows at the velocity *v of the body, which changes with them; returns their natural-map residual before, m/s.
+/// Exact solution of the line rows at the velocity *v of the body, which changes with them; returns their natural-map
+/// residual before, m/s.
 double bt_tow_update(bt_tow *t, bt_vel *v, bt_inv inv);
 
 /// Velocity of the body changed by the impulses of all branches.

@@ -35,7 +35,8 @@ void bt_tow_begin_vessel(bt_world *w)
 
 typedef enum { FULL, HELD, IDLE } power;
 
-/// The end of the line in this step: velocity (along, across the course) without the line, and how much an impulse changes it.
+/// The end of the line in this step: velocity (along, across the course) without the line, and how much an impulse
+/// changes it.
 typedef struct {
     double d, n;      ///< m/s
     double wd, wn;    ///< 1/kg
@@ -101,7 +102,9 @@ void bt_tow_finish_vessel(bt_tow *t)
     const end_motion e = end_of(t, p);
     s->vd2 = p == HELD ? e.d : e.d - e.wd * pull[0];
     s->vn2 = e.n - e.wn * pull[1];
-    s->thrust = p == IDLE ? 0 : p == FULL ? t->dt * (s->bollard_pull - s->kt * (s->vd2 - s->ud)) : thrust_for(s, t->dt, s->vd2, pull[0]);
+    s->thrust = p == IDLE   ? 0
+                : p == FULL ? t->dt * (s->bollard_pull - s->kt * (s->vd2 - s->ud))
+                            : thrust_for(s, t->dt, s->vd2, pull[0]);
     s->vx = s->vd2 * t->ux - s->vn2 * t->uy;
     s->vy = s->vd2 * t->uy + s->vn2 * t->ux;
 }
@@ -160,7 +163,9 @@ void bt_tow_begin_rows(bt_world *w)
         t->body_w[k] = inv.m + inv.i * b->rxl * b->rxl;
         b->w = t->body_w[k] + end_w(t, &idle, k, k);
     }
-    t->coupling = t->n_branches > 1 ? inv.m * (first->lx * second->lx + first->ly * second->ly) + inv.i * first->rxl * second->rxl : 0;
+    t->coupling = t->n_branches > 1
+                      ? inv.m * (first->lx * second->lx + first->ly * second->ly) + inv.i * first->rxl * second->rxl
+                      : 0;
     const double weights[2] = {first->broken ? 0 : first->w, second->broken || t->n_branches < 2 ? 0 : second->w};
     const double h2 = fastest_mode(t, weights, t->n_branches > 1 ? t->coupling + end_w(t, &idle, 0, 1) : 0);
     const double theta = h2 > 2 ? 1 - 2 / h2 : 0;
@@ -174,7 +179,8 @@ void bt_tow_begin_rows(bt_world *w)
     }
 }
 
-/// Both branches together at one state of the end. rate0: their rates without the line's impulses, but for the end's velocity.
+/// Both branches together at one state of the end. rate0: their rates without the line's impulses, but for the end's
+/// velocity.
 static void solve_pair(const bt_tow *t, const end_motion *e, const double hull0[2], double lambda[2])
 {
     const bt_branch *p = &t->branch[0], *q = &t->branch[1];
@@ -182,7 +188,8 @@ static void solve_pair(const bt_tow *t, const end_motion *e, const double hull0[
     const double w11 = t->body_w[0] + end_w(t, e, 0, 0), w22 = two ? t->body_w[1] + end_w(t, e, 1, 1) : 0;
     const double w12 = two ? t->coupling + end_w(t, e, 0, 1) : 0;
     const double a11 = 1 + p->b * w11, a12 = p->b * w12, a21 = q->b * w12, a22 = 1 + q->b * w22;
-    const double c1 = p->a + p->b * (end_rate(t, e, p) - hull0[0]), c2 = two ? q->a + q->b * (end_rate(t, e, q) - hull0[1]) : 0;
+    const double c1 = p->a + p->b * (end_rate(t, e, p) - hull0[0]),
+                 c2 = two ? q->a + q->b * (end_rate(t, e, q) - hull0[1]) : 0;
     const double det = a11 * a22 - a12 * a21; // ≥ 1: diag(b) W has no negative eigenvalue
     const double both1 = (a22 * c1 - a12 * c2) / det, both2 = (a11 * c2 - a21 * c1) / det;
     if (both1 >= 0 && both2 >= 0) {
@@ -200,14 +207,17 @@ static void solve_rows(const bt_tow *t, const bt_vel *v, double lambda[BT_MAX_BR
 {
     const bt_branch *p = &t->branch[0], *q = &t->branch[1];
     if (t->n_branches == 1 && t->mode != BT_TOW_THRUST) {
-        // One row against a prescribed end: λ' = max(0, λ + (a + b l̇ − λ)/(1 + b W)). The same as below with less rounding.
+        // One row against a prescribed end: λ' = max(0, λ + (a + b l̇ − λ)/(1 + b W)). The same as below with less
+        // rounding.
         const end_motion e = end_of(t, HELD);
-        lambda[0] = bt_max(0, p->lambda + (p->a + p->b * (end_rate(t, &e, p) - hull_rate(p, v)) - p->lambda) / (1 + p->b * p->w));
+        lambda[0] = bt_max(0, p->lambda + (p->a + p->b * (end_rate(t, &e, p) - hull_rate(p, v)) - p->lambda) /
+                                              (1 + p->b * p->w));
         lambda[1] = 0;
         return;
     }
     const double hull0[2] = {hull_rate(p, v) - (t->body_w[0] * p->lambda + t->coupling * q->lambda),
-                             t->n_branches > 1 ? hull_rate(q, v) - (t->coupling * p->lambda + t->body_w[1] * q->lambda) : 0};
+                             t->n_branches > 1 ? hull_rate(q, v) - (t->coupling * p->lambda + t->body_w[1] * q->lambda)
+                                               : 0};
     for (power s = FULL;; s = next_power(t, s, lambda)) {
         const end_motion e = end_of(t, s);
         solve_pair(t, &e, hull0, lambda);
@@ -229,7 +239,8 @@ double bt_tow_residual(const bt_tow *t, const bt_vel *v)
 {
     double lambda[BT_MAX_BRANCHES], worst = 0;
     solve_rows(t, v, lambda);
-    for (int k = 0; k < t->n_branches; k++) worst = bt_max(worst, fabs(lambda[k] - t->branch[k].lambda) * t->branch[k].w);
+    for (int k = 0; k < t->n_branches; k++)
+        worst = bt_max(worst, fabs(lambda[k] - t->branch[k].lambda) * t->branch[k].w);
     return worst;
 }
 

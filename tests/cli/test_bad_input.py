@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Bad input from a user's hand: each kind must end with its exit code and a message that names it and says what to do."""
+"""Bad input from a user's hand: each kind must end with its exit code and a message that names it and says what to
+do."""
 import os
 import subprocess
 
@@ -48,43 +49,58 @@ def test_the_good_case_is_good(folder):
 TEXTS = {
     "unknown key": (GOOD + "tow: {sped: 1}\n", "bad.yml:5: tow.sped: unknown key; did you mean tow.speed?"),
     "unknown section": (GOOD + "iec: {size: 1}\n", "bad.yml:5: iec: unknown key; did you mean ice?"),
-    "key in the wrong section": (GOOD + "tow: {friction: 1}\n", "bad.yml:5: tow.friction: unknown key; did you mean ice.friction?"),
+    "key in the wrong section": (GOOD + "tow: {friction: 1}\n",
+                                 "bad.yml:5: tow.friction: unknown key; did you mean ice.friction?"),
     "duplicate key": (GOOD + "run: {dt: 0.2}\n", "bad.yml:5: run: duplicate key, first given in line 1"),
     "duplicate in two spellings": (GOOD + "run.dt: 0.2\n", "bad.yml:5: run.dt: duplicate key, first given in line 1"),
     "missing required key": ("run: {dt: 0.1}\n", "bad.yml: run.duration: missing"),
     "NaN": (GOOD + "tow: {speed: .nan}\n", 'bad.yml:5: tow.speed: ".nan" is not a number'),
     "infinity": (GOOD + "tow: {speed: .inf}\n", 'bad.yml:5: tow.speed: ".inf" is not a number'),
     "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
-    "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"), "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
-    "rafting that gives energy": (GOOD.replace("size: 1", "rafting: {kappa: 1.5}"), "bad.yml:3: ice.rafting.kappa: 1.5 is less than 2", "0 = they do not"),
-    "ice that sinks": (GOOD.replace("size: 1", "density: 1000") + "water: {density: 900}\n", "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3",
-                       "correct one"),
-    "concentration above one": (GOOD.replace("0.3", "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
-    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed", "m/s"),
+    "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"),
+                           "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
+    "rafting that gives energy": (GOOD.replace("size: 1", "rafting: {kappa: 1.5}"),
+                                  "bad.yml:3: ice.rafting.kappa: 1.5 is less than 2", "0 = they do not"),
+    "ice that sinks": (GOOD.replace("size: 1", "density: 1000") + "water: {density: 900}\n",
+                       "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3", "correct one"),
+    "concentration above one": (GOOD.replace("0.3",
+                                             "1.2"), "bad.yml:3: ice.concentration: 1.2 is out of range", "[0, 0.95]"),
+    "wrong unit": (GOOD + "tow: {speed: 3 kN}\n", "bad.yml:5: tow.speed: kN is the unit of a force and this is a speed",
+                   "m/s"),
     "unknown unit": (GOOD + "tow: {speed: 3 mph}\n", 'bad.yml:5: tow.speed: "mph" is not a unit of speed'),
     "trailing junk": (GOOD.replace("0.3", "0.8x"), 'bad.yml:3: ice.concentration: "x"'),
     "hexadecimal": (GOOD + "tow: {speed: 0x10}\n", 'bad.yml:5: tow.speed: "x10"'),
     "decimal comma": (GOOD + "tow: {speed: \"0,13\"}\n", 'bad.yml:5: tow.speed: ",13"'),
-    "fraction for a whole number": (GOOD + "solver: {max_sweeps: 1.5}\n", "bad.yml:5: solver.max_sweeps", "whole number"),
-    "integer overflow": (GOOD.replace("size: 1", "seed: 99999999999999999999"), "bad.yml:3: ice.seed: 99999999999999999999 is too large"),
+    "fraction for a whole number": (GOOD + "solver: {max_sweeps: 1.5}\n", "bad.yml:5: solver.max_sweeps",
+                                    "whole number"),
+    "integer overflow": (GOOD.replace("size: 1", "seed: 99999999999999999999"),
+                         "bad.yml:3: ice.seed: 99999999999999999999 is too large"),
     "unknown choice": (GOOD.replace("x: 4", "shape: shipp"), "bad.yml:4: body.shape:", "did you mean ship?"),
     "neither true nor false": (GOOD + "solver: {warm_start: 2}\n", "bad.yml:5: solver.warm_start:", "true"),
     "empty value": (GOOD + "tow:\n  speed:\n", "bad.yml:6: tow.speed: has no value"),
     "list for a value": (GOOD + "tow: {speed: [1, 2]}\n", "bad.yml:5: tow.speed: is a list"),
     "value for a section": (GOOD + "tow: 1\n", "bad.yml:5: tow: is a section"),
-    "body larger than the basin": (GOOD.replace("x: 4", "length: 20"), "bad.yml:4: body.length: the body spans", "domain.width"),
+    "body larger than the basin": (GOOD.replace("x: 4", "length: 20"), "bad.yml:4: body.length: the body spans",
+                                   "domain.width"),
     "body outside": (GOOD.replace("x: 4", "x: 40"), "bad.yml:4: body.x:", "outside the domain"),
-    "tow through the wall": (GOOD.replace("duration: 1}", "duration: 1000}"), "bad.yml:1: run.duration:", "a wall stands after"),
-    "body that is not convex": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0],[1,0.2],[0,2]]"), "bad.yml:4: body.vertices: the waterline is refused"),
-    "two points": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0]]"), "bad.yml:4: body.vertices: has 2 points"),
+    "tow through the wall": (GOOD.replace("duration: 1}",
+                                          "duration: 1000}"), "bad.yml:1: run.duration:", "a wall stands after"),
+    "body that is not convex": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0],[1,0.2],[0,2]]"),
+                                "bad.yml:4: body.vertices: the waterline is refused"),
+    "two points": (GOOD.replace("x: 4", "x: 4, shape: polygon, vertices: [[0,0],[2,0]]"),
+                   "bad.yml:4: body.vertices: has 2 points"),
     "ice region outside": (GOOD.replace("size: 1", "x_max: 13"), "bad.yml:3: ice.x_max: 13 m is outside the domain"),
-    "empty ice region": (GOOD.replace("size: 1", "x_min: 5, x_max: 5"), "bad.yml:3: ice.x_min: 5 m is not below ice.x_max"),
-    "floes larger than the basin": (GOOD.replace("size: 1", "size: 30"), "bad.yml:3: ice.size: 30 m is larger than the ice region"),
+    "empty ice region": (GOOD.replace("size: 1",
+                                      "x_min: 5, x_max: 5"), "bad.yml:3: ice.x_min: 5 m is not below ice.x_max"),
+    "floes larger than the basin": (GOOD.replace("size: 1", "size: 30"),
+                                    "bad.yml:3: ice.size: 30 m is larger than the ice region"),
     "too many floes": (GOOD.replace("size: 1", "size: 0.1 mm"), "bad.yml:3: ice.size:", "floes, at most"),
     "too many steps": (GOOD.replace("dt: 0.1", "dt: 1e-12"), "bad.yml:1: run.dt:", "steps"),
-    "step longer than the run": (GOOD.replace("dt: 0.1", "dt: 2"), "bad.yml:1: run.dt: 2 s is longer than run.duration"),
+    "step longer than the run": (GOOD.replace("dt: 0.1",
+                                              "dt: 2"), "bad.yml:1: run.dt: 2 s is longer than run.duration"),
     "no line": (GOOD + "tow: {mode: line, line_stiffness: 0}\n", "bad.yml:5: tow.line_stiffness:", "needs a stiffness"),
-    "floe by hand outside": (GOOD + "floes: [{x: 30, y: 0, length: 1}]\n", "bad.yml:5: floes[0]: is outside the domain"),
+    "floe by hand outside": (GOOD + "floes: [{x: 30, y: 0, length: 1}]\n",
+                             "bad.yml:5: floes[0]: is outside the domain"),
     "floe by hand without place": (GOOD + "floes: [{x: 9, length: 1}]\n", "bad.yml:5: floes[0].y: missing"),
     "anchor": (GOOD.replace("run: {", "run: &a {"), "bad.yml:1: anchors and aliases"),
     "two documents": (GOOD + "---\n" + GOOD, "bad.yml:5: a second document"),
@@ -193,7 +209,8 @@ def test_truncated_field_file(folder, keep):
     refused(call("check", "bad.yml", cwd=folder), CASE, "field.h5")
 
 
-@pytest.mark.parametrize("name, value", [("pose", float("nan")), ("vertices", float("inf")), ("thickness", -1.0), ("offsets", 10**12)])
+@pytest.mark.parametrize("name, value", [("pose", float("nan")), ("vertices", float("inf")), ("thickness", -1.0),
+                                         ("offsets", 10**12)])
 def test_field_file_with_a_bad_value(folder, name, value):
     h5py = pytest.importorskip("h5py")
     path = make_field(folder)
@@ -281,8 +298,11 @@ def test_set(folder, kind):
 
 # ---- what must work ----
 
-@pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "), (["--list-keys"], b"ice.concentration"),
-                                                 (["run", "--help"], b"--dump-contacts"), (["check", "--help"], b"--set"), (["field", "--help"], b"--output")])
+
+@pytest.mark.parametrize("arguments, fragment", [(["--help"], b"Usage: bergtow"), (["--version"], b"bergtow "),
+                                                 (["--list-keys"], b"ice.concentration"),
+                                                 (["run", "--help"], b"--dump-contacts"),
+                                                 (["check", "--help"], b"--set"), (["field", "--help"], b"--output")])
 def test_help(folder, arguments, fragment):
     result = call(*arguments, cwd=folder)
     assert result.returncode == DONE and fragment in result.stdout and not result.stderr

@@ -11,19 +11,44 @@ BALANCES = {
     "speed": TOW,
     "speed askew, e = 0.5": changed(TOW, tow__direction=15, ice__restitution=0.5, body__shape="square"),
     "line": changed(TOW, tow__mode="line"),
-    "slack line, e = 0.5": changed(TOW, tow={"mode": "line", "speed": 0.2, "direction": 10, "ramp": 1, "hull_y": 0.4, "hull_x": 0.8,
-                                             "line_length": 1.5, "line_stiffness": 300, "line_damping": 0}, ice__restitution=0.5),
-    "line, current, wind, Coriolis": changed(TOW, tow__mode="line", water={"latitude": 75, "current_y": 0.05}, air={"wind_x": -3}),
-    "speed, current, slope, Coriolis": changed(TOW, water={"latitude": 75, "current_y": 0.05, "tilt": "slope", "slope_x": 1e-5}),
+    "slack line, e = 0.5": changed(TOW,
+                                   tow={
+                                       "mode": "line", "speed": 0.2, "direction": 10, "ramp": 1, "hull_y": 0.4,
+                                       "hull_x": 0.8, "line_length": 1.5, "line_stiffness": 300, "line_damping": 0
+                                   },
+                                   ice__restitution=0.5),
+    "line, current, wind, Coriolis": changed(TOW,
+                                             tow__mode="line",
+                                             water={"latitude": 75, "current_y": 0.05},
+                                             air={"wind_x": -3}),
+    "speed, current, slope, Coriolis": changed(
+        TOW, water={"latitude": 75, "current_y": 0.05, "tilt": "slope", "slope_x": 1e-5}),
     # Everything that changes: the tide turns within the run.
     "line, tide, dynamic tilt, wind, Coriolis, geographic": changed(
-        TOW, domain__frame="geographic", domain__x0=0, tow__mode="line", tow__direction=10, air={"wind_x": 2, "wind_y": 4},
-        water={"latitude": 75, "current_x": 0.02, "tilt": "dynamic", "tide": {"major": 0.1, "minor": 0.05, "period": 40, "inclination": 70}}),
+        TOW,
+        domain__frame="geographic",
+        domain__x0=0,
+        tow__mode="line",
+        tow__direction=10,
+        air={"wind_x": 2, "wind_y": 4},
+        water={
+            "latitude": 75, "current_x": 0.02, "tilt": "dynamic",
+            "tide": {"major": 0.1, "minor": 0.05, "period": 40, "inclination": 70}
+        }),
     "speed, tide, geostrophic, wind, Coriolis, geographic": changed(
-        TOW, domain__frame="geographic", domain__x0=0, air={"wind_x": -2, "wind_y": 4},
-        water={"latitude": -75, "tilt": "geostrophic", "tide": {"major": 0.1, "minor": -0.05, "period": 40, "phase": 100}}),
+        TOW,
+        domain__frame="geographic",
+        domain__x0=0,
+        air={"wind_x": -2, "wind_y": 4},
+        water={
+            "latitude": -75, "tilt": "geostrophic", "tide": {"major": 0.1, "minor": -0.05, "period": 40, "phase": 100}
+        }),
     "none, tide, dynamic tilt, wind, Coriolis": changed(
-        TOW, tow={"mode": "none"}, body__vx=0.2, air={"wind_x": 5}, solver={"reference_speed": 0.13},
+        TOW,
+        tow={"mode": "none"},
+        body__vx=0.2,
+        air={"wind_x": 5},
+        solver={"reference_speed": 0.13},
         water={"latitude": 75, "tilt": "dynamic", "tide": {"major": 0.1, "minor": 0.05, "period": 40}}),
 }
 
@@ -36,10 +61,12 @@ def balanced(request, tmp_path_factory):
 def test_forces_on_the_body(balanced):
     """tow = ice + drag + Coriolis + tilt + inertia in every sample, and in the means of the summary to 1e-6.
 
-    On a line this holds the spring's tension, the contact rows, the drag formulas and the velocities against each other.
+    On a line this holds the spring's tension, the contact rows, the drag formulas and the velocities against each
+    other.
     """
     case, r = balanced
-    tow, *others = r.series("tow_force", "ice_resistance", "drag_force", "coriolis_force", "tilt_force", "inertia_force")
+    tow, *others = r.series("tow_force", "ice_resistance", "drag_force", "coriolis_force", "tilt_force",
+                            "inertia_force")
     scale = np.abs([tow, *others]).max(axis=0) # the largest term of that sample
     assert np.abs(others[0]).max() > 1 and np.abs(others[1]).max() > 0.1
     assert np.all(np.abs(tow - sum(others)) <= 1e-9 * scale)
@@ -59,7 +86,8 @@ def moment(v):
 
 
 def cubic(v):
-    """Integral of r³ over the area, by triangles to the origin: a fifth of the cube of the distance along the edge, times its distance."""
+    """Integral of r³ over the area, by triangles to the origin: a fifth of the cube of the distance along the edge,
+    times its distance."""
     t, weight = np.polynomial.legendre.leggauss(20)
     total = 0
     for p, q in zip(v, np.roll(v, -1, axis=0)):
@@ -69,7 +97,8 @@ def cubic(v):
 
 
 def outline_drag(outline, yaw, at, ref, skin, form):
-    """Drag of one fluid as load - matrix @ (u, v, w): skin |v| v, and form max(0, -v.n) v along the outline by quadrature over the sides that water meets."""
+    """Drag of one fluid as load - matrix @ (u, v, w): skin |v| v, and form max(0, -v.n) v along the outline by
+    quadrature over the sides that water meets."""
     c, s = np.cos(yaw), np.sin(yaw)
     corners = outline @ np.array([[c, s], [-s, c]])
     nodes, weights = np.polynomial.legendre.leggauss(5)
@@ -95,14 +124,17 @@ def outline_drag(outline, yaw, at, ref, skin, form):
 
 
 def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
-    """Each from the recorded velocities and the case's own numbers: the budget closes term by term, not in the sum alone."""
+    """Each from the recorded velocities and the case's own numbers: the budget closes term by term, not in the sum
+    alone."""
     case, r = balanced
-    names = "time body_vx body_vy body_yaw_rate body_yaw drag_force coriolis_force tilt_force current_x current_y wind_x wind_y".split()
+    names = ("time body_vx body_vy body_yaw_rate body_yaw drag_force coriolis_force tilt_force "
+             "current_x current_y wind_x wind_y").split()
     t, vx, vy, spin, yaw, drag, coriolis, tilt, *fluids = r.series(*names)
     water, air = case.get("water", {}), case.get("air", {})
     flow = np.array(fluids).reshape(2, 2, -1)
     tide = water.get("tide", {})
-    mean = np.array([[water.get("current_x", 0), water.get("current_y", 0)], [air.get("wind_x", 0), air.get("wind_y", 0)]])
+    mean = np.array([[water.get("current_x", 0), water.get("current_y", 0)],
+                     [air.get("wind_x", 0), air.get("wind_y", 0)]])
     i, turn = np.radians(tide.get("inclination", 0)), 2 * np.pi / tide.get("period", 1)
     axes = np.array([[np.cos(i), -np.sin(i)], [np.sin(i), np.cos(i)]]) * [tide.get("major", 0), tide.get("minor", 0)]
 
@@ -115,7 +147,8 @@ def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
     angle = np.radians(case["tow"].get("direction", 0))
     along = np.array([np.cos(angle), np.sin(angle)])
     with h5py.File(r.dir / "result.h5") as f:
-        area, height, outline = f["bodies/area"][0], f["bodies/height"][0], f["bodies/vertices"][:f["bodies/offsets"][1]]
+        area, height, outline = f["bodies/area"][0], f["bodies/height"][0], f[
+            "bodies/vertices"][:f["bodies/offsets"][1]]
     mass, draft = 1.5 * 900 * area * height, 0.5
     prescribed = case["tow"].get("mode", "speed") == "speed"
     u = np.array([vx, vy, spin])
@@ -128,17 +161,23 @@ def test_drag_coriolis_and_tilt_by_their_formulas(balanced):
     moving = (u if prescribed else start)[:2]
     slope = water.get("tilt", "none")
     here, last = current(t - 0.05), current(np.maximum(t - 0.15, 0))
-    # Added mass takes no part in Coriolis and slope (a third of the whole here), but goes along with water that is accelerated.
-    push = {"none": np.zeros_like(moving), "slope": np.zeros_like(moving) + np.array([[-9.81 * water.get("slope_x", 0)], [0]]) / 1.5,
-            "geostrophic": -gyre @ here / 1.5, "dynamic": -gyre @ last / 1.5 + (here - last) / 0.1}[slope]
+    # Added mass takes no part in Coriolis and slope (a third of the whole here), but goes along with water that is
+    # accelerated.
+    push = {
+        "none": np.zeros_like(moving),
+        "slope": np.zeros_like(moving) + np.array([[-9.81 * water.get("slope_x", 0)], [0]]) / 1.5,
+        "geostrophic": -gyre @ here / 1.5, "dynamic": -gyre @ last / 1.5 + (here - last) / 0.1
+    }[slope]
     want = np.zeros_like(moving)
     inertia = np.diag([mass, mass, mass * moment(outline) / area])
-    # The coefficient is that of the speed at the start of the step (of the prescribed speed itself), the velocity that at its end; what couples
-    # turning and drift, that of the body without contacts and line.
+    # The coefficient is that of the speed at the start of the step (of the prescribed speed itself), the velocity that
+    # at its end; what couples turning and drift, that of the body without contacts and line.
     for k in range(len(t)):
         at = (u if prescribed else start)[:, k]
-        matrix, load = outline_drag(outline, before[k], at, flow[0, :, k], 1027 * 5e-4 * area, 0.5 * 1027 * 0.85 * draft)
-        of_air = outline_drag(outline, before[k], at, flow[1, :, k], 1.29 * 2.5e-4 * area, 0.5 * 1.29 * 0.4 * (height - draft))
+        matrix, load = outline_drag(outline, before[k], at, flow[0, :, k], 1027 * 5e-4 * area,
+                                    0.5 * 1027 * 0.85 * draft)
+        of_air = outline_drag(outline, before[k], at, flow[1, :, k], 1.29 * 2.5e-4 * area,
+                              0.5 * 1.29 * 0.4 * (height - draft))
         matrix, load = matrix + of_air[0], load + of_air[1]
         matrix[2, 2] += (1027 * 5e-4 + 1.29 * 2.5e-4) * cubic(outline) * abs(at[2])
         force = load - matrix @ u[:, k]
@@ -220,8 +259,15 @@ def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
 
     Newton's law of restitution alone gains energy where several contacts, or friction, act at once (Kane's paradox).
     """
-    r = run(tmp_path, changed(TOW, tow__mode=mode, ice__restitution=restitution, ice__friction=friction, solver__tolerance=1e-7,
-                              ice__concentration=0.4, solver__max_sweeps=3000))
+    r = run(
+        tmp_path,
+        changed(TOW,
+                tow__mode=mode,
+                ice__restitution=restitution,
+                ice__friction=friction,
+                solver__tolerance=1e-7,
+                ice__concentration=0.4,
+                solver__max_sweeps=3000))
     work = r.series("contact_work")
     assert work.min() < -1e-3, "nothing collided"
     assert work.max() <= 1e-5
@@ -242,10 +288,12 @@ def test_unconverged_steps_are_told(tmp_path):
     n = r.summary["unconverged_steps"]
     assert n == unconverged.sum() > 20
     assert n == np.sum(residual > 0.13 * 1e-3)
-    # The limit is one of work: six updates of every contact (of a point or two) for each of two sweeps, and a tenth more, which the last sweep may pass by two turns;
-    # a step that outruns its margin is solved again, at most four times. No step here takes more than three for each sweep and solution.
+    # The limit is one of work: six updates of every contact (of a point or two) for each of two sweeps, and a tenth
+    # more, which the last sweep may pass by two turns; a step that outruns its margin is solved again, at most four
+    # times. No step here takes more than three for each sweep and solution.
     assert np.all(updates <= 5 * (3 * 2 + 2) * r.series("contacts"))
-    assert r.summary["mean_unit_updates"] == pytest.approx(updates.mean()) and r.summary["mean_sweeps"] == pytest.approx(sweeps.mean())
+    assert r.summary["mean_unit_updates"] == pytest.approx(
+        updates.mean()) and r.summary["mean_sweeps"] == pytest.approx(sweeps.mean())
     plain = run(tmp_path, changed(TOW, solver__max_sweeps=2, solver__plain=True), name="plain")
     swept, moved = plain.series("sweeps", "momentum_moves")
     assert np.median(swept) == 2 and swept.max() <= 2 * 5 and not moved.any()
@@ -259,10 +307,16 @@ def test_unconverged_steps_are_told(tmp_path):
 
 
 def test_the_mean_does_not_hang_on_the_tolerance(tmp_path):
-    """Tenfold tighter: the mean over four fields moves by less than its standard error, each single one by less than two."""
+    """Tenfold tighter: the mean over four fields moves by less than its standard error, each single one by less than
+    two."""
     change, error = [], []
     for seed in (1, 2, 3, 4):
-        case = changed(TOW, ice__concentration=0.3, ice__seed=seed, run__duration=60, domain__length=16, solver__max_sweeps=2000)
+        case = changed(TOW,
+                       ice__concentration=0.3,
+                       ice__seed=seed,
+                       run__duration=60,
+                       domain__length=16,
+                       solver__max_sweeps=2000)
         a = run(tmp_path, case, name=f"a{seed}").summary
         b = run(tmp_path, changed(case, solver__tolerance=1e-4), name=f"b{seed}").summary
         change.append(b["mean_ice_resistance_n"] - a["mean_ice_resistance_n"])
@@ -280,7 +334,8 @@ def test_periodic_both_ways_keeps_every_floe(tmp_path):
     assert r.summary["floes_outside"] == 0
     pose = r.dataset("/frames/pose")
     assert pose.shape == (61, r.summary["n_floes"], 3) and np.isfinite(pose).all()
-    assert np.all((pose[:, :, 0] >= 0) & (pose[:, :, 0] < 12)) and np.all((pose[:, :, 1] >= -3.5) & (pose[:, :, 1] < 3.5))
+    assert np.all((pose[:, :, 0] >= 0) & (pose[:, :, 0] < 12)) and np.all((pose[:, :, 1] >= -3.5)
+                                                                          & (pose[:, :, 1] < 3.5))
     # The body has been round: its series go on, its frames wrap.
     x, y = r.series("body_x", "body_y")
     way = 0.3 * (60 - 0.5) * np.array([np.cos(np.radians(30)), np.sin(np.radians(30))])
@@ -319,12 +374,17 @@ def test_walls_keep_floes_in(tmp_path):
 
 def test_floes_by_hand(tmp_path):
     """A large floe is pushed by the body into small ones, and all against a fixed one."""
-    small = [{"shape": "square", "length": 0.5, "x": 7 + 0.7 * (i % 3), "y": -1.5 + 0.7 * (i // 3), "yaw": 11 * i} for i in range(15)]
+    small = [{"shape": "square", "length": 0.5, "x": 7 + 0.7 * (i % 3), "y": -1.5 + 0.7 * (i // 3), "yaw": 11 * i}
+             for i in range(15)]
     case = {
-        "run": {"dt": 0.1, "duration": 11}, "domain": {"length": 14, "width": 8}, "ice": {"concentration": 0},
-        "body": {"shape": "disc", "length": 2, "x": 2}, "tow": {"speed": 0.3, "ramp": 0}, "output": {"frame_interval": 0.5},
-        "floes": [{"shape": "rectangle", "length": 2.4, "width": 5, "x": 5, "y": 0.2}] + small
-                 + [{"shape": "square", "length": 1, "x": 11, "y": 0, "yaw": 45, "fixed": True, "thickness": 1}],
+        "run": {"dt": 0.1, "duration": 11},
+        "domain": {"length": 14, "width": 8},
+        "ice": {"concentration": 0},
+        "body": {"shape": "disc", "length": 2, "x": 2},
+        "tow": {"speed": 0.3, "ramp": 0},
+        "output": {"frame_interval": 0.5},
+        "floes": [{"shape": "rectangle", "length": 2.4, "width": 5, "x": 5, "y": 0.2}] + small +
+        [{"shape": "square", "length": 1, "x": 11, "y": 0, "yaw": 45, "fixed": True, "thickness": 1}],
     }
     r = run(tmp_path, case)
     pose = r.dataset("/frames/pose")
@@ -350,7 +410,9 @@ def test_floes_by_hand_beside_a_field(tmp_path):
         v, o, pose = f["floes/vertices"][:], f["floes/offsets"][:], f["frames/pose"][0]
     assert worst_overlap([placed(v[o[i]:o[i + 1]], p) for i, p in enumerate(pose)]) < 1e-3
     assert pose[-1, 0] == 9
-    clash = changed(TOW, floes=[{"shape": "disc", "length": 3, "x": 9, "y": 0.5}, {"shape": "disc", "length": 1, "x": 10, "y": 0.5}],
+    clash = changed(TOW,
+                    floes=[{"shape": "disc", "length": 3, "x": 9, "y": 0.5},
+                           {"shape": "disc", "length": 1, "x": 10, "y": 0.5}],
                     ice__concentration=0)
     refused = run(tmp_path, clash, name="clash", code=CASE)
     assert "overlap by" in refused.result.stderr
@@ -359,8 +421,11 @@ def test_floes_by_hand_beside_a_field(tmp_path):
 # ---- free drift ----
 
 DRIFT = {
-    "run": {"dt": 5, "duration": 10000}, "domain": {"frame": "geographic", "length": 20000, "width": 20000, "ends": "open", "sides": "open"},
-    "ice": {"concentration": 0, "thickness": 1}, "body": {"shape": "disc", "length": 100, "draft": 50, "sail": 7}, "tow": {"mode": "none"},
+    "run": {"dt": 5, "duration": 10000},
+    "domain": {"frame": "geographic", "length": 20000, "width": 20000, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "thickness": 1},
+    "body": {"shape": "disc", "length": 100, "draft": 50, "sail": 7},
+    "tow": {"mode": "none"},
     "floes": [{"shape": "disc", "length": 40, "x": 300, "y": 300}],
 }
 
@@ -374,7 +439,8 @@ def drift(folder, name, **changes):
 
 @pytest.mark.parametrize("angle", [0, 60, 200])
 def test_bodies_drift_with_the_wind(tmp_path, angle):
-    """Without Coriolis exactly along the wind, at the speed at which air and water drag are equal: the square-root law."""
+    """Without Coriolis exactly along the wind, at the speed at which air and water drag are equal: the square-root
+    law."""
     wind = 10 * np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])
     body, floe, r = drift(tmp_path, "out", air={"wind_x": wind[0], "wind_y": wind[1]})
     along = wind / 10
@@ -402,7 +468,12 @@ def test_coriolis_turns_right_in_the_north_and_left_in_the_south(tmp_path):
 
 def test_coriolis_in_the_basin_frame(tmp_path):
     """There y is to the left of x, seen from above: right is −y."""
-    case = changed(DRIFT, domain__frame="basin", domain__x0=-10000, body__x=0, air={"wind_x": 10}, water={"latitude": 75})
+    case = changed(DRIFT,
+                   domain__frame="basin",
+                   domain__x0=-10000,
+                   body__x=0,
+                   air={"wind_x": 10},
+                   water={"latitude": 75})
     r = run(tmp_path, case)
     x, y = r.series("body_x", "body_y")
     assert x[-1] > 0 and y[-1] < -0.02 * x[-1]

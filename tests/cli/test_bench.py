@@ -18,8 +18,15 @@ import bench  # noqa: E402
 
 
 def start(*args):
-    return subprocess.run(["/usr/bin/python3", str(SCALING / "bench.py"), "--bergtow", str(BERGTOW), "--triad", str(TRIAD), *map(str, args)],
-                          capture_output=True, text=True, timeout=300)
+    return subprocess.run([
+        "/usr/bin/python3",
+        str(SCALING / "bench.py"), "--bergtow",
+        str(BERGTOW), "--triad",
+        str(TRIAD), *map(str, args)
+    ],
+                          capture_output=True,
+                          text=True,
+                          timeout=300)
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +72,8 @@ def test_picture_and_machine(small):
     out, _ = small
     assert (out / "bench.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" and (out / "bench.png").stat().st_size > 40000
     machine = (out / "machine.txt").read_text()
-    for line in ("Model name: .+", "L3 cache: .+", "bergtow compiler: .+", "bergtow flags: -O", "bergtow revision: .+", r"load average before: \d",
-                 r"triad, 1 thread: median \d"):
+    for line in ("Model name: .+", "L3 cache: .+", "bergtow compiler: .+", "bergtow flags: -O", "bergtow revision: .+",
+                 r"load average before: \d", r"triad, 1 thread: median \d"):
         assert re.search("^" + line.replace(": ", r":\s*"), machine, re.M), (line, machine)
 
 
@@ -74,8 +81,9 @@ def test_fields_are_made_once_and_keys_reach_the_run(small):
     out, rows = small
     before = {p: p.stat().st_mtime_ns for p in (out / "fields").iterdir()}
     assert len(before) == 8
-    done = start("--sizes", 300, "--scenes", "tow-95", "--steps", 2, "--repeats", 1, "--cores", 1, "--triad-mib", 4, "--out", out,
-                 "--set", "solver.plain=true", "--set", "solver.max_sweeps=5", "--set", "solver.tolerance=1e-9")
+    done = start("--sizes", 300, "--scenes", "tow-95", "--steps", 2, "--repeats", 1, "--cores", 1, "--triad-mib", 4,
+                 "--out", out, "--set", "solver.plain=true", "--set", "solver.max_sweeps=5", "--set",
+                 "solver.tolerance=1e-9")
     assert done.returncode == 0, done.stderr
     with open(out / "bench.csv", newline="") as f:
         (row,) = csv.DictReader(f)
@@ -87,15 +95,19 @@ def made_up(n, ranks, threads, wall, sweep_bytes=None, **other):
     """A record of 10 steps with 1000 contacts in 4 sweeps each, half of the time in the phase solve."""
     phases = dict.fromkeys(bench.PHASES, 0.0)
     phases["solve"] = wall / 2
-    s = {"n_floes": n, "ranks": ranks, "threads": threads, "n_steps": 10, "dt_s": 1, "wall_time_s": wall, "ns_per_floe_step": 1e9 * wall / n / 10,
-         "phases_s": phases, "mean_sweeps": 4, "contacts_mean": 1000, "unconverged_steps": 0, "state_hash": "0", **other}
+    s = {
+        "n_floes": n, "ranks": ranks, "threads": threads, "n_steps": 10, "dt_s": 1, "wall_time_s": wall,
+        "ns_per_floe_step": 1e9 * wall / n / 10, "phases_s": phases, "mean_sweeps": 4, "contacts_mean": 1000,
+        "unconverged_steps": 0, "state_hash": "0", **other
+    }
     if sweep_bytes:
         s["sweep_bytes_per_contact"] = sweep_bytes
     return bench.record("tow-80", n, s, 10 * 1000 * 4, None)
 
 
 def test_figures_of_known_runs():
-    records = [made_up(1000, 1, 1, w) for w in (2.0, 1.0, 9.0)] + [made_up(1000, 1, 2, 1.25)] + [made_up(2000, 1, 1, 5.0)]
+    records = [made_up(1000, 1, 1, w)
+               for w in (2.0, 1.0, 9.0)] + [made_up(1000, 1, 2, 1.25)] + [made_up(2000, 1, 1, 5.0)]
     records += [made_up(2000, 2, 1, 2.5, sweep_bytes=100, edge_cut=7, memory_per_floe_b=900)]
     one, two, large, ranks = bench.tables(records, {1: [10.0], 2: [30.0, 10.0, 16.0]})
     assert (one["runs"], one["wall_s"], one["wall_min_s"], one["wall_max_s"]) == (3, 2.0, 1.0, 9.0)
@@ -104,7 +116,8 @@ def test_figures_of_known_runs():
     assert (large["speedup"], large["weak_efficiency"]) == (1, None)
     # 2,000 floes on two cores in 2.5 s against 1,000 on one in 2 s
     assert (ranks["speedup"], ranks["efficiency"], ranks["weak_efficiency"]) == (2, 1, pytest.approx(0.8))
-    assert one["contact_sweeps_per_s"] == pytest.approx(4e4) and ranks["weak_solve_efficiency"] == pytest.approx(3.2e4 / (2 * 4e4))
+    assert one["contact_sweeps_per_s"] == pytest.approx(4e4) and ranks["weak_solve_efficiency"] == pytest.approx(
+        3.2e4 / (2 * 4e4))
     assert (ranks["edge_cut"], ranks["bytes_per_floe"], one["edge_cut"], one["sweep_gb_s"]) == (7, 900, None, None)
     assert ranks["sweep_gb_s"] == pytest.approx(3.2e-3) and ranks["sweep_of_triad"] == pytest.approx(3.2e-3 / 16)
     assert one["solve_share"] == 0.5 and one["state_hash"] == "0"
@@ -122,8 +135,10 @@ def test_every_column_is_explained():
     assert [name for name in bench.COLUMNS if f"`{name}`" not in text] == []
 
 
-@pytest.mark.parametrize("args, words", [(["--scenes", "tow-81"], "no such scene; there are tow-80"), (["--sizes", "300;600"], "whole numbers"),
-                                         (["--sizes", "20"], "at least 300"), (["--set", "run.dt"], "KEY=VALUE"), (["--triad", "/nowhere"], "is missing; run `make bench`")])
+@pytest.mark.parametrize("args, words", [(["--scenes", "tow-81"], "no such scene; there are tow-80"),
+                                         (["--sizes", "300;600"], "whole numbers"), (["--sizes", "20"], "at least 300"),
+                                         (["--set", "run.dt"], "KEY=VALUE"),
+                                         (["--triad", "/nowhere"], "is missing; run `make bench`")])
 def test_wrong_use(args, words, tmp_path):
     done = start("--out", tmp_path, *args)
     assert done.returncode == 2 and words in done.stderr

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The case files that are shipped: all are valid, the bridle of 2005 parts, and every number of cases/field says where it is from.
+"""The case files that are shipped: all are valid, the bridle of 2005 parts, and every number of cases/field says where
+it is from.
 """
 import re
 
@@ -52,9 +53,13 @@ def test_a_shipped_case_is_valid(path):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_number_of_a_case_says_where_it_is_from(name):
     """Every key has a mark [P], [R] or [A], but for the seed, the body's place, and words that choose a form."""
-    plain = {"x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type", "conversion"}
+    plain = {
+        "x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type",
+        "conversion"
+    }
     told = 0
-    for line in (FIELD / f"{name}.yml").read_text().splitlines():
+    lists_on_one_line = re.sub(r"\],\n\s+\[", "], [", (FIELD / f"{name}.yml").read_text())
+    for line in lists_on_one_line.splitlines():
         match = re.match(r"\s*(?:- )?(\w+): ", line)
         if not match or match[1] in plain or line.startswith("#"):
             continue
@@ -66,7 +71,8 @@ def test_every_number_of_a_case_says_where_it_is_from(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_readme_has_the_numbers_of_the_case(name):
-    """Every row of a section's table is marked published, reported or assumed with a source or a reason, and the section speaks of this case."""
+    """Every row of a section's table is marked published, reported or assumed with a source or a reason, and the
+    section speaks of this case."""
     section = re.search(rf"^## {name}\n(.*?)(?=^## |\Z)", README, re.S | re.M)[1]
     rows = [line for line in section.splitlines() if re.match(r"\| .*\|$", line) and not line.startswith("| ---")]
     marks = [re.search(r"\b(published|reported|assumed)\b \(", row) for row in rows[1:] if "±" not in row]
@@ -81,11 +87,13 @@ def test_the_readme_has_the_numbers_of_the_case(name):
 
 def test_the_bridle_of_2005_parts_as_the_vessel_speeds_up_again(tmp_path):
     """Slowed at the large floe the line hangs slack; then the worn branch parts, and the tow goes on with the other."""
-    r = run(tmp_path, FIELD / "barents-2005.yml", "--threads", 1, "--quiet", "--steps", 690, "--set", "output.frame_interval=1h")
+    r = run(tmp_path, FIELD / "barents-2005.yml", "--threads", 1, "--quiet", "--steps", 690, "--set",
+            "output.frame_interval=1h")
     with h5py.File(r.dir / "result.h5") as f:
         kinds, subjects, when, value = (f[f"events/{k}"][:] for k in ("kind", "subject", "time", "value"))
     assert list(kinds) == [0] and list(subjects) == [1] and 1200 < when[0] < 1380 and value[0] > 500e3
-    time, speed, one, two, yaw, thrust = r.series("time", "vessel_speed", "line_tension_1", "line_tension_2", "body_yaw", "vessel_thrust")
+    time, speed, one, two, yaw, thrust = r.series("time", "vessel_speed", "line_tension_1", "line_tension_2",
+                                                  "body_yaw", "vessel_thrust")
     slack = (time > 1000) & (time < 1200)
     assert (one[slack] == 0).all() and (two[slack] == 0).all() and speed[slack].max() < 0.3, "hindered, the line hangs"
     after = time > when[0] + 1
@@ -95,7 +103,9 @@ def test_the_bridle_of_2005_parts_as_the_vessel_speeds_up_again(tmp_path):
     assert abs(yaw[-1] - yaw[np.searchsorted(time, when[0])]) > 0.1, "the berg turns to the branch that is left"
 
 
-@pytest.mark.parametrize("path", sorted([*(ROOT / "cases").glob("*/README.md"), ROOT / "postproc/README.md"]), ids=lambda p: p.parent.name)
+@pytest.mark.parametrize("path",
+                         sorted([*(ROOT / "cases").glob("*/README.md"), ROOT / "postproc/README.md"]),
+                         ids=lambda p: p.parent.name)
 def test_an_error_says_what_it_is(path):
     """± is one standard error, and the page says so."""
     text = path.read_text()

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt, `check` calls valid with a warning."""
+"""What `run` refuses, `check` refuses: the same message, the same exit code. What `run` goes through with a doubt,
+`check` calls valid with a warning."""
 import os
 
 import pytest
@@ -11,9 +12,16 @@ PIER = {"shape": "square", "length": 1, "x": 6, "y": 0, "fixed": True}
 WATER = changed(TOW, ice__concentration=0)
 
 REFUSED = {
-    "no room for the images": (changed(WATER, domain__width=2.9, domain__sides="periodic", body__length=1.6, floes=[PIER | {"x": 10, "length": 1.3, "fixed": False}]), CASE, "no room for the two largest bodies"),
-    "a pier on the path": (changed(WATER, tow__speed=0.3, floes=[PIER]), CASE, "which cannot give way, on its prescribed path"),
-    "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False}, PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
+    "no room for the images": (changed(WATER,
+                                       domain__width=2.9,
+                                       domain__sides="periodic",
+                                       body__length=1.6,
+                                       floes=[PIER | {"x": 10, "length": 1.3, "fixed": False}]), CASE,
+                               "no room for the two largest bodies"),
+    "a pier on the path": (changed(WATER, tow__speed=0.3,
+                                   floes=[PIER]), CASE, "which cannot give way, on its prescribed path"),
+    "floes in each other": (changed(WATER, floes=[PIER | {"x": 9, "y": 2, "fixed": False},
+                                                  PIER | {"x": 9.5, "y": 2}]), CASE, "overlap by"),
     "a floe on the body": (changed(WATER, floes=[PIER | {"x": 3, "y": 1, "fixed": False}]), CASE, "overlap by"),
     "a field that is not there": (changed(TOW, ice__field="none.h5"), IO, "none.h5"),
     "no field": (changed(TOW, ice__field="case.yml"), CASE, "case.yml"),
@@ -37,7 +45,8 @@ def test_check_refuses_what_run_refuses(tmp_path, name):
 
 @pytest.mark.skipif(not GB < 55, reason="this machine has room for the largest field")
 def test_memory_beyond_the_machine(tmp_path):
-    case = changed(TOW, domain__length=6000, domain__width=2000, ice__concentration=0.6, run__duration=0.1)  # 18 million floes
+    # 18 million floes
+    case = changed(TOW, domain__length=6000, domain__width=2000, ice__concentration=0.6, run__duration=0.1)
     checked, ran = both(tmp_path, case)
     assert ran.returncode == CASE and "GB of memory, and this machine has" in ran.stderr
     assert (checked.returncode, checked.stderr) == (ran.returncode, ran.stderr)
@@ -58,8 +67,10 @@ def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
     case = changed(TOW, run__dt=0.6, run__duration=3, tow__ramp=1)
     checked = call("check", write_case(tmp_path, case))
     lines = checked.stdout.splitlines()
-    assert checked.returncode == DONE and lines[0].endswith("case.yml: valid, with 2 warnings") and lines[-1] == lines[0]
-    assert lines[-3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; take at most 0.1 s"
+    assert checked.returncode == DONE and lines[0].endswith(
+        "case.yml: valid, with 2 warnings") and lines[-1] == lines[0]
+    assert lines[
+        -3] == "warning              run.dt: 0.6 s is longer than a collision lasts in a basin; take at most 0.1 s"
     assert lines[-2].startswith("warning              run.dt: in 0.6 s floes move 0.111 of their size")
     run(tmp_path, case)
     good = call("check", write_case(tmp_path, TOW)).stdout
@@ -69,7 +80,8 @@ def test_a_time_step_that_is_too_large_is_a_warning(tmp_path):
 def test_a_start_that_jerks_the_line_is_a_warning(tmp_path):
     line = {"mode": "line", "speed": 0.13, "line_length": 3, "line_stiffness": 1000}
     lines = call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 1}))).stdout.splitlines()
-    assert lines[0].endswith("valid, with 1 warning") and lines[-1] == lines[0] and lines[-2].startswith("warning              tow.ramp: 1 s is short for a body that swings on its line")
+    assert lines[0].endswith("valid, with 1 warning") and lines[-1] == lines[0] and lines[-2].startswith(
+        "warning              tow.ramp: 1 s is short for a body that swings on its line")
     assert "warning" not in call("check", write_case(tmp_path, changed(TOW, tow=line | {"ramp": 100}))).stdout
 
 
@@ -107,8 +119,13 @@ def test_sizes_have_no_default_in_the_geographic_frame(tmp_path):
 def test_what_needs_no_size_is_not_asked_for_one(tmp_path):
     assert missing(tmp_path, changed(MAP, ice={"concentration": 0})) == (DONE, [])
     assert missing(tmp_path, changed(MAP, body={"shape": "none"}, tow={"mode": "none"})) == (DONE, [])
-    assert missing(tmp_path, changed(MAP, body={"shape": "polygon", "vertices": [[-40, -20], [40, -20], [0, 30]], "draft": 20})) == (DONE, [])
-    assert missing(tmp_path, changed(MAP, ice={"concentration": 0.2, "thickness": 1, "size_law": "power", "size_min": 20, "size_max": 60})) == (DONE, [])
+    assert missing(tmp_path,
+                   changed(MAP, body={"shape": "polygon", "vertices": [[-40, -20], [40, -20], [0, 30]],
+                                      "draft": 20})) == (DONE, [])
+    assert missing(
+        tmp_path,
+        changed(MAP, ice={"concentration": 0.2, "thickness": 1, "size_law": "power", "size_min": 20,
+                          "size_max": 60})) == (DONE, [])
     floe = {"shape": "disc", "length": 40, "x": 300, "y": 0}
     assert missing(tmp_path, changed(MAP, ice={"concentration": 0}, floes=[floe])) == (CASE, ["ice.thickness"])
     assert missing(tmp_path, changed(MAP, ice={"concentration": 0}, floes=[floe | {"thickness": 1}])) == (DONE, [])

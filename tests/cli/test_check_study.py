@@ -9,9 +9,11 @@ import pytest
 from harness import BERGTOW, CASE, DONE, IO, TOW, USAGE, call, changed, environment, write_case
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
-STUDY = {"title": "three ices", "base": "base.yml", "repeats": 7, "set": {"ice.friction": 0.2},
-         "parameters": {"ice.concentration": [0.2, 0.5, 0.7], "tow.speed": {"from": "0.1 m/s", "to": "0.2 m/s", "n": 2}},
-         "with": {"ice.concentration=0.7": {"run.duration": "40 s"}}}
+STUDY = {
+    "title": "three ices", "base": "base.yml", "repeats": 7, "set": {"ice.friction": 0.2},
+    "parameters": {"ice.concentration": [0.2, 0.5, 0.7], "tow.speed": {"from": "0.1 m/s", "to": "0.2 m/s", "n": 2}},
+    "with": {"ice.concentration=0.7": {"run.duration": "40 s"}}
+}
 SECONDS = {"s": 1, "min": 60, "h": 3600, "days": 86400}
 
 
@@ -43,14 +45,19 @@ def seconds(text):
 def test_the_study_in_numbers(tmp_path):
     text = checked(tmp_path, STUDY)
     assert text.startswith("study.yml: valid, with warnings in 2 of 6 conditions\n")  # at 70 % arches reach the walls
-    assert line(text, "title") == "three ices" and line(text, "base") == "base.yml" and line(text, "set") == "ice.friction=0.2"
-    assert line(text, "ice.concentration") == "0.2, 0.5, 0.7" and line(text, "tow.speed") == "0.1, 0.2" and line(text, "members") == "6 conditions x 7 fields = 42"
+    assert line(text, "title") == "three ices" and line(text, "base") == "base.yml" and line(
+        text, "set") == "ice.friction=0.2"
+    assert line(text, "ice.concentration") == "0.2, 0.5, 0.7" and line(text, "tow.speed") == "0.1, 0.2" and line(
+        text, "members") == "6 conditions x 7 fields = 42"
     head, table = rows(text)
     assert head == ["condition", "ice.concentration", "tow.speed", "floes", "steps", "one run", "time step"]
-    assert [row[:3] for row in table] == [[str(k + 1), c, v] for k, (c, v) in enumerate((c, v) for c in ("0.2", "0.5", "0.7") for v in ("0.1", "0.2"))]
+    assert [row[:3] for row in table] == [[str(k + 1), c, v] for k, (c, v) in enumerate((c, v)
+                                                                                        for c in ("0.2", "0.5", "0.7")
+                                                                                        for v in ("0.1", "0.2"))]
     total = 0
     for row in table:
-        more = ["--set", f"ice.concentration={row[1]}", "--set", f"tow.speed={row[2]}"] + (["--set", "run.duration=40"] if row[1] == "0.7" else [])
+        more = ["--set", f"ice.concentration={row[1]}", "--set", f"tow.speed={row[2]}"
+                ] + (["--set", "run.duration=40"] if row[1] == "0.7" else [])
         alone = call("check", "base.yml", *more, cwd=tmp_path).stdout
         assert line(alone, "floes") == f"about {row[3]}" and line(alone, "steps").startswith(f"{row[4]} of ")
         assert f"rough estimate {row[5]} on one core" in alone
@@ -60,26 +67,40 @@ def test_the_study_in_numbers(tmp_path):
 
 
 def test_time_steps_that_are_too_large_are_told(tmp_path):
-    head, table = rows(checked(tmp_path, {"base": "base.yml", "set": {"run.duration": 10}, "parameters": {"run.dt": [0.1, 0.2], "tow.speed": [0.1, 0.9]}}))
-    assert [row[-1] for row in table] == ["ok", "TOO LARGE", "TOO LARGE", "TOO LARGE"]  # 0.9 m/s: an eighth of a floe in 0.1 s; 0.2 s: longer than a collision
+    head, table = rows(
+        checked(tmp_path, {
+            "base": "base.yml", "set": {"run.duration": 10},
+            "parameters": {"run.dt": [0.1, 0.2], "tow.speed": [0.1, 0.9]}
+        }))
+    # 0.9 m/s: an eighth of a floe in 0.1 s; 0.2 s: longer than a collision
+    assert [row[-1] for row in table] == ["ok", "TOO LARGE", "TOO LARGE", "TOO LARGE"]
     assert [row[-3] for row in table] == ["100", "100", "50", "50"]
 
 
 def test_many_conditions_are_a_range(tmp_path):
     parameters = {"ice.concentration": [0.2, 0.5], "tow.speed": {"from": 0.1, "to": 0.9, "n": 20}}
     text = checked(tmp_path, {"base": "base.yml", "set": {"run.duration": 10}, "parameters": parameters})
-    few = checked(tmp_path, {"base": "base.yml", "set": {"run.duration": 10}, "parameters": {"ice.concentration": [0.2, 0.5]}})
+    few = checked(tmp_path,
+                  {"base": "base.yml", "set": {"run.duration": 10}, "parameters": {"ice.concentration": [0.2, 0.5]}})
     floes, one = ([row[k] for row in rows(few)[1]] for k in (2, 4))
-    assert "\ncondition" not in text and line(text, "floes") == " to ".join(floes) and line(text, "one run") == f"rough estimate {one[0]} to {one[1]} on one core"
-    assert re.match(r"TOO LARGE in \d+ conditions", line(text, "time step")) and line(text, "members") == "40 conditions x 1 fields = 40"
+    assert "\ncondition" not in text and line(text, "floes") == " to ".join(floes) and line(
+        text, "one run") == f"rough estimate {one[0]} to {one[1]} on one core"
+    assert re.match(r"TOO LARGE in \d+ conditions", line(text, "time step")) and line(
+        text, "members") == "40 conditions x 1 fields = 40"
     assert line(text, "tow.speed").endswith("... 0.9 (20 values)")
 
 
 def test_a_hypercube_and_variants(tmp_path):
-    text = checked(tmp_path, {"base": "base.yml", "sampling": "latin-hypercube", "samples": 30, "ranks": 2, "fields": "common",
-                              "parameters": {"ice.friction": {"from": 0.1, "to": 0.4, "scale": "log"}}, "variants": {"squares": {"ice.shape": "rectangles", "ice.aspect": 1}, "cells": {}}})
-    assert line(text, "ice.friction") == "0.1 to 0.4, logarithmic" and line(text, "variant") == "squares, cells" and line(text, "  squares") == "ice.shape=rectangles, ice.aspect=1"
-    assert line(text, "members") == "30 conditions x 1 fields = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"
+    text = checked(
+        tmp_path, {
+            "base": "base.yml", "sampling": "latin-hypercube", "samples": 30, "ranks": 2, "fields": "common",
+            "parameters": {"ice.friction": {"from": 0.1, "to": 0.4, "scale": "log"}
+                           }, "variants": {"squares": {"ice.shape": "rectangles", "ice.aspect": 1}, "cells": {}}
+        })
+    assert line(text, "ice.friction") == "0.1 to 0.4, logarithmic" and line(
+        text, "variant") == "squares, cells" and line(text, "  squares") == "ice.shape=rectangles, ice.aspect=1"
+    assert line(text, "members"
+                ) == "30 conditions x 1 fields = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"
 
 
 def test_faults_name_place_and_conditions(tmp_path):
@@ -92,17 +113,24 @@ with:
     domain.width: 1
 """, CASE)
     assert len(found) == 2, found  # each fault once, though it is of several conditions
-    assert re.search(r"base\.yml:\d+: output\.window_start: 5 s is not before the end .*; give an earlier time \(condition 4: run\.duration 3, tow\.speed 0\.1; and 2 more\)$", found[1]), found
-    assert re.search(r"base\.yml:\d+: body\.length: .* \(condition 3: run\.duration 8, tow\.speed 0\.3; and 1 more\)$", found[0]), found
+    assert re.search(
+        r"base\.yml:\d+: output\.window_start: 5 s is not before the end .*; give an earlier time \(condition 4: "
+        r"run\.duration 3, tow\.speed 0\.1; and 2 more\)$",
+        found[1]), found
+    assert re.search(r"base\.yml:\d+: body\.length: .* \(condition 3: run\.duration 8, tow\.speed 0\.3; and 1 more\)$",
+                     found[0]), found
 
 
 def test_a_fault_of_a_value_names_its_line_of_the_study(tmp_path):
     """An end of the ice region that no base has: the fault is of the override, not of the base."""
-    found = checked(tmp_path, "base: base.yml\nset:\n  ice.friction: 0.1\nparameters:\n  ice.x_max:\n    [10, 99]\n", CASE)
-    assert len(found) == 1 and re.match(r"bergtow: study\.yml:5: ice\.x_max=99: .* \(condition 2: ice\.x_max 99\)$", found[0]), found
+    found = checked(tmp_path, "base: base.yml\nset:\n  ice.friction: 0.1\nparameters:\n  ice.x_max:\n    [10, 99]\n",
+                    CASE)
+    assert len(found) == 1 and re.match(r"bergtow: study\.yml:5: ice\.x_max=99: .* \(condition 2: ice\.x_max 99\)$",
+                                        found[0]), found
     variants = "base: base.yml\nvariants:\n  near: {ice.x_max: 10}\n  far:\n    ice.friction: 0.1\n    ice.x_max: 99\n"
     assert checked(tmp_path, variants, CASE)[0].startswith("bergtow: study.yml:6: ice.x_max=99: ")
-    assert checked(tmp_path, "base: base.yml\nset:\n\n  ice.x_max: 99\n", CASE)[0].startswith("bergtow: study.yml:4: ice.x_max=99: ")
+    assert checked(tmp_path, "base: base.yml\nset:\n\n  ice.x_max: 99\n",
+                   CASE)[0].startswith("bergtow: study.yml:4: ice.x_max=99: ")
     result = call("ensemble", "study.yml", cwd=tmp_path)
     assert result.returncode == CASE and "study.yml:4: ice.x_max=99: " in result.stderr
 
@@ -119,13 +147,18 @@ def test_faults_of_the_study_and_of_the_base_are_told_once(tmp_path):
 
 def test_what_a_condition_reads_is_looked_at(tmp_path):
     (tmp_path / "there.csv").write_text("t,u,v\n0,0,0\n99,0.1,0\n")
-    study = {"base": "base.yml", "variants": {"still": {}, "table": {"water.current_table": "there.csv"}, "lost": {"water.current_table": "none.csv"}}}
+    study = {
+        "base": "base.yml", "variants": {
+            "still": {}, "table": {"water.current_table": "there.csv"}, "lost": {"water.current_table": "none.csv"}
+        }
+    }
     found = checked(tmp_path, study, IO)
     assert len(found) == 1 and "none.csv" in found[0] and found[0].endswith("(condition 3: variant lost)")
     call("field", "base.yml", "-o", "field.h5", cwd=tmp_path)
     study = {"base": "base.yml", "set": {"ice.field": "field.h5"}, "parameters": {"tow.speed": [0.1, 0.2]}}
     floes = [row[2] for row in rows(checked(tmp_path, study))[1]]
-    assert floes[0] == floes[1] and f"floes                {floes[0]} (read" in call("check", "base.yml", "--set", "ice.field=field.h5", cwd=tmp_path).stdout
+    assert floes[0] == floes[1] and f"floes                {floes[0]} (read" in call(
+        "check", "base.yml", "--set", "ice.field=field.h5", cwd=tmp_path).stdout
     (tmp_path / "field.h5").write_bytes(b"no field")
     assert "(condition 1: tow.speed 0.1; and 1 more)" in checked(tmp_path, study, CASE)[0]
 
@@ -139,9 +172,11 @@ def test_options_of_a_case_are_refused(tmp_path):
 def test_what_is_for_cases_says_that_this_is_a_study(tmp_path, command):
     write_case(tmp_path, BASE, "base.yml")
     (tmp_path / "study.yml").write_text(json.dumps(STUDY))
-    result = call(command, "study.yml", "-o", "out", cwd=tmp_path) if command != "estimate" else call(command, "study.yml", cwd=tmp_path)
+    result = call(command, "study.yml", "-o", "out", cwd=tmp_path) if command != "estimate" else call(
+        command, "study.yml", cwd=tmp_path)
     assert result.returncode == CASE, result.stderr
-    assert "study.yml: is a study" in result.stderr and "bergtow ensemble" in result.stderr and len(result.stderr.splitlines()) == 1
+    assert "study.yml: is a study" in result.stderr and "bergtow ensemble" in result.stderr and len(
+        result.stderr.splitlines()) == 1
 
 
 def test_a_case_in_a_pipe_is_still_read(tmp_path):
@@ -155,6 +190,12 @@ def test_under_mpirun_it_is_said_once(tmp_path):
     env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     for study, code in (STUDY, DONE), (STUDY | {"base": "none.yml"}, IO):
         checked(tmp_path, study, code)
-        result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", "study.yml"], cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60)
+        result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", "study.yml"],
+                                cwd=tmp_path,
+                                env=env,
+                                capture_output=True,
+                                text=True,
+                                timeout=60)
         assert result.returncode == code
-        assert result.stdout == (alone if code == DONE else "") and result.stderr.count("bergtow: study.yml: base: ") == (code != DONE)
+        assert result.stdout == (alone if code == DONE else
+                                 "") and result.stderr.count("bergtow: study.yml: base: ") == (code != DONE)

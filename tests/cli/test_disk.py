@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What `check` says a run leaves on the disk, against what it leaves: within 20 %, on one rank and on two, with checkpoints, panels and read fields."""
+"""What `check` says a run leaves on the disk, against what it leaves: within 20 %, on one rank and on two, with
+checkpoints, panels and read fields."""
 import json
 import re
 import subprocess
@@ -40,7 +41,11 @@ def said(text, words):
 
 def run(folder, path, ranks, *more):
     command = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    result = subprocess.run([*command, BERGTOW, "run", path, "-o", folder, "--threads", "1", "--quiet", *more], env=environment(OMP_NUM_THREADS=1, **MPI), capture_output=True, text=True, timeout=120)
+    result = subprocess.run([*command, BERGTOW, "run", path, "-o", folder, "--threads", "1", "--quiet", *more],
+                            env=environment(OMP_NUM_THREADS=1, **MPI),
+                            capture_output=True,
+                            text=True,
+                            timeout=120)
     assert result.returncode == DONE, result.stderr
     return left(folder)
 
@@ -62,20 +67,29 @@ def test_of_a_field_that_is_read(tmp_path, ranks):
     path = ROOT / "cases/outlines/outlines.yml"
     sets = ["--set", "run.duration=30 s", "--set", "output.window_start=-1"]
     text = call("check", path, *sets).stdout
-    assert said(text, "disk +about" if ranks == 1 else "while it runs;") == pytest.approx(run(tmp_path / "out", path, ranks, *sets), rel=WITHIN)
+    assert said(text, "disk +about" if ranks == 1 else "while it runs;") == pytest.approx(run(
+        tmp_path / "out", path, ranks, *sets),
+                                                                                          rel=WITHIN)
 
 
 def test_under_mpirun_the_estimate_is_of_these_ranks(tmp_path):
     path = write_case(tmp_path, CASES["dense"])
-    several = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", path], env=environment(OMP_NUM_THREADS=1, **MPI), capture_output=True, text=True, timeout=60)
+    several = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", path],
+                             env=environment(OMP_NUM_THREADS=1, **MPI),
+                             capture_output=True,
+                             text=True,
+                             timeout=60)
     alone = call("check", path).stdout
-    assert several.returncode == DONE and said(several.stdout, "disk +about") == said(alone, "while it runs;") > said(alone, "disk +about")
+    assert several.returncode == DONE and said(several.stdout, "disk +about") == said(alone, "while it runs;") > said(
+        alone, "disk +about")
     assert several.stdout.count("\ndomain  ") == 1  # printed once
 
 
 def test_of_a_study(tmp_path):
     write_case(tmp_path, SHORT, "base.yml")
-    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": 2, "parameters": {"ice.concentration": [0.2, 0.5]}}))
+    (tmp_path / "study.yml").write_text(
+        json.dumps({"base": "base.yml", "repeats": 2, "parameters": {"ice.concentration": [0.2, 0.5]}}))
     estimate = said(call("check", "study.yml", cwd=tmp_path).stdout, "disk +about")
     assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
-    assert estimate == pytest.approx(sum(p.stat().st_size for p in (tmp_path / "all").rglob("*") if p.is_file()), rel=WITHIN)
+    assert estimate == pytest.approx(sum(p.stat().st_size for p in (tmp_path / "all").rglob("*") if p.is_file()),
+                                     rel=WITHIN)

@@ -208,3 +208,9 @@ def test_examples_are_valid_cases(path, tmp_path):
         done = call("check", case)
         assert done.returncode == DONE, done.stderr
         assert "warning" not in done.stdout + done.stderr
+
+
+def test_the_force_law_of_the_page_is_the_one_that_is_tested():
+    page = (ROOT / "docs/how-to-add-a-force-law.md").read_text()
+    first = next(lines for language, lines in blocks(page) if language == "c")
+    assert first == (ROOT / "tests/examples/force_law.c").read_text().splitlines()

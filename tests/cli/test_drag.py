@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Form drag along the outline, added mass and free drift at the start, on the program itself, against SciPy and closed forms."""
+"""Form drag along the outline, added mass and free drift at the start, on the program itself, against SciPy and closed
+forms."""
 import h5py
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from test_environment import BERG, CURRENT, DRIFT, FLOE, OMEGA, RHO_A, RHO_W, WE
 
 # The berg of the open literature's usual size, in still water, with nothing near it.
 TURNING = {
-    "run": {"dt": 5, "duration": 1800}, "domain": {"frame": "geographic", "length": 5000, "width": 5000, "ends": "open", "sides": "open"},
-    "ice": {"concentration": 0}, "body": {"shape": "rectangle", "length": 80, "width": 56, "draft": 58, "yaw_rate": 0.3}, "tow": {"mode": "none"},
+    "run": {"dt": 5, "duration": 1800},
+    "domain": {"frame": "geographic", "length": 5000, "width": 5000, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0},
+    "body": {"shape": "rectangle", "length": 80, "width": 56, "draft": 58, "yaw_rate": 0.3},
+    "tow": {"mode": "none"},
 }
 RECTANGLE = np.array([[-40, -28], [40, -28], [40, 28], [-40, 28]], float)
 
@@ -20,7 +24,8 @@ def outline(corners, n=100):
     """Middle, normal and length of n pieces of each side: a plain sum, not the program's quadrature."""
     for p, q in zip(corners, np.roll(corners, -1, axis=0)):
         t = (np.arange(n) + 0.5) / n
-        yield p + t[:, None] * (q - p), np.array([q[1] - p[1], p[0] - q[0]]) / np.hypot(*(q - p)), np.hypot(*(q - p)) / n
+        yield p + t[:, None] * (q - p), np.array([q[1] - p[1], p[0] - q[0]
+                                                  ]) / np.hypot(*(q - p)), np.hypot(*(q - p)) / n
 
 
 def form_drag(corners, v, w, factor):
@@ -34,7 +39,8 @@ def form_drag(corners, v, w, factor):
 
 
 def moments(corners, n=400):
-    """Area and the means of r² and r³, by triangles to the origin: along a ray r^k has a mean of 2/(k + 2) of its end, along the side a plain sum."""
+    """Area and the means of r² and r³, by triangles to the origin: along a ray r^k has a mean of 2/(k + 2) of its end,
+    along the side a plain sum."""
     sums = np.zeros(3)
     for p, q in zip(corners, np.roll(corners, -1, axis=0)):
         r = np.hypot(*(p[:, None] + (q - p)[:, None] * (np.arange(n) + 0.5) / n))
@@ -65,7 +71,8 @@ def integrate(state, time, corners=RECTANGLE, drag=BERG, draft=58):
 @pytest.mark.parametrize("dt", [5, 1])
 @pytest.mark.parametrize("shape, left", [("rectangle", 0.245), ("disc", 0.445)])
 def test_a_turning_berg_is_damped(tmp_path, shape, left, dt):
-    """0.3 deg/s of a berg of 80 x 56 x 58 m, by an independent integration within 1 %; an ellipse is left with 44 % of it after 30 min, skin drag alone with 99.8 %."""
+    """0.3 deg/s of a berg of 80 x 56 x 58 m, by an independent integration within 1 %; an ellipse is left with 44 % of
+    it after 30 min, skin drag alone with 99.8 %."""
     r = run(tmp_path, changed(TURNING, run__dt=dt, body__shape=shape))
     t, spin, vx, vy = r.series("time", "body_yaw_rate", "body_vx", "body_vy")
     with h5py.File(r.dir / "result.h5") as f:
@@ -77,7 +84,8 @@ def test_a_turning_berg_is_damped(tmp_path, shape, left, dt):
 
 
 def test_a_berg_that_turns_and_drifts(tmp_path):
-    """Turning and drift together: the side that meets the water bears the drag, and the path bends. Within 1 % of an independent integration."""
+    """Turning and drift together: the side that meets the water bears the drag, and the path bends. Within 1 % of an
+    independent integration."""
     r = run(tmp_path, changed(TURNING, body__vx=0.3, body__vy=0.1, run__dt=1))
     t, spin, vx, vy, yaw = r.series("time", "body_yaw_rate", "body_vx", "body_vy", "body_yaw")
     u, v, w = integrate([0.3, 0.1, np.radians(0.3)], t)
@@ -90,7 +98,10 @@ def test_a_berg_that_turns_and_drifts(tmp_path):
 
 SHAPES = {
     "disc": {"shape": "disc", "length": 80},
-    "askew": {"shape": "polygon", "vertices": [[40, 4], [28, 24], [0, 29], [-28, 22], [-40, 0], [-30, -22], [-2, -27], [27, -20]]},
+    "askew": {
+        "shape": "polygon", "vertices": [[40, 4], [28, 24], [0, 29], [-28, 22], [-40, 0], [-30, -22], [-2, -27],
+                                         [27, -20]]
+    },
     "triangle": {"shape": "polygon", "vertices": [[40, 0], [-20, 30], [-20, -10]]},
 }
 
@@ -98,8 +109,12 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("yaw", [0, 37])
 def test_translation_has_the_drag_of_the_width(tmp_path, name, yaw):
-    """A body that is led straight on: (half rho C d b + rho C A) v² of water and air, to rounding, whatever its outline."""
-    case = changed(TURNING, body={**SHAPES[name], "draft": 58, "sail": 8, "yaw": yaw}, tow={"mode": "speed", "speed": 0.5, "direction": 20, "ramp": 0}, run__duration=50)
+    """A body that is led straight on: (half rho C d b + rho C A) v² of water and air, to rounding, whatever its
+    outline."""
+    case = changed(TURNING,
+                   body={**SHAPES[name], "draft": 58, "sail": 8, "yaw": yaw},
+                   tow={"mode": "speed", "speed": 0.5, "direction": 20, "ramp": 0},
+                   run__duration=50)
     r = run(tmp_path, case)
     with h5py.File(r.dir / "result.h5") as f:
         area, v = f["bodies/area"][0], f["bodies/vertices"][:f["bodies/offsets"][1]]
@@ -112,8 +127,15 @@ def test_translation_has_the_drag_of_the_width(tmp_path, name, yaw):
 @pytest.mark.parametrize("frame, start", [("geographic", "drift"), ("basin", "rest"), ("basin", "drift")])
 def test_a_geostrophic_current_carries_berg_and_ice(tmp_path, frame, start):
     """Whatever the added mass: Coriolis and slope act on the mass itself and balance at the velocity of the water."""
-    case = changed(DRIFT, domain__frame=frame, domain__x0=-1e5, body__x=0, ice__added_mass=0.3, ice__start=start, air={"wind_x": 0.15, "wind_y": 0.25},
-                   water={"current_x": 0.15, "current_y": 0.25, "latitude": 75, "tilt": "geostrophic"}, run={"dt": 5, "duration": 20000})
+    case = changed(DRIFT,
+                   domain__frame=frame,
+                   domain__x0=-1e5,
+                   body__x=0,
+                   ice__added_mass=0.3,
+                   ice__start=start,
+                   air={"wind_x": 0.15, "wind_y": 0.25},
+                   water={"current_x": 0.15, "current_y": 0.25, "latitude": 75, "tilt": "geostrophic"},
+                   run={"dt": 5, "duration": 20000})
     if start == "rest":  # the velocity of the water by hand: kept
         case = changed(case, body__vx=0.15, body__vy=0.25, floes=[{**DRIFT["floes"][0], "vx": 0.15, "vy": 0.25}])
     r = run(tmp_path, case)
@@ -124,12 +146,19 @@ def test_a_geostrophic_current_carries_berg_and_ice(tmp_path, frame, start):
 
 
 def test_a_changing_current_carries_the_added_mass_too(tmp_path):
-    """tilt: dynamic, wind that goes with the water: berg and floe move with a tide to rounding, added mass and Coriolis or not."""
+    """tilt: dynamic, wind that goes with the water: berg and floe move with a tide to rounding, added mass and Coriolis
+    or not."""
     t = np.arange(0, 20001, 20)
     u = np.array([0.3 * np.cos(2 * np.pi * t / 20000), 0.2 * np.sin(2 * np.pi * t / 20000)])
     (tmp_path / "tide.csv").write_text("t,u,v\n" + "\n".join(f"{a},{b:.17g},{c:.17g}" for a, b, c in zip(t, *u)) + "\n")
-    case = changed(DRIFT, body__vx=0.3, body__vy=0, floes=[{**DRIFT["floes"][0], "vx": 0.3, "vy": 0}], ice__added_mass=0.3, run={"dt": 20, "duration": 20000},
-                   water={"current_table": "tide.csv", "latitude": 75, "tilt": "dynamic"}, air={"wind_table": "tide.csv"})
+    case = changed(DRIFT,
+                   body__vx=0.3,
+                   body__vy=0,
+                   floes=[{**DRIFT["floes"][0], "vx": 0.3, "vy": 0}],
+                   ice__added_mass=0.3,
+                   run={"dt": 20, "duration": 20000},
+                   water={"current_table": "tide.csv", "latitude": 75, "tilt": "dynamic"},
+                   air={"wind_table": "tide.csv"})
     r = run(tmp_path, case)
     vx, vy, cx, cy = r.series("body_vx", "body_vy", "current_x", "current_y")
     assert np.hypot(vx - cx, vy - cy).max() < 1e-9 and np.ptp(cx) > 0.5
@@ -140,9 +169,14 @@ def test_a_changing_current_carries_the_added_mass_too(tmp_path):
 
 @pytest.mark.parametrize("latitude, tilt", [(75, "none"), (75, "geostrophic"), (-60, "none"), (0, "none")])
 def test_ice_and_free_bodies_begin_adrift(tmp_path, latitude, tilt):
-    """The balance of forces, by SciPy, from the first step on, each body its own; and the velocity stays to rounding."""
-    case = changed(DRIFT, **(WEATHER | {"water__latitude": latitude, "water__tilt": tilt}), run={"dt": 2, "duration": 2000}, output={"frame_interval": 100},
-                   floes=[DRIFT["floes"][0], {"shape": "square", "length": 30, "x": -3000, "y": 3000, "thickness": 2.5}])
+    """The balance of forces, by SciPy, from the first step on, each body its own; and the velocity stays to
+    rounding."""
+    case = changed(
+        DRIFT,
+        **(WEATHER | {"water__latitude": latitude, "water__tilt": tilt}),
+        run={"dt": 2, "duration": 2000},
+        output={"frame_interval": 100},
+        floes=[DRIFT["floes"][0], {"shape": "square", "length": 30, "x": -3000, "y": 3000, "thickness": 2.5}])
     r = run(tmp_path, case)
     f = 2 * OMEGA * np.sin(np.radians(latitude))
     balance = CURRENT if tilt == "geostrophic" else (0, 0)
@@ -167,27 +201,46 @@ def test_ice_and_free_bodies_begin_adrift(tmp_path, latitude, tilt):
 
 
 FIELD = {
-    "run": {"dt": 2, "duration": 60}, "domain": {"frame": "geographic", "length": 400, "width": 300, "ends": "periodic", "sides": "periodic"},
-    "ice": {"concentration": 0.5, "size": 20, "thickness": 0.5, "thickness_law": "lognormal"}, "body": {"shape": "disc", "length": 40, "draft": 20}, "tow": {"mode": "none"},
+    "run": {"dt": 2, "duration": 60},
+    "domain": {"frame": "geographic", "length": 400, "width": 300, "ends": "periodic", "sides": "periodic"},
+    "ice": {"concentration": 0.5, "size": 20, "thickness": 0.5, "thickness_law": "lognormal"},
+    "body": {"shape": "disc", "length": 40, "draft": 20},
+    "tow": {"mode": "none"},
 }
 WINDY = changed(FIELD, water={"latitude": 75, "current_x": 0.1}, air={"wind_x": 8, "wind_y": -5})
 
 
 def test_rest_is_rest_and_without_water_or_wind_nothing_changes(tmp_path):
-    still = {start: run(tmp_path, changed(FIELD, ice__start=start, water={"latitude": 75}), name=start) for start in ("drift", "rest")}
+    still = {
+        start: run(tmp_path, changed(FIELD, ice__start=start, water={"latitude": 75}), name=start)
+        for start in ("drift", "rest")
+    }
     assert still["drift"].hash == still["rest"].hash
     ways = []
     for start in ("rest", "drift"):
-        r = run(tmp_path, changed(WINDY, ice__start=start, run={"dt": 0.1, "duration": 1}, output={"frame_interval": 0.1}), name=f"windy {start}")
+        r = run(tmp_path,
+                changed(WINDY, ice__start=start, run={"dt": 0.1, "duration": 1}, output={"frame_interval": 0.1}),
+                name=f"windy {start}")
         pose = r.dataset("/frames/pose")
-        ways.append([np.hypot(*[v[0] for v in r.series("body_vx", "body_vy")]), np.median(np.hypot(*(pose[1] - pose[0])[:, :2].T)) / 0.1])
+        ways.append([
+            np.hypot(*[v[0] for v in r.series("body_vx", "body_vy")]),
+            np.median(np.hypot(*(pose[1] - pose[0])[:, :2].T)) / 0.1
+        ])
     assert max(ways[0]) < 0.02 < 0.1 < min(ways[1]), ways
 
 
-@pytest.mark.parametrize("ends, sides, still", [("wall", "wall", "xy"), ("open", "wall", "y"), ("wall", "periodic", "x"), ("moving", "wall", "y")])
+@pytest.mark.parametrize("ends, sides, still", [("wall", "wall", "xy"), ("open", "wall", "y"),
+                                                ("wall", "periodic", "x"), ("moving", "wall", "y")])
 def test_ice_does_not_drift_across_walls(tmp_path, ends, sides, still):
-    case = changed(WINDY, domain__ends=ends, domain__sides=sides, run__dt=0.1, run__duration=1, output={"frame_interval": 0.1}, ice__concentration=0.2,
-                   tow={"mode": "speed", "speed": 0.8, "ramp": 0.2}, body__x=-80)
+    case = changed(WINDY,
+                   domain__ends=ends,
+                   domain__sides=sides,
+                   run__dt=0.1,
+                   run__duration=1,
+                   output={"frame_interval": 0.1},
+                   ice__concentration=0.2,
+                   tow={"mode": "speed", "speed": 0.8, "ramp": 0.2},
+                   body__x=-80)
     r = run(tmp_path, case)
     step = np.diff(r.dataset("/frames/pose")[:2], axis=0)[0, :, :2] / 0.1
     for k, axis in enumerate("xy"):
@@ -197,17 +250,28 @@ def test_ice_does_not_drift_across_walls(tmp_path, ends, sides, still):
 
 @pytest.mark.parametrize("mode, drifts", [("none", True), ("line", False), ("thrust", False), ("speed", False)])
 def test_a_body_on_a_line_or_led_does_not_begin_adrift(tmp_path, mode, drifts):
-    tow = {"none": {}, "speed": {"speed": 0.5, "ramp": 60}, "line": {"speed": 0.5, "line_length": 100, "line_stiffness": 1e6, "ramp": 1000},
-           "thrust": {"speed": 0.5, "line_length": 100, "line_stiffness": 1e6, "ramp": 1000, "vessel": {"mass": 3e6, "bollard_pull": 1e6, "free_speed": 7}}}[mode]
+    tow = {
+        "none": {}, "speed": {"speed": 0.5, "ramp": 60},
+        "line": {"speed": 0.5, "line_length": 100, "line_stiffness": 1e6, "ramp": 1000}, "thrust": {
+            "speed": 0.5, "line_length": 100, "line_stiffness": 1e6, "ramp": 1000,
+            "vessel": {"mass": 3e6, "bollard_pull": 1e6, "free_speed": 7}
+        }
+    }[mode]
     r = run(tmp_path, changed(WINDY, domain__length=1000, tow={"mode": mode, **tow}, body__x=-300), "--steps", 1)
     vx, vy = r.series("body_vx", "body_vy")
     assert (np.hypot(vx[0], vy[0]) > 0.1) == drifts
 
 
 def test_a_given_velocity_prevails(tmp_path):
-    case = changed(WINDY, body__vy=-0.5, floes=[{"shape": "disc", "length": 10, "x": 150, "y": 100, "vx": 0.7}], ice__concentration=0, run__dt=0.01, run__duration=0.02)
+    case = changed(WINDY,
+                   body__vy=-0.5,
+                   floes=[{"shape": "disc", "length": 10, "x": 150, "y": 100, "vx": 0.7}],
+                   ice__concentration=0,
+                   run__dt=0.01,
+                   run__duration=0.02)
     r = run(tmp_path, case)
-    assert r.series("body_vx")[0] == pytest.approx(0, abs=1e-3) and r.series("body_vy")[0] == pytest.approx(-0.5, abs=1e-3)
+    assert r.series("body_vx")[0] == pytest.approx(0, abs=1e-3) and r.series("body_vy")[0] == pytest.approx(-0.5,
+                                                                                                            abs=1e-3)
     way = np.diff(r.dataset("/frames/pose")[:, 0, :2], axis=0)[0] / 0.01
     assert way == pytest.approx([0.7, 0], abs=1e-2)
 
@@ -217,7 +281,16 @@ def test_the_resolved_file_and_resume_begin_alike(tmp_path):
     assert run(tmp_path, whole.dir / "case.resolved.yml", name="again").hash == whole.hash
     for threads in (1, 2):
         part = tmp_path / f"part{threads}"
-        assert call("run", write_case(tmp_path, WINDY), "-o", part, "--quiet", "--steps", 7, "--threads", threads, env=environment()).returncode == DONE
+        assert call("run",
+                    write_case(tmp_path, WINDY),
+                    "-o",
+                    part,
+                    "--quiet",
+                    "--steps",
+                    7,
+                    "--threads",
+                    threads,
+                    env=environment()).returncode == DONE
         assert call("resume", part, "--quiet").returncode == DONE
         assert f'"state_hash": "{whole.hash}"' in (part / "summary.json").read_text()
     listing = call("--list-keys").stdout

@@ -44,11 +44,13 @@ def quiet(tmp_path_factory):
 def test_a_row_for_each_member(quiet):
     folder, result = quiet
     with h5py.File(folder / "all/ensemble.h5") as f:
-        assert f.attrs["complete"] == 1 and f.attrs["n_members"] == 12 and f.attrs["n_finished"] == 12 and f.attrs["n_failed"] == 0
+        assert f.attrs["complete"] == 1 and f.attrs["n_members"] == 12 and f.attrs["n_finished"] == 12 and f.attrs[
+            "n_failed"] == 0
         assert np.all(f["members/status"][()] == 1) and len(set(f["members/seed"][()])) == 12
         assert np.array_equal(f["members/condition"][()], np.repeat([0, 1, 2, 3], 3))
         assert np.array_equal(f["parameters/ice.concentration"][()], np.repeat([0.2, 0.5], 6))
-        assert np.allclose(f["parameters/tow.speed"][()], np.tile(np.repeat([0.1, 0.2], 3), 2), rtol=1e-15) and f["parameters/tow.speed"].attrs["units"] == "m/s"
+        assert np.allclose(f["parameters/tow.speed"][()], np.tile(np.repeat([0.1, 0.2], 3), 2),
+                           rtol=1e-15) and f["parameters/tow.speed"].attrs["units"] == "m/s"
         for i, name in enumerate(f["members/name"].asstr()[()]):
             member = folder / "all/members" / name
             summary = json.loads((member / "summary.json").read_text())
@@ -58,10 +60,13 @@ def test_a_row_for_each_member(quiet):
                 assert np.array_equal(f["series/ice_resistance"][i], r["series/ice_resistance"][()])
             # A member is an ordinary run: its case alone gives the same.
             if i in (0, 11):
-                assert call("run", member / "case.resolved.yml", "-o", f"again{i}", "--quiet", cwd=folder).returncode == DONE
-                assert json.loads((folder / f"again{i}/summary.json").read_text())["state_hash"] == summary["state_hash"]
+                assert call("run", member / "case.resolved.yml", "-o", f"again{i}", "--quiet",
+                            cwd=folder).returncode == DONE
+                assert json.loads(
+                    (folder / f"again{i}/summary.json").read_text())["state_hash"] == summary["state_hash"]
         assert not {"wall_time_s", "threads", "phases_s_solve"} & set(f["summary"])
-    assert "12 members: 4 conditions x 3 fields" in result.stdout and "12 finished, 0 failed" in result.stdout.replace("members ", "")
+    assert "12 members: 4 conditions x 3 fields" in result.stdout and "12 finished, 0 failed" in result.stdout.replace(
+        "members ", "")
 
 
 def test_finished_members_are_not_run_again(quiet):
@@ -76,22 +81,32 @@ def test_killed_and_called_again(quiet, tmp_path):
     prepare(tmp_path)
     rng = random.Random(3)
     for _ in range(4):
-        child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stdout=subprocess.DEVNULL)
+        child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                                 cwd=tmp_path,
+                                 env=environment(OMP_NUM_THREADS=1),
+                                 stdout=subprocess.DEVNULL)
         time.sleep(0.15 + 0.4 * rng.random())
         child.kill()
         child.wait()
-    stopped = len([j for j in journal(tmp_path) if j["event"] == "start"]) - len([j for j in journal(tmp_path) if j["event"] == "finished"])
+    stopped = len([j for j in journal(tmp_path) if j["event"] == "start"]) - len(
+        [j for j in journal(tmp_path) if j["event"] == "finished"])
     assert stopped >= 1 # some member was struck in its middle
     assert ensemble(tmp_path).returncode == DONE
     assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
-    assert sorted(j["member"] for j in journal(tmp_path) if j["event"] == "finished") == sorted(p.name for p in (tmp_path / "all/members").iterdir())
+    assert sorted(j["member"]
+                  for j in journal(tmp_path)
+                  if j["event"] == "finished") == sorted(p.name for p in (tmp_path / "all/members").iterdir())
 
 
 def test_interrupted(quiet, tmp_path):
     folder, _ = quiet
     prepare(tmp_path)
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1),
-                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                             cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1),
+                             stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE,
+                             text=True)
     while not list(tmp_path.glob("all/members/*/result*.h5")):
         time.sleep(0.01)
     child.send_signal(signal.SIGINT)
@@ -113,17 +128,27 @@ def test_interrupted(quiet, tmp_path):
 def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
     folder, _ = quiet
     prepare(tmp_path)
-    jobs = [subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--quiet"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1)) for _ in range(3)]
+    jobs = [
+        subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--quiet"],
+                         cwd=tmp_path,
+                         env=environment(OMP_NUM_THREADS=1)) for _ in range(3)
+    ]
     assert [j.wait(timeout=120) for j in jobs] == [DONE] * 3
     starts = [j["member"] for j in journal(tmp_path) if j["event"] == "start"]
     assert len(starts) == len(set(starts)) == 12 and len({j["pid"] for j in journal(tmp_path)}) > 1
-    assert ensemble(tmp_path).returncode == DONE  # the one that ended last may have gathered before another's last member
+    # the one that ended last may have gathered before another's last member
+    assert ensemble(tmp_path).returncode == DONE
     assert differing(folder / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
     groups = changed(STUDY, ranks=2, repeats=2)
     prepare(tmp_path / "mpi", groups)
-    result = subprocess.run(["mpirun", "--oversubscribe", "-n", "3", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path / "mpi",
-                            env=environment(OMP_NUM_THREADS=1, **ROOT), capture_output=True, text=True, timeout=180)
+    result = subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "3", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+        cwd=tmp_path / "mpi",
+        env=environment(OMP_NUM_THREADS=1, **ROOT),
+        capture_output=True,
+        text=True,
+        timeout=180)
     assert result.returncode == DONE, result.stderr
     with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "mpi/all/ensemble.h5") as b:
         kept = a["members/repeat"][()] < 2
@@ -136,11 +161,15 @@ def test_one_member_fails_and_the_rest_complete(tmp_path):
     result = ensemble(tmp_path)
     assert result.returncode == CASE
     assert "member c002-r001 failed (3)" in result.stderr and "output.window_start" in result.stderr
-    assert call("check", "study.yml", cwd=tmp_path).stderr.replace(" (condition 2: run.duration 3)", "").strip().removeprefix("bergtow: ") in result.stderr  # told beforehand, too
+    # told beforehand, too
+    assert call("check", "study.yml",
+                cwd=tmp_path).stderr.replace(" (condition 2: run.duration 3)",
+                                             "").strip().removeprefix("bergtow: ") in result.stderr
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert list(f["members/status"][()]) == [1, 2, 1] and f.attrs["complete"] == 1
         assert "output.window_start" in f["members/reason"].asstr()[1]
-        assert np.isnan(f["summary/mean_ice_resistance_n"][1]) and np.isfinite(f["series/time"][0]).sum() == 80 and np.isfinite(f["series/time"][2]).sum() == 60
+        assert np.isnan(f["summary/mean_ice_resistance_n"][1]) and np.isfinite(
+            f["series/time"][0]).sum() == 80 and np.isfinite(f["series/time"][2]).sum() == 60
     before = len(journal(tmp_path))
     assert ensemble(tmp_path).returncode == CASE and len(journal(tmp_path)) == before
     assert ensemble(tmp_path, "all", "--retry-failed").returncode == CASE and len(journal(tmp_path)) == before + 2
@@ -150,12 +179,17 @@ def test_a_full_disk_is_named_and_made_good(quiet, tmp_path):
     folder, _ = quiet
     prepare(tmp_path, changed(STUDY, repeats=1))
     # The members' files hit the limit on file sizes; the small texts do not.
-    limited = subprocess.run(["bash", "-c", f"ulimit -f 40; exec {BERGTOW} ensemble study.yml -o all --threads 1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1),
-                             capture_output=True, text=True, timeout=120)
+    limited = subprocess.run(["bash", "-c", f"ulimit -f 40; exec {BERGTOW} ensemble study.yml -o all --threads 1"],
+                             cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1),
+                             capture_output=True,
+                             text=True,
+                             timeout=120)
     assert limited.returncode == IO and "failed (4)" in limited.stderr and "ulimit -f" in limited.stderr
     assert ensemble(tmp_path, "all", "--retry-failed").returncode == DONE
     with h5py.File(folder / "all/ensemble.h5") as a, h5py.File(tmp_path / "all/ensemble.h5") as b:
-        assert np.array_equal(a["members/state_hash"][()][::3], b["members/state_hash"][()]) and b.attrs["n_failed"] == 0
+        assert np.array_equal(a["members/state_hash"][()][::3],
+                              b["members/state_hash"][()]) and b.attrs["n_failed"] == 0
 
 
 def test_a_process_that_dies_each_time_does_not_stop_the_rest(tmp_path):
@@ -164,13 +198,16 @@ def test_a_process_that_dies_each_time_does_not_stop_the_rest(tmp_path):
     bad.mkdir(parents=True)
     (bad / "attempts").write_text("." * 20)
     result = ensemble(tmp_path)
-    assert "its process died in each of 20 attempts" in result.stderr and "3 members finished, 1 failed" in result.stdout
+    assert ("its process died in each of 20 attempts" in result.stderr
+            and "3 members finished, 1 failed" in result.stdout)
     assert [j["member"] for j in journal(tmp_path)][-1] == "c004-r001"  # it came last
 
 
 def test_another_study_is_refused(quiet, tmp_path):
     folder, _ = quiet
-    for name, study, base in ("values", changed(STUDY, parameters={"ice.concentration": [0.2, 0.6]}), BASE), ("base", STUDY, changed(BASE, ice__friction=0.1)), ("seed", changed(STUDY, seed=5), BASE):
+    for name, study, base in ("values", changed(STUDY, parameters={"ice.concentration": [0.2, 0.6]}),
+                              BASE), ("base", STUDY, changed(BASE, ice__friction=0.1)), ("seed", changed(STUDY,
+                                                                                                         seed=5), BASE):
         here = prepare(tmp_path / name, study, base)
         os.symlink(folder / "all", here / "all")
         result = ensemble(here)
@@ -183,15 +220,22 @@ def test_another_study_is_refused(quiet, tmp_path):
         assert b.attrs["n_finished"] == 16 and np.array_equal(a["members/state_hash"][()], b["members/state_hash"][old])
 
 
-BAD = {"repeat": 3, "set": {"run.duration": "20 x", "ice.sed": 4}, "sampling": "lhs",
-       "parameters": {"ice.concentration": [0.2, 1.5, 0.2], "tow.speed": {"from": 0.3, "too": 0.2, "n": 1}, "ice.seed": [1, 2], "tow": 4, "run.duration": [1], "body.draft": []}}
+BAD = {
+    "repeat": 3, "set": {"run.duration": "20 x", "ice.sed": 4}, "sampling": "lhs", "parameters": {
+        "ice.concentration": [0.2, 1.5, 0.2], "tow.speed": {"from": 0.3, "too": 0.2, "n": 1}, "ice.seed": [1, 2],
+        "tow": 4, "run.duration": [1], "body.draft": []
+    }
+}
 
 
 def test_every_fault_of_a_study_at_once(tmp_path):
     prepare(tmp_path, BAD)
     result = ensemble(tmp_path)
     assert result.returncode == CASE and not (tmp_path / "all").exists()
-    for part in ("repeat: unknown key of a study; did you mean repeats", "base: missing", "\"x\" is not a unit of time", "ice.sed: unknown key; did you mean ice.seed", "1.5 is out of range",
-                 "did you mean to", "ice.seed: the fields of a study", "tow: is a section", "give grid or latin-hypercube", "body.draft: the list is empty"):
+    for part in ("repeat: unknown key of a study; did you mean repeats", "base: missing", "\"x\" is not a unit of time",
+                 "ice.sed: unknown key; did you mean ice.seed", "1.5 is out of range", "did you mean to",
+                 "ice.seed: the fields of a study", "tow: is a section", "give grid or latin-hypercube",
+                 "body.draft: the list is empty"):
         assert part in result.stderr, part
-    assert "Traceback" not in result.stderr and all(line.startswith("bergtow: study.yml") for line in result.stderr.splitlines())
+    assert "Traceback" not in result.stderr and all(
+        line.startswith("bergtow: study.yml") for line in result.stderr.splitlines())

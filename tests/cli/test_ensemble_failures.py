@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a member can die of: a bad value, a full disk, a dead rank. It is named, up to the report, and the rest complete."""
+"""What a member can die of: a bad value, a full disk, a dead rank. It is named, up to the report, and the rest
+complete."""
 import json
 import os
 import re
@@ -50,8 +51,15 @@ def page(monkeypatch):
     def made(folder):
         report.main([str(folder / "all")])
         text = unescape((folder / "all/report.html").read_text())
-        rows = {name: re.sub(r"<[^>]*>", " ", rest) for name, rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text, re.S)}
-        told = {name: re.sub(r"<[^>]*>", "", rest).strip() for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)}
+        rows = {
+            name: re.sub(r"<[^>]*>", " ", rest)
+            for name, rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text,
+                                         re.S)
+        }
+        told = {
+            name: re.sub(r"<[^>]*>", "", rest).strip()
+            for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)
+        }
         return text.split('<section class="figures"')[0], rows, told
     return made
 
@@ -63,13 +71,20 @@ def statuses(folder):
 
 def test_a_bad_value(tmp_path, page):
     """What only the whole case shows, and what only the setting up does."""
-    prepare(tmp_path, {"base": "base.yml", "variants": {"good": {}, "short": {"run.duration": 3}, "lost": {"ice.field": "none.h5"}, "slow": {"tow.speed": 0.05}}})
+    prepare(
+        tmp_path, {
+            "base": "base.yml", "variants": {
+                "good": {}, "short": {"run.duration": 3}, "lost": {"ice.field": "none.h5"}, "slow": {"tow.speed": 0.05}
+            }
+        })
     result = ensemble(tmp_path)
     assert result.returncode in (CASE, IO) and "2 members finished, 2 failed, 0 left" in result.stdout
     warnings, rows, told = page(tmp_path)
     assert "2 members failed" in warnings and "c002-r001: " in warnings and "not complete" not in warnings
-    assert [re.search("finished|failed|waiting", rows[f"c00{k}-r001"])[0] for k in (1, 2, 3, 4)] == ["finished", "failed", "failed", "finished"]
-    assert told["c002-r001"].startswith("failed") and "output.window_start" in told["c002-r001"] and "none.h5" in told["c003-r001"]
+    assert [re.search("finished|failed|waiting", rows[f"c00{k}-r001"])[0]
+            for k in (1, 2, 3, 4)] == ["finished", "failed", "failed", "finished"]
+    assert told["c002-r001"].startswith(
+        "failed") and "output.window_start" in told["c002-r001"] and "none.h5" in told["c003-r001"]
 
 
 @pytest.fixture
@@ -79,7 +94,9 @@ def tmpfs():
 
     def mount(place, size):
         place.mkdir(parents=True, exist_ok=True)
-        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place], capture_output=True, text=True)
+        done = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", place],
+                              capture_output=True,
+                              text=True)
         if done.returncode != 0:
             pytest.skip(f"no small file system can be mounted here: {done.stderr.strip() or 'not root'}")
         places.append(place)
@@ -103,15 +120,18 @@ def test_a_full_disk_of_one_member(quiet, tmp_path, tmpfs, page, size):
     tmpfs(bad, size)
     (bad / "there").write_bytes(b"x" * (4096 if size == "4k" else 100))
     result = ensemble(tmp_path)
-    assert result.returncode == IO and "member c002-r001 failed (4)" in result.stderr and "No space left" in result.stderr and "2 members finished, 1 failed" in result.stdout
+    assert (result.returncode == IO and "member c002-r001 failed (4)" in result.stderr
+            and "No space left" in result.stderr and "2 members finished, 1 failed" in result.stdout)
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
     warnings, rows, told = page(tmp_path)
-    assert "1 member failed" in warnings and "c002-r001: " in warnings and "No space left" in told["c002-r001"] and "failed" in rows["c002-r001"] and "finished" in rows["c003-r001"]
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "No space left" in told[
+        "c002-r001"] and "failed" in rows["c002-r001"] and "finished" in rows["c003-r001"]
     subprocess.run(["mount", "-o", "remount,size=64m", bad], check=True)
     before = len(journal(tmp_path))
     assert ensemble(tmp_path).returncode == IO and len(journal(tmp_path)) == before
     assert ensemble(tmp_path, "--retry-failed").returncode == DONE
-    assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == [] and not list(tmp_path.glob("all/members/*.txt"))
+    assert differing(quiet / "all/ensemble.h5",
+                     tmp_path / "all/ensemble.h5") == [] and not list(tmp_path.glob("all/members/*.txt"))
 
 
 def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
@@ -120,8 +140,13 @@ def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
     tmpfs(tmp_path / "all/members", "16k")
     (tmp_path / "all/members/there").write_bytes(b"x" * 16384)
     result = ensemble(tmp_path)
-    assert result.returncode == IO and re.search(r"member c003-r001 failed \(4\): .*No space left.*; nor could that be recorded", result.stderr) and "worked on by other" not in result.stdout
-    assert {j["member"] for j in journal(tmp_path) if j["event"] == "failed"} == {"c001-r001", "c002-r001", "c003-r001"} and statuses(tmp_path)["c003-r001"] == 0
+    assert result.returncode == IO and re.search(
+        r"member c003-r001 failed \(4\): .*No space left.*; nor could that be recorded",
+        result.stderr) and "worked on by other" not in result.stdout
+    assert {j["member"]
+            for j in journal(tmp_path)
+            if j["event"] == "failed"} == {"c001-r001", "c002-r001", "c003-r001"
+                                           } and statuses(tmp_path)["c003-r001"] == 0
     subprocess.run(["mount", "-o", "remount,size=64m", tmp_path / "all/members"], check=True)
     assert ensemble(tmp_path).returncode == DONE
     assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
@@ -132,17 +157,25 @@ def test_a_folder_that_cannot_be_made(quiet, tmp_path):
     (tmp_path / "all/members").mkdir(parents=True)
     (tmp_path / "all/members/c002-r001").write_text("in the way")
     result = ensemble(tmp_path)
-    assert result.returncode == IO and "member c002-r001 failed (4)" in result.stderr and statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
+    assert result.returncode == IO and "member c002-r001 failed (4)" in result.stderr and statuses(tmp_path) == {
+        "c001-r001": 1, "c002-r001": 2, "c003-r001": 1
+    }
     (tmp_path / "all/members/c002-r001").unlink()
     assert ensemble(tmp_path, "--retry-failed").returncode == DONE
     assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 
-LONG = {"base": "base.yml", "variants": {"short": {"run.duration": 6}, "long": {"run.duration": "200 s", "tow.speed": 0.04}, "slow": {"run.duration": 6, "tow.speed": 0.05}}}
+LONG = {
+    "base": "base.yml", "variants": {
+        "short": {"run.duration": 6}, "long": {"run.duration": "200 s", "tow.speed": 0.04},
+        "slow": {"run.duration": 6, "tow.speed": 0.05}
+    }
+}
 
 
 def with_a_dead_rank(folder, member, all_of_them=False):
-    """A call on two ranks. Whichever begins the member is killed, and the launcher ends the other; all_of_them: as some launchers do it, at once, without a word."""
+    """A call on two ranks. Whichever begins the member is killed, and the launcher ends the other; all_of_them: as some
+    launchers do it, at once, without a word."""
     known, p = len(journal(folder)), started(2, "ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=folder)
     while p.poll() is None:
         for line in journal(folder)[known:]:
@@ -167,14 +200,17 @@ def test_a_dead_rank(tmp_path, page):
     # the rest came first; and what the file says of the one that ended the program is as new as the file
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 0, "c003-r001": 1}
     warnings, rows, told = page(tmp_path)
-    assert "1 member whose process died; the first: c002-r001: its process died in 1 attempt" in warnings and "waiting" in rows["c002-r001"] and "its process died" in told["c002-r001"]
-    (tmp_path / "all/members/c002-r001/attempts").write_text("." * 18)  # those between the third and the eighteenth would be alike
+    assert "1 member whose process died; the first: c002-r001: its process died in 1 attempt" in warnings
+    assert "waiting" in rows["c002-r001"] and "its process died" in told["c002-r001"]
+    # those between the third and the eighteenth would be alike
+    (tmp_path / "all/members/c002-r001/attempts").write_text("." * 18)
     for attempts in 19, 20:
         assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == attempts
     assert with_a_dead_rank(tmp_path, "none") == NUMERIC
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
     warnings, rows, told = page(tmp_path)
-    assert "1 member failed" in warnings and "c002-r001: " in warnings and "died in each of 20 attempts" in told["c002-r001"] and "failed" in rows["c002-r001"]
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "died in each of 20 attempts" in told[
+        "c002-r001"] and "failed" in rows["c002-r001"]
 
 
 def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_path):
@@ -192,4 +228,6 @@ def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_p
     assert with_a_dead_rank(tmp_path, "none") == NUMERIC
     assert statuses(tmp_path) == {f"c00{c}-r00{r}": 2 if (c, r) == (2, 1) else 1 for c in (1, 2, 3) for r in (1, 2)}
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
-        assert np.array_equal(f["summary/mean_ice_resistance_n"][()], np.where(np.arange(6) == 2, np.nan, whole), equal_nan=True)
+        assert np.array_equal(f["summary/mean_ice_resistance_n"][()],
+                              np.where(np.arange(6) == 2, np.nan, whole),
+                              equal_nan=True)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Members whose files are not what they left are told, run again, and never in ensemble.h5; a call ends with 0 only without a hole."""
+"""Members whose files are not what they left are told, run again, and never in ensemble.h5; a call ends with 0 only
+without a hole."""
 import json
 import os
 import shutil
@@ -23,12 +24,21 @@ def ensemble(folder, *more, **how):
 
 
 def on_two_ranks(folder):
-    return subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=folder,
-                          env=environment(OMP_NUM_THREADS=1, **ROOT), capture_output=True, text=True, timeout=180)
+    return subprocess.run(
+        ["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+        cwd=folder,
+        env=environment(OMP_NUM_THREADS=1, **ROOT),
+        capture_output=True,
+        text=True,
+        timeout=180)
 
 
 def started(folder):
-    return [j["member"] for j in map(json.loads, (folder / "all/journal.jsonl").read_text().splitlines()) if j["event"] == "start"]
+    return [
+        j["member"]
+        for j in map(json.loads, (folder / "all/journal.jsonl").read_text().splitlines())
+        if j["event"] == "start"
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +101,9 @@ def test_a_damaged_member_is_run_again(quiet, copy, damage):
     before = len(started(copy))
     DAMAGES[damage](copy / "all/members/c001-r002")
     result = ensemble(copy, "--quiet")
-    assert result.returncode == DONE and result.stderr.count("member c001-r002 is not sound and is run again: all/members/c001-r002/") == 1 and result.stderr.count("\n") == 1
+    assert result.returncode == DONE and result.stderr.count(
+        "member c001-r002 is not sound and is run again: all/members/c001-r002/") == 1 and result.stderr.count(
+            "\n") == 1
     assert started(copy)[before:] == ["c001-r002"]
     assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == []
     assert ensemble(copy).stderr == "" and len(started(copy)) == before + 1
@@ -115,10 +127,14 @@ def test_what_cannot_be_read_stays_and_is_a_hole(quiet, copy):
     (member / "finished/x").write_text("")
     before = len(started(copy))
     result = ensemble(copy)
-    assert result.returncode == IO and "member c001-r001 is not sound" in result.stderr and "3 members finished, 0 failed, 0 left, 1 not sound" in result.stdout
+    assert (result.returncode == IO and "member c001-r001 is not sound" in result.stderr
+            and "3 members finished, 0 failed, 0 left, 1 not sound" in result.stdout)
     assert len(started(copy)) == before and (member / "result.h5").exists()
     with h5py.File(copy / "all/ensemble.h5") as f:
-        assert list(f["members/status"][()]) == [0, 1, 1, 1] and f.attrs["complete"] == 0 and "its result" in f["members/reason"].asstr()[0] and np.isnan(f["summary/mean_ice_resistance_n"][0])
+        assert list(f["members/status"][()]) == [
+            0, 1, 1, 1
+        ] and f.attrs["complete"] == 0 and "its result" in f["members/reason"].asstr()[0] and np.isnan(
+            f["summary/mean_ice_resistance_n"][0])
     shutil.rmtree(member / "finished")
     (member / "kept").rename(member / "finished")
     assert ensemble(copy).returncode == DONE and len(started(copy)) == before
@@ -134,18 +150,32 @@ def test_without_permission(quiet, copy):
         if os.stat(folder).st_uid == 0 and folder != folder.parent and "pytest" in str(folder):
             folder.chmod(0o755)
     (member / "result.h5").chmod(0)
-    command = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"]
-    result = subprocess.run(command, cwd=copy, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
+    command = [
+        "setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", BERGTOW, "ensemble", "study.yml", "-o", "all",
+        "--threads", "1"
+    ]
+    result = subprocess.run(command,
+                            cwd=copy,
+                            env=environment(OMP_NUM_THREADS=1),
+                            capture_output=True,
+                            text=True,
+                            timeout=60)
     if "command not found" in result.stderr or "Permission denied" in result.stderr and BERGTOW in result.stderr:
         pytest.skip("another user cannot reach the program here")
     assert result.returncode == IO and "c002-r001/result.h5: cannot read the file: Permission denied" in result.stderr
     (member / "result.h5").chmod(0o644)
-    result = subprocess.run(command, cwd=copy, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
+    result = subprocess.run(command,
+                            cwd=copy,
+                            env=environment(OMP_NUM_THREADS=1),
+                            capture_output=True,
+                            text=True,
+                            timeout=60)
     assert result.returncode == DONE and differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == []
 
 
 def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
-    """By a lock of the test's own: the call ends when the member is free and done; --no-wait says what is left, with another code."""
+    """By a lock of the test's own: the call ends when the member is free and done; --no-wait says what is left, with
+    another code."""
     import fcntl
     member = copy / "all/members/c002-r002"
     (member / "finished").unlink()
@@ -154,16 +184,26 @@ def test_a_call_waits_for_members_that_others_are_at_work_on(copy):
         import struct
         fcntl.fcntl(lock, 37, struct.pack("hhqqi4x", fcntl.F_WRLCK, 0, 0, 0, 0))
         result = ensemble(copy, "--no-wait")
-        assert result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr and "3 members finished, 0 failed, 1 left" in result.stdout
-        waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=copy, env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, text=True)
+        assert (result.returncode == SIGNAL and "1 members are being worked on by other processes" in result.stderr
+                and "3 members finished, 0 failed, 1 left" in result.stdout)
+        waiting = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                                   cwd=copy,
+                                   env=environment(OMP_NUM_THREADS=1),
+                                   stdout=subprocess.PIPE,
+                                   text=True)
         time.sleep(1)
         assert waiting.poll() is None
-        interrupted = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=copy, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+        interrupted = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                                       cwd=copy,
+                                       env=environment(OMP_NUM_THREADS=1),
+                                       stderr=subprocess.PIPE,
+                                       text=True)
         time.sleep(0.5)
         interrupted.send_signal(signal.SIGINT)
         assert "stopped by a signal" in interrupted.communicate(timeout=30)[1] and interrupted.returncode == SIGNAL
     out = waiting.communicate(timeout=60)[0]
-    assert waiting.returncode == DONE and "waiting for 1 members" in out and "4 members finished, 0 failed, 0 left" in out
+    assert (waiting.returncode == DONE and "waiting for 1 members" in out
+            and "4 members finished, 0 failed, 0 left" in out)
 
 
 def test_threads_as_for_a_run(quiet, tmp_path):
@@ -192,23 +232,40 @@ def test_a_failed_member_stays_a_hole(tmp_path):
 def test_damage_while_a_call_is_at_work(tmp_path):
     """A member that was sound when the call began is looked at again when it is taken in."""
     write_case(tmp_path, BASE, "base.yml")
-    (tmp_path / "study.yml").write_text(json.dumps({"base": "base.yml", "variants": {"long": {"run.duration": "150 s", "tow.speed": 0.04}, "short": {"run.duration": 6}}}))
+    (tmp_path / "study.yml").write_text(
+        json.dumps({
+            "base": "base.yml",
+            "variants": {"long": {"run.duration": "150 s", "tow.speed": 0.04}, "short": {"run.duration": 6}}
+        }))
     short, long_one = (tmp_path / "all/members" / name for name in ("c002-r001", "c001-r001"))
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                             cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1),
+                             stderr=subprocess.PIPE,
+                             text=True)
     assert child.wait(timeout=60) == DONE
     (long_one / "finished").unlink()
-    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen([BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+                             cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1),
+                             stderr=subprocess.PIPE,
+                             text=True)
     while started(tmp_path).count(long_one.name) < 2:
         time.sleep(0.01)
     flip(short / "result.h5", -1)
     told = child.communicate(timeout=60)[1]
-    assert child.returncode == IO and "member c002-r001 is not sound: all/members/c002-r001/result.h5: has changed since the member finished; the same call runs it again" in told
+    assert (child.returncode == IO
+            and "member c002-r001 is not sound: all/members/c002-r001/result.h5: has changed since the member "
+            "finished; the same call runs it again" in told)
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
-        assert list(f["members/status"][()]) == [1, 0] and f.attrs["complete"] == 0 and "is not sound and is made again" in f["members/reason"].asstr()[1]
+        assert list(f["members/status"][()]) == [
+            1, 0
+        ] and f.attrs["complete"] == 0 and "is not sound and is made again" in f["members/reason"].asstr()[1]
     assert ensemble(tmp_path).returncode == DONE
 
 
 def test_ensemble_file_is_made_anew_whatever_it_was(quiet, copy):
     flip(copy / "all/ensemble.h5", -1)
     assert ensemble(copy).returncode == DONE
-    assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == [] and (copy / "all/ensemble.h5").read_bytes().startswith(b"bergtow sealed file\nkind: ensemble 1\n")
+    assert differing(quiet / "all/ensemble.h5", copy / "all/ensemble.h5") == [] and (
+        copy / "all/ensemble.h5").read_bytes().startswith(b"bergtow sealed file\nkind: ensemble 1\n")

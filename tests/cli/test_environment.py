@@ -17,13 +17,19 @@ FLOE = {"water_form": 0.85, "water_skin": 5.5e-3, "air_form": 0.4, "air_skin": 2
 
 # Far apart, so that they never meet. Neither outline is round: the width across the flow counts.
 DRIFT = {
-    "run": {"dt": 5, "duration": 60000}, "domain": {"frame": "geographic", "length": 2e5, "width": 2e5, "ends": "open", "sides": "open"},
-    "ice": {"concentration": 0, "thickness": 0.8}, "tow": {"mode": "none"}, "output": {"frame_interval": 10000},
+    "run": {"dt": 5, "duration": 60000},
+    "domain": {"frame": "geographic", "length": 2e5, "width": 2e5, "ends": "open", "sides": "open"},
+    "ice": {"concentration": 0, "thickness": 0.8},
+    "tow": {"mode": "none"},
+    "output": {"frame_interval": 10000},
     "body": {"shape": "rectangle", "length": 60, "width": 30, "yaw": 25, "draft": 20, "sail": 5},
     "floes": [{"shape": "rectangle", "length": 50, "width": 20, "yaw": -40, "x": 3000, "y": 3000}],
 }
 WIND, CURRENT = np.array([9.0, -4.0]), np.array([0.15, 0.25])
-WEATHER = {"water__current_x": CURRENT[0], "water__current_y": CURRENT[1], "water__latitude": 75, "air__wind_x": WIND[0], "air__wind_y": WIND[1]}
+WEATHER = {
+    "water__current_x": CURRENT[0], "water__current_y": CURRENT[1], "water__latitude": 75, "air__wind_x": WIND[0],
+    "air__wind_y": WIND[1]
+}
 
 
 def steady_drift(outline, mass, draft, sail, c, f, balance=(0, 0), wind=WIND, current=CURRENT):
@@ -51,12 +57,18 @@ def turned(v, yaw):
     return v @ np.array([[c, s], [-s, c]])
 
 
-@pytest.mark.parametrize("frame, tilt, latitude", [("geographic", "none", 75), ("geographic", "geostrophic", 75), ("geographic", "none", -60),
-                                                   ("basin", "geostrophic", 75), ("geographic", "none", 0)])
+@pytest.mark.parametrize("frame, tilt, latitude", [("geographic", "none", 75), ("geographic", "geostrophic", 75),
+                                                   ("geographic", "none", -60), ("basin", "geostrophic", 75),
+                                                   ("geographic", "none", 0)])
 def test_free_drift_is_the_balance_of_forces(tmp_path, frame, tilt, latitude):
-    """Berg and floe. Coriolis is a rotation by f dt in the step: its force is off by f dt / 2 of itself, 4e-4 at 5 s."""
+    """Berg and floe. Coriolis is a rotation by f dt in the step: its force is off by f dt / 2 of itself, 4e-4 at 5
+    s."""
     for dt, close in ((5, 1e-3), (1, 2e-4)):
-        case = changed(DRIFT, domain__frame=frame, domain__x0=-1e5, body__x=0, **(WEATHER | {"water__tilt": tilt, "water__latitude": latitude}),
+        case = changed(DRIFT,
+                       domain__frame=frame,
+                       domain__x0=-1e5,
+                       body__x=0,
+                       **(WEATHER | {"water__tilt": tilt, "water__latitude": latitude}),
                        run={"dt": dt, "duration": 60000 if dt == 5 else 30000})
         r = run(tmp_path, case, name=f"dt{dt}")
         f = 2 * OMEGA * np.sin(np.radians(latitude)) * (1 if frame == "geographic" else -1)
@@ -81,9 +93,16 @@ def test_a_pack_drifts_as_its_floes_do(tmp_path):
     """Without form drag every floe of one thickness has the same free drift, whatever its size and place: a dense pack
     moves as one and its floes do not press on each other."""
     bare = FLOE | {"water_form": 0, "air_form": 0}
-    case = changed(DRIFT, domain={"frame": "geographic", "length": 600, "width": 400, "ends": "periodic", "sides": "periodic"},
-                   ice={"concentration": 0.85, "size": 30, "size_law": "lognormal", "size_spread": 0.4, "thickness": 0.5, "drag": bare},
-                   body={"shape": "none"}, floes=None, run={"dt": 5, "duration": 20000}, **WEATHER)
+    case = changed(DRIFT,
+                   domain={"frame": "geographic", "length": 600, "width": 400, "ends": "periodic", "sides": "periodic"},
+                   ice={
+                       "concentration": 0.85, "size": 30, "size_law": "lognormal", "size_spread": 0.4, "thickness": 0.5,
+                       "drag": bare
+                   },
+                   body={"shape": "none"},
+                   floes=None,
+                   run={"dt": 5, "duration": 20000},
+                   **WEATHER)
     r = run(tmp_path, case)
     f = 2 * OMEGA * np.sin(np.radians(75))
     draft = 0.5 * 910 / RHO_W
@@ -100,21 +119,31 @@ def test_a_pack_drifts_as_its_floes_do(tmp_path):
 
 @pytest.mark.parametrize("frame, latitude", [("geographic", 75), ("geographic", -75), ("basin", 75)])
 def test_inertial_circle(tmp_path, frame, latitude):
-    """Radius U/f, period 2π/f, f times the share of the body without its added mass, to the right of the motion in the north: towards the east (+y) of a start to the north (+x)."""
+    """Radius U/f, period 2π/f, f times the share of the body without its added mass, to the right of the motion in the
+    north: towards the east (+y) of a start to the north (+x)."""
     none = dict.fromkeys(BERG, 0)
     f, speed = 2 * OMEGA * np.sin(np.radians(latitude)) / 1.5, 0.3
     period = 2 * np.pi / abs(f)
-    case = changed(DRIFT, domain__frame=frame, domain__x0=-1e5, body__x=0, body__vx=speed, body__drag=none, ice__drag=none,
-                   water={"latitude": latitude}, run={"dt": period / 9000, "duration": period})
+    case = changed(DRIFT,
+                   domain__frame=frame,
+                   domain__x0=-1e5,
+                   body__x=0,
+                   body__vx=speed,
+                   body__drag=none,
+                   ice__drag=none,
+                   water={"latitude": latitude},
+                   run={"dt": period / 9000, "duration": period})
     r = run(tmp_path, case)
     t, x, y = r.series("time", "body_x", "body_y")
     right = (1 if frame == "geographic" else -1) * np.sign(latitude)
     radius = speed / abs(f)
     # Positions are sums of the velocities at the ends of the steps: half a step's way off, 4e-4 of the radius.
     np.testing.assert_allclose(np.hypot(x, y - right * radius), radius, rtol=1e-3)
-    assert y[len(y) // 4] == pytest.approx(right * radius, rel=2e-3) and x[len(x) // 4] == pytest.approx(radius, rel=2e-3)
+    assert y[len(y) // 4] == pytest.approx(right * radius, rel=2e-3) and x[len(x) // 4] == pytest.approx(radius,
+                                                                                                         rel=2e-3)
     assert np.hypot(x[-1], y[-1]) < 1e-9 * radius
-    assert r.series("coriolis_force").max() > 0 and np.abs(r.series("drag_force")).max() < 1e-12 * r.series("coriolis_force").max()
+    assert r.series("coriolis_force").max() > 0 and np.abs(
+        r.series("drag_force")).max() < 1e-12 * r.series("coriolis_force").max()
 
 
 TIDE = {"major": 0.4, "minor": -0.15, "inclination": 35, "period": 12000, "phase": 50}
@@ -148,7 +177,8 @@ def test_a_light_floe_follows_the_tidal_ellipse(tmp_path):
 
 
 def test_a_table_of_the_same_tide(tmp_path):
-    """Rows of one minute: a chord of the ellipse; and the run of the resolved file, elsewhere, finds the table again."""
+    """Rows of one minute: a chord of the ellipse; and the run of the resolved file, elsewhere, finds the table
+    again."""
     t = np.arange(0, 15061, 60)
     u, _ = ellipse(t, (0.05, -0.02), **TIDE)
     folder = tmp_path / "case"
@@ -169,7 +199,8 @@ def test_wind_table_drives_the_berg(tmp_path):
     r = run(tmp_path, changed(DRIFT, run={"dt": 5, "duration": 3600}, air={"wind_table": "gust.csv"}))
     t, vx, vy, wind = r.series("time", "body_vx", "body_vy", "wind_x")
     assert np.all(vx[t <= 600] == 0) and np.all(np.diff(vx[t >= 605]) > 0) and np.allclose(vy, -vx, rtol=1e-9)
-    assert wind[-1] == pytest.approx(10 * 1852 / 3600) and np.interp(630, t - 2.5, wind) == pytest.approx(5 * 1852 / 3600)
+    assert wind[-1] == pytest.approx(10 * 1852 / 3600) and np.interp(630, t - 2.5, wind) == pytest.approx(
+        5 * 1852 / 3600)
 
 
 TABLES = {
@@ -184,7 +215,8 @@ TABLES = {
     "out of range": ("t,u,v\n0,1,1\n99,1000,1\n", "bad.csv:3: a speed is out of range"),
     "not sorted": ("t,u,v\n0,1,1\n50,1,1\n50,2,1\n99,0,0\n", "bad.csv:4: its time is not after"),
     "late": ("t,u,v\n1,1,1\n99,1,1\n", "case.yml", "water.current_table: the table begins at 1 s"),
-    "short": ("t,u,v\n0,1,1\n49,1,1\n", "case.yml", "water.current_table: the table ends at 49 s and the run asks it for 50 s"),
+    "short": ("t,u,v\n0,1,1\n49,1,1\n", "case.yml",
+              "water.current_table: the table ends at 49 s and the run asks it for 50 s"),
     "long line": ("t,u,v\n" + "0" * 300 + ",1,1\n", "bad.csv:2: is longer"),
 }
 
@@ -203,10 +235,15 @@ def test_tables_that_are_refused(tmp_path, kind):
 def test_keys_beside_a_table_and_a_table_that_is_missing(tmp_path):
     (tmp_path / "t.csv").write_text("t,u,v\n0,1,1\n50,1,1\n")
     base = changed(DRIFT, run__duration=50)
-    path = write_case(tmp_path, changed(base, water={"current_table": "t.csv", "current_x": 0.1, "tide": {"major": 0.2}}, air={"wind_table": "t.csv", "wind_y": 3}))
+    path = write_case(
+        tmp_path,
+        changed(base,
+                water={"current_table": "t.csv", "current_x": 0.1, "tide": {"major": 0.2}},
+                air={"wind_table": "t.csv", "wind_y": 3}))
     result = call("check", path)
     assert result.returncode == CASE
-    for key, table in (("water.current_x", "water.current_table"), ("water.tide.major", "water.current_table"), ("air.wind_y", "air.wind_table")):
+    for key, table in (("water.current_x", "water.current_table"), ("water.tide.major", "water.current_table"),
+                       ("air.wind_y", "air.wind_table")):
         assert f"{key}: has no effect beside {table}" in result.stderr
     assert call("check", write_case(tmp_path, changed(base, water={"current_table": "t.csv"}))).returncode == DONE
     result = call("check", write_case(tmp_path, changed(base, water={"current_table": "none.csv"})))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""bergtow estimate, the estimates in the summary of a run, and the Froude-scaled twin that bergtow check --scale prints."""
+"""bergtow estimate, the estimates in the summary of a run, and the Froude-scaled twin that bergtow check --scale
+prints."""
 import json
 import math
 
@@ -9,7 +10,8 @@ import pytest
 from harness import CASE, DONE, TOW, USAGE, call, changed, run, write_case
 
 G = 9.81
-KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "ships_in_pack_ice", "open_water_drag")
+KINDS = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit",
+         "ships_in_pack_ice", "open_water_drag")
 BERG = {
     "run": {"dt": 5, "duration": 1000},
     "domain": {"frame": "geographic", "length": 5000, "width": 2000},
@@ -35,7 +37,8 @@ def by_formula(a, h, w, v, r, e, rho=910.0, rho_w=1027.0, p_star=20e3, p_s=13e3,
         "marchenko_rafting": kappa * 0.5 * rho * (1 - rho / rho_w) * G * h * h * a * w,
         "marchenko_momentum": rho * h * w * v * v * a * phi / (phi - a) if a < phi else None,
         "dilute_limit": 4 / 3 * (1 + e) * a * rho * h * (w / 2 + r) * v * v,
-        "ships_in_pack_ice": 0.5 * 16.1 * (v / math.sqrt(G * h * a)) ** -1.7937 * rho * w * h * v * v * a**3 if a else 0.0,
+        "ships_in_pack_ice": 0.5 * 16.1 * (v / math.sqrt(G * h * a))**-1.7937 * rho * w * h * v * v *
+        a**3 if a else 0.0,
     }
 
 
@@ -46,7 +49,8 @@ def test_the_command_has_the_numbers_of_the_formulas(tmp_path, a, h):
         assert found[name]["force_n"] == (None if force is None else pytest.approx(force, rel=1e-12)), name
         assert found[name]["formula"] and found[name]["source"] and found[name]["note"]
     assert found["marchenko_rafting"]["high_n"] == pytest.approx(17 / 11 * found["marchenko_rafting"]["force_n"])
-    assert found["open_water_drag"]["force_n"] == pytest.approx((0.5 * 1027 * 0.85 * 50 * 60 + 1027 * 5e-4 * 4800) * 0.25)
+    assert found["open_water_drag"]["force_n"] == pytest.approx(
+        (0.5 * 1027 * 0.85 * 50 * 60 + 1027 * 5e-4 * 4800) * 0.25)
 
 
 def test_curves_are_the_estimates_over_the_concentration(tmp_path):
@@ -60,26 +64,33 @@ def test_curves_are_the_estimates_over_the_concentration(tmp_path):
                 assert x is None, (name, a)
             elif min(abs(a - 0.15), abs(a - 0.9)) > 1e-9:  # the grid is printed with 7 digits
                 assert x == pytest.approx(y, rel=2e-6, abs=1e-12), (name, a)
-    assert curves["valid_range"] == {"lichey_hellmer": [0.01, 0.98], "marchenko_compaction": [0.65, 0.98], "marchenko_rafting": [0.65, 0.98],
-                                     "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "ships_in_pack_ice": [None, None], "open_water_drag": [0.01, 0.98]}
+    assert curves["valid_range"] == {
+        "lichey_hellmer": [0.01, 0.98], "marchenko_compaction": [0.65, 0.98], "marchenko_rafting": [0.65, 0.98],
+        "marchenko_momentum": [0.01, 0.899999], "dilute_limit": [0.01, 0.25], "ships_in_pack_ice": [None, None],
+        "open_water_drag": [0.01, 0.98]
+    }
     jump = grid.tolist().index(0.9)
     assert curves["lichey_hellmer"][jump] > 10 * curves["lichey_hellmer"][jump - 1] > 0
 
 
 def test_a_ship_is_what_the_regression_of_ships_is_for(tmp_path):
     """Blunt and slender hull by their constants; a berg is an extrapolation, and a run is not held against it."""
-    berg, ship = (estimate(tmp_path, changed(BERG, body__shape=shape))["ships_in_pack_ice"] for shape in ("rectangle", "ship"))
+    berg, ship = (estimate(tmp_path, changed(BERG, body__shape=shape))["ships_in_pack_ice"]
+                  for shape in ("rectangle", "ship"))
     froude = 0.5 / math.sqrt(G * 0.8)
     slender = 0.5 * 4.4 * froude**-0.8267 * 910 * 60 * 0.25 * 0.8**2
-    assert berg["low_n"] == pytest.approx(slender) and berg["high_n"] == berg["force_n"] == pytest.approx(0.5 * 16.1 * froude**-1.7937 * 910 * 60 * 0.25 * 0.8**3)
-    assert not berg["valid"] and berg["note"].startswith("extrapolated") and ship["valid"] and ship["compares"] and not berg["compares"]
+    assert berg["low_n"] == pytest.approx(slender) and berg["high_n"] == berg["force_n"] == pytest.approx(
+        0.5 * 16.1 * froude**-1.7937 * 910 * 60 * 0.25 * 0.8**3)
+    assert not berg["valid"] and berg["note"].startswith(
+        "extrapolated") and ship["valid"] and ship["compares"] and not berg["compares"]
     assert "PolarRoute" in ship["source"] and ship["force_n"] == pytest.approx(berg["force_n"])
 
 
 def test_a_table_for_readers(tmp_path):
     result = call("estimate", write_case(tmp_path, BERG))
     assert result.returncode == DONE
-    for word in ("Lichey-Hellmer", "6.825 kN", "Marchenko, compaction", "rafting", "momentum", "dilute limit", "not valid", "open-water drag", "P_s"):
+    for word in ("Lichey-Hellmer", "6.825 kN", "Marchenko, compaction", "rafting", "momentum", "dilute limit",
+                 "not valid", "open-water drag", "P_s"):
         assert word in result.stdout, word
 
 
@@ -97,7 +108,8 @@ def test_a_field_that_is_read_counts_as_it_is(tmp_path):
     asked = estimate(tmp_path, TOW)
     read = estimate(tmp_path, changed(TOW, ice={"field": "f.h5", "concentration": 0.1}))
     assert read["concentration"] == pytest.approx(0.5, abs=0.005) and read["concentration"] != 0.1
-    assert asked["thickness_m"] == 0.04 and read["thickness_m"] != 0.04 and read["thickness_m"] == pytest.approx(0.04, rel=0.2)
+    assert asked["thickness_m"] == 0.04 and read["thickness_m"] != 0.04 and read["thickness_m"] == pytest.approx(
+        0.04, rel=0.2)
 
 
 def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
@@ -118,7 +130,8 @@ def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
     assert {name for name in KINDS if found[name]["compares"]} == {"marchenko_momentum"}
     lines = {name: next(line for line in r.result.stdout.splitlines() if line.strip().startswith(name)) for name in
              ("Lichey-Hellmer", "Marchenko, momentum", "dilute limit", "ships in pack ice")}
-    assert f" {mean / want['marchenko_momentum']:.3g} " in lines["Marchenko, momentum"] and "extrapolated" in lines["ships in pack ice"]
+    assert f" {mean / want['marchenko_momentum']:.3g} " in lines["Marchenko, momentum"] and "extrapolated" in lines[
+        "ships in pack ice"]
     for name in ("Lichey-Hellmer", "dilute limit", "ships in pack ice"):
         assert " - " in lines[name], lines[name]
     drift = run(tmp_path, changed(TOW, tow={"mode": "none"}, water__current_x=0.1), name="drift")
@@ -128,11 +141,17 @@ def test_the_summary_puts_the_run_beside_the_estimates(tmp_path):
 
 
 def test_open_water_drag_is_what_a_tow_in_open_water_meets(tmp_path):
-    """The same law in src/force/forces.c and in the estimate, with a current at an angle, a body that is no disc, and the air taken away."""
-    case = changed(TOW, ice__concentration=0, body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20}, air__density=0,
-                   water={"current_x": -0.05, "current_y": 0.04}, output__window_start=10)
+    """The same law in src/force/forces.c and in the estimate, with a current at an angle, a body that is no disc, and
+    the air taken away."""
+    case = changed(TOW,
+                   ice__concentration=0,
+                   body={"x": 5, "shape": "rectangle", "length": 2, "width": 0.7, "yaw": 20},
+                   air__density=0,
+                   water={"current_x": -0.05, "current_y": 0.04},
+                   output__window_start=10)
     r = run(tmp_path, case)
-    assert r.summary["estimates"]["open_water_drag"]["force_n"] == pytest.approx(r.summary["mean_drag_force_n"], rel=1e-12)
+    assert r.summary["estimates"]["open_water_drag"]["force_n"] == pytest.approx(r.summary["mean_drag_force_n"],
+                                                                                 rel=1e-12)
 
 
 # ---- the twin ----
@@ -144,7 +163,11 @@ def twin(folder, path, scale, name):
     return folder / name
 
 
-LOOSE = changed(TOW, run__duration=60, tow={"mode": "line", "speed": 0.13, "line_stiffness": 2e4}, water__current_y=0.01, air__wind_x=1.0,
+LOOSE = changed(TOW,
+                run__duration=60,
+                tow={"mode": "line", "speed": 0.13, "line_stiffness": 2e4},
+                water__current_y=0.01,
+                air__wind_x=1.0,
                 output__window_start=10)
 
 
@@ -161,14 +184,16 @@ def dimensionless(a, b, L, tolerance):
             units = units.decode() if isinstance(units, bytes) else units
             scale = L ** exponents[units]
             bound = tolerance * max(np.nanmax(np.abs(x), initial=0), 1e-30)
-            assert np.allclose(x * scale, y, rtol=0, atol=bound * scale, equal_nan=True), (name, np.nanmax(np.abs(y / scale - x)))
+            assert np.allclose(x * scale, y, rtol=0, atol=bound * scale,
+                               equal_nan=True), (name, np.nanmax(np.abs(y / scale - x)))
         x, y = f["frames/pose"][:], g["frames/pose"][:]
         assert np.allclose(x[:, :, :2] * L, y[:, :, :2], rtol=0, atol=tolerance * 15 * L)
         assert np.allclose(x[:, :, 2], y[:, :, 2], rtol=0, atol=tolerance * 10)
 
 
 def test_a_twin_of_scale_4_is_the_case_to_rounding_of_the_units(tmp_path):
-    """Factors of 4, 2, 8, ... only change exponents of numbers: whatever differs has a length, time or mass of its own in the program."""
+    """Factors of 4, 2, 8, ... only change exponents of numbers: whatever differs has a length, time or mass of its own
+    in the program."""
     path = write_case(tmp_path, changed(LOOSE, ice__concentration=0.7))
     a = run(tmp_path, path, name="a")
     b = run(tmp_path, twin(tmp_path, path, "4", "twin.yml"), name="b")
@@ -176,7 +201,8 @@ def test_a_twin_of_scale_4_is_the_case_to_rounding_of_the_units(tmp_path):
     dimensionless(a, b, 4, 1e-15)
     for name in KINDS:
         if a.summary["estimates"][name]["valid"] and name != "open_water_drag":
-            assert b.summary["estimates"][name]["simulated_over_estimate"] == a.summary["estimates"][name]["simulated_over_estimate"]
+            assert b.summary["estimates"][name]["simulated_over_estimate"] == a.summary["estimates"][name][
+                "simulated_over_estimate"]
 
 
 def test_a_twin_of_any_scale_is_the_case_to_rounding(tmp_path):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Ice fields made from the command line, measured here by other means: areas, overlap, edges of the region, randomness."""
+"""Ice fields made from the command line, measured here by other means: areas, overlap, edges of the region,
+randomness."""
 import h5py
 import numpy as np
 import pytest
@@ -19,7 +20,11 @@ FIELDS = {
     "loose": changed(BASE, ice__concentration=0.12),
     "rectangles": changed(BASE, ice__shape="rectangles", ice__aspect=1.5),
     "polygons": changed(BASE, ice__shape="polygons", ice__sides=6, ice__concentration=0.6),
-    "lognormal": changed(BASE, ice__size_law="lognormal", ice__size_spread=0.5, ice__thickness_law="lognormal", ice__thickness_spread=0.3),
+    "lognormal": changed(BASE,
+                         ice__size_law="lognormal",
+                         ice__size_spread=0.5,
+                         ice__thickness_law="lognormal",
+                         ice__thickness_spread=0.3),
     "power": changed(BASE, ice__size_law="power", ice__size_min=0.4, ice__size_max=2.5, ice__size_exponent=1.8),
     "periodic": changed(BASE, domain__ends="periodic", domain__sides="periodic"),
     "region": changed(BASE, ice__x_min=6, ice__x_max=15, ice__y_min=-4, ice__y_max=2.5),
@@ -32,7 +37,8 @@ class Field:
     def __init__(self, path):
         with h5py.File(path) as f:
             g = f["floes"]
-            self.offsets, self.pose, self.thickness, self.area = (g[n][:] for n in ("offsets", "pose", "thickness", "area"))
+            self.offsets, self.pose, self.thickness, self.area = (g[n][:]
+                                                                  for n in ("offsets", "pose", "thickness", "area"))
             self.vertices = g["vertices"][:]
         self.n = len(self.pose)
         self.local = [self.vertices[self.offsets[i]:self.offsets[i + 1]] for i in range(self.n)]
@@ -60,7 +66,8 @@ def footprint(folder, case):
 
 def region(case):
     d, i = case["domain"], case["ice"]
-    return (i.get("x_min", 0), i.get("x_max", d["length"]), i.get("y_min", -d["width"] / 2), i.get("y_max", d["width"] / 2))
+    return (i.get("x_min", 0), i.get("x_max", d["length"]), i.get("y_min",
+                                                                  -d["width"] / 2), i.get("y_max", d["width"] / 2))
 
 
 def clipped_area(polygon, x0, x1, y0, y1):
@@ -167,7 +174,8 @@ def test_sizes_follow_the_law(made):
 
 
 def test_a_seed_is_a_field(tmp_path):
-    """The same seed makes the same bytes, whatever the number of threads and the name of the file; another makes another."""
+    """The same seed makes the same bytes, whatever the number of threads and the name of the file; another makes
+    another."""
     one = make(tmp_path, BASE, name="one.h5")
     assert differing(one, make(tmp_path, BASE, name="two.h5")) == []
     assert differing(one, make(tmp_path, changed(BASE, run__threads=2), name="three.h5"), but=("/case",)) == []
@@ -180,7 +188,8 @@ def test_a_seed_is_a_field(tmp_path):
 
 
 def clark_evans(f, ground):
-    """Mean distance to the nearest neighbour over that of points at random: 1 at random, 2.15 for a triangular lattice."""
+    """Mean distance to the nearest neighbour over that of points at random: 1 at random, 2.15 for a triangular
+    lattice."""
     p = f.pose[:, :2]
     distance = np.hypot(*(p[:, None] - p[None]).transpose(2, 0, 1))
     np.fill_diagonal(distance, np.inf)
@@ -204,7 +213,8 @@ def test_what_cannot_be_made_or_written_is_refused(tmp_path):
     missing = call("field", case, "-o", tmp_path / "no/such/field.h5")
     assert missing.returncode == IO and "no/such/field.h5" in missing.stderr
     field = make(tmp_path, BASE)
-    twice = call("field", write_case(tmp_path, changed(BASE, ice__field="field.h5"), "read.yml"), "-o", tmp_path / "again.h5")
+    twice = call("field", write_case(tmp_path, changed(BASE, ice__field="field.h5"), "read.yml"), "-o",
+                 tmp_path / "again.h5")
     assert twice.returncode == CASE and "ice.field" in twice.stderr
     assert not (tmp_path / "again.h5").exists() and field.exists()
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""cases/fullscale/study.py on a small piece of ice: the table, what is kept and what is run again, and its exit codes."""
+"""cases/fullscale/study.py on a small piece of ice: the table, what is kept and what is run again, and its exit
+codes."""
 import subprocess
 import sys
 
@@ -8,12 +9,16 @@ import pytest
 from harness import BERGTOW, CASE, DONE, ROOT, USAGE, call, environment
 
 STUDY = ROOT / "cases/fullscale/study.py"
-SMALL = ("--set", "domain.length=900 m", "--set", "domain.width=500 m", "--set", "body.x=-300 m", "--set", "run.duration=500",
-         "--set", "output.window_start=100", "--set", "tow.ramp=50 s", "--set", "ice.shake=2", "--threads", "1")
+SMALL = ("--set", "domain.length=900 m", "--set", "domain.width=500 m", "--set", "body.x=-300 m", "--set",
+         "run.duration=500", "--set", "output.window_start=100", "--set", "tow.ramp=50 s", "--set", "ice.shake=2",
+         "--threads", "1")
 
 
 def study(*arguments):
-    return subprocess.run([sys.executable, str(STUDY), *map(str, arguments)], capture_output=True, text=True, timeout=120,
+    return subprocess.run([sys.executable, str(STUDY), *map(str, arguments)],
+                          capture_output=True,
+                          text=True,
+                          timeout=120,
                           env=environment(BERGTOW=BERGTOW))
 
 
@@ -52,10 +57,12 @@ def test_time_steps_on_one_field(tmp_path):
 
 def test_a_run_that_fails_ends_the_study_with_its_code(tmp_path):
     result = study("dt", "--out", tmp_path, "--set", "ice.thicknes=1")
-    assert result.returncode == CASE and "did you mean ice.thickness" in result.stderr and "exit code 3" in result.stderr
+    assert (result.returncode == CASE and "did you mean ice.thickness" in result.stderr
+            and "exit code 3" in result.stderr)
 
 
-@pytest.mark.parametrize("words", [("nothing",), (), ("concentration", "--concentrations", "1.2"), ("dt", "--steps", "0"), ("dt", "--bergtow", "/none")])
+@pytest.mark.parametrize("words", [("nothing", ), (), ("concentration", "--concentrations", "1.2"),
+                                   ("dt", "--steps", "0"), ("dt", "--bergtow", "/none")])
 def test_usage(words):
     result = study(*words)
     assert result.returncode == USAGE and "Traceback" not in result.stderr

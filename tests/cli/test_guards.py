@@ -29,7 +29,8 @@ def beyond(folder, frame=-1):
 
 
 def test_floes_beyond_walls_end_the_run_at_the_step_they_pass(tmp_path):
-    """A run of fewer than 50 steps, and one that ends between two multiples of 50; walls are where they have closed to."""
+    """A run of fewer than 50 steps, and one that ends between two multiples of 50; walls are where they have closed
+    to."""
     free = run(tmp_path, changed(CLOSING, guard__escape=False), "--quiet", name="free")
     assert beyond(free.dir) > 10
     r = run(tmp_path, CLOSING, "--quiet", code=NUMERIC)
@@ -44,35 +45,51 @@ def test_floes_beyond_walls_end_the_run_at_the_step_they_pass(tmp_path):
 
 def test_energy_that_overflows_ends_the_run(tmp_path):
     r = run(tmp_path, HEAVY, "--quiet", code=NUMERIC)
-    said = r"step 1: kinetic_energy \(kinetic energy of all dynamic bodies.*\) is not a number, or came from some too large"
+    said = (r"step 1: kinetic_energy \(kinetic energy of all dynamic bodies.*\) is not a number, "
+            r"or came from some too large")
     assert re.search(said, r.result.stderr), r.result.stderr
     assert (r.dir / "failure.h5").exists() and not (r.dir / "summary.json").exists()
     assert np.isfinite(r.series("kinetic_energy")).all() and not len(r.series("time"))
 
 
-@pytest.mark.parametrize("more", [{"air__wind_x": 15}, {"air__wind_x": 15, "ice__thickness": 0.002}, {"water__current_y": 1, "domain__sides": "periodic"},
-                                  {"water__tide__major": 1, "water__tide__period": 40, "domain__sides": "periodic"},
+@pytest.mark.parametrize("more", [{"air__wind_x": 15}, {"air__wind_x": 15, "ice__thickness": 0.002}, {
+    "water__current_y": 1, "domain__sides": "periodic"
+}, {"water__tide__major": 1, "water__tide__period": 40, "domain__sides": "periodic"},
                                   {"water__tilt": "slope", "water__slope_x": 0.01}])
 def test_what_drives_the_ice_is_no_failure_on_a_slow_tow(tmp_path, more):
-    """Wind, current, tide or slope that move the ice a hundred times faster than the tow, over as many steps as they take to."""
-    r = run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40, **more), "--quiet")
+    """Wind, current, tide or slope that move the ice a hundred times faster than the tow, over as many steps as they
+    take to."""
+    r = run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40, **more),
+            "--quiet")
     assert r.series("kinetic_energy").max() > 0
 
 
 def test_a_table_of_wind_drives_the_ice(tmp_path):
     (tmp_path / "wind.csv").write_text("t,u,v\n0,0,0\n10,15,0\n40,15,0\n")
-    run(tmp_path, changed(TOW, tow__speed=0.0005, solver__reference_speed=0.0005, solver__max_sweeps=40, air={"wind_table": "wind.csv"}), "--quiet")
+    run(
+        tmp_path,
+        changed(TOW,
+                tow__speed=0.0005,
+                solver__reference_speed=0.0005,
+                solver__max_sweeps=40,
+                air={"wind_table": "wind.csv"}), "--quiet")
 
 
 def test_energy_beyond_what_drives_the_ice_is_one(tmp_path):
     r = run(tmp_path, changed(TOW, air__wind_x=15, guard__energy=1e-3), "--quiet", code=NUMERIC)
-    assert re.search(r"step \d+: the bodies have \S+ J of kinetic energy, more than the \S+ J that guard.energy allows", r.result.stderr)
+    assert re.search(r"step \d+: the bodies have \S+ J of kinetic energy, more than the \S+ J that guard.energy allows",
+                     r.result.stderr)
 
 
 # ---- the last state ----
 
-LAST = changed(CLOSING, domain__ends_closing=0.3, domain__sides_closing=0.2, guard={"overlap": 0, "escape": False}, run__duration=3,
-               output__frame_interval=1, output__checkpoint_steps=7)
+LAST = changed(CLOSING,
+               domain__ends_closing=0.3,
+               domain__sides_closing=0.2,
+               guard={"overlap": 0, "escape": False},
+               run__duration=3,
+               output__frame_interval=1,
+               output__checkpoint_steps=7)
 
 
 def measured(r):
@@ -97,7 +114,8 @@ def test_the_largest_overlap_includes_the_last_state(tmp_path):
 
 
 def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):
-    """Stopped at steps where the last look would be deeper or not, and gone on with: summary, series and state of a run never stopped."""
+    """Stopped at steps where the last look would be deeper or not, and gone on with: summary, series and state of a run
+    never stopped."""
     whole = run(tmp_path, LAST, "--quiet", name="whole")
     case = write_case(tmp_path, LAST)
     overlap = whole.series("overlap")
@@ -110,7 +128,11 @@ def test_the_last_look_leaves_no_trace_in_a_run_that_goes_on(tmp_path):
     assert call("resume", tmp_path / "bits", "--quiet").returncode == DONE
     parts = Run(tmp_path / "bits", None)
     clocks = {"wall_time_s", "phases_s", "ns_per_floe_step", "memory_per_floe_b"}
-    assert {k: v for k, v in parts.summary.items() if k not in clocks} == {k: v for k, v in whole.summary.items() if k not in clocks}
+    assert {k: v
+            for k, v in parts.summary.items()
+            if k not in clocks} == {k: v
+                                    for k, v in whole.summary.items()
+                                    if k not in clocks}
     with h5py.File(whole.dir / "result.h5") as a, h5py.File(parts.dir / "result.h5") as b:
         assert all(np.array_equal(a["series"][n][:], b["series"][n][:], equal_nan=True) for n in a["series"])
 
@@ -121,7 +143,8 @@ def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
     size = free.summary["mean_size_m"]
     limit = 0.5 * (free.series("overlap").max() + free.summary["max_overlap_m"]) / size
     r = run(tmp_path, changed(LAST, guard__overlap=limit), "--quiet", code=NUMERIC)
-    assert re.search(r"step 30: two bodies overlap by \S+ m", r.result.stderr) and not (r.dir / "summary.json").exists(), r.result.stderr
+    assert re.search(r"step 30: two bodies overlap by \S+ m",
+                     r.result.stderr) and not (r.dir / "summary.json").exists(), r.result.stderr
     again = call("resume", r.dir / "failure.h5", "--quiet")
     assert again.returncode == NUMERIC and "step 30: two bodies overlap" in again.stderr
 
@@ -130,9 +153,12 @@ def test_an_overlap_of_the_last_state_is_held_against_its_guard(tmp_path):
 
 @pytest.mark.parametrize("case, has", [
     (changed(TOW, run__duration=2), {"always", "with a towed body", "where collisions are told apart"}),
-    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=2, impact={"conversion": "none"}), {"always", "with a towed body", "with a tow line"}),
-    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=3, tow__line={"branches": 2}),
-     {"always", "with a towed body", "with a tow line", "with a tow line of two branches", "where collisions are told apart"}),
+    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=2,
+             impact={"conversion": "none"}), {"always", "with a towed body", "with a tow line"}),
+    (changed(TOW, run__duration=2, tow__mode="line", tow__line_length=3, tow__line={"branches": 2}), {
+        "always", "with a towed body", "with a tow line", "with a tow line of two branches",
+        "where collisions are told apart"
+    }),
     (changed(CLOSING, run__duration=1), {"always"}),
 ])
 def test_each_series_says_when_it_applies(tmp_path, case, has):

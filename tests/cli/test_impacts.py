@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Collisions and panel loads that a run leaves: against its series, against each other, and against formulas written down again here."""
+"""Collisions and panel loads that a run leaves: against its series, against each other, and against formulas written
+down again here."""
 import re
 import subprocess
 import sys
@@ -18,8 +19,14 @@ import plot_impacts  # noqa: E402
 from bergtow_read import Run as Folder  # noqa: E402
 
 # On a line, off the middle, so that the body yaws; a window of the statistics that begins within the run.
-LINE = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4}, body__shape="square", body__length=1.6,
-               body__y=0.5, ice__restitution=0.2, output={"panels": True, "window_start": 10}, impact={"panels": 24, "duration": 0.04})
+LINE = changed(TOW,
+               tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},
+               body__shape="square",
+               body__length=1.6,
+               body__y=0.5,
+               ice__restitution=0.2,
+               output={"panels": True, "window_start": 10},
+               impact={"panels": 24, "duration": 0.04})
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +58,8 @@ def test_panels_carry_the_ice_force_at_every_sample(line, prescribed):
     total, fx, fy = prescribed.dataset("/panels/force").sum(axis=1), *prescribed.series("ice_force_x", "ice_force_y")
     c, s = np.cos(np.pi / 9), np.sin(np.pi / 9)
     scale = np.abs(fx).max()
-    assert scale > 1 and np.abs(c * total[:, 0] - s * total[:, 1] - fx).max() < 1e-11 * scale and np.abs(s * total[:, 0] + c * total[:, 1] - fy).max() < 1e-11 * scale
+    assert scale > 1 and np.abs(c * total[:, 0] - s * total[:, 1] - fx).max() < 1e-11 * scale and np.abs(
+        s * total[:, 0] + c * total[:, 1] - fy).max() < 1e-11 * scale
     force, load = line.dataset("/panels/force"), line.dataset("/panels/load")
     fx, fy, yaw = line.series("ice_force_x", "ice_force_y", "body_yaw")
     assert force.shape == (300, 24, 2) and load.shape == (300, 24) and np.ptp(yaw) > 0.02
@@ -72,7 +80,8 @@ def test_panels_lie_on_the_hull_and_collisions_on_them(line):
     # Ice presses, along the normal, wherever a panel is all on one side of the square; the sixths are on its corners.
     flat = np.arange(24) % 6 != 3
     inward = -np.einsum("tkc,kc->tk", force, normal)[:, flat]
-    np.testing.assert_allclose(inward, load[:, flat], rtol=0.02, atol=1e-9)  # a floe that lies nearly flush may lend its own normal
+    # a floe that lies nearly flush may lend its own normal
+    np.testing.assert_allclose(inward, load[:, flat], rtol=0.02, atol=1e-9)
     assert (load[:, flat] > 0).sum() > 300
     r = rows(line)
     # Each collision lies on its panel.
@@ -82,12 +91,15 @@ def test_panels_lie_on_the_hull_and_collisions_on_them(line):
 
 def test_rows_series_and_summary_agree(line):
     r, s = rows(line), line.summary["impacts"]
-    count, peak, share, ice, time = line.series("collisions", "impact_peak", "collision_resistance", "ice_resistance", "time")
-    assert len(r["time"]) == s["collisions_whole_run"] and 0 <= len(r["time"]) - count.sum() <= 3  # the last may be open when the run ends
+    count, peak, share, ice, time = line.series("collisions", "impact_peak", "collision_resistance", "ice_resistance",
+                                                "time")
+    # the last may be open when the run ends
+    assert len(r["time"]) == s["collisions_whole_run"] and 0 <= len(r["time"]) - count.sum() <= 3
     assert len(r["time"]) > 20
     np.testing.assert_allclose(r["mean"], r["impulse"] / 0.04)
     np.testing.assert_allclose(r["peak"], np.pi / 2 * r["impulse"] / 0.04)
-    assert np.all(r["approach"] >= 0.05 * 0.13) and np.all(r["impulse"] > 0) and np.all(r["impulse"] <= 1.2001 * r["effective_mass"] * (r["approach"] + 1e-3) * 1.3)
+    assert np.all(r["approach"] >= 0.05 * 0.13) and np.all(r["impulse"] > 0) and np.all(
+        r["impulse"] <= 1.2001 * r["effective_mass"] * (r["approach"] + 1e-3) * 1.3)
     assert np.all((r["floe"] >= 0) & (r["floe"] < line.summary["n_floes"] + 5))
     assert peak.max() == r["peak"][:int(count.sum())].max()
     late = time >= 10
@@ -113,13 +125,22 @@ def test_everything_is_counted_over_the_window_that_is_found(found):
 
 def test_a_long_run_that_was_killed_counts_the_same(tmp_path):
     """More steps than blocks of five hold: killed before the window, and within it."""
-    case = changed(FOUND, run__dt=0.0025, ice__concentration=0.2, output={"panels": True, "checkpoint_steps": 1500, "frame_interval": 60})
+    case = changed(FOUND,
+                   run__dt=0.0025,
+                   ice__concentration=0.2,
+                   output={"panels": True, "checkpoint_steps": 1500, "frame_interval": 60})
     r = run(tmp_path, case, "--quiet", "--threads", 1)
     start = assert_counted_over_the_window(r)
     assert r.summary["n_steps"] == 24000 and 2 < start < 30
     steps = []
     for seconds in (0.7, 1.0, 1.3, 1.6, 0.4, 0.4):
-        killed_after(seconds, 1, *(("resume", "cut") if steps else ("run", "case.yml", "-o", "cut")), "--quiet", "--threads", 1, cwd=tmp_path)
+        killed_after(seconds,
+                     1,
+                     *(("resume", "cut") if steps else ("run", "case.yml", "-o", "cut")),
+                     "--quiet",
+                     "--threads",
+                     1,
+                     cwd=tmp_path)
         if (tmp_path / "cut/checkpoint.h5").exists():
             with h5py.File(tmp_path / "cut/checkpoint.h5") as f:
                 steps.append(f["world/step"][0])
@@ -134,11 +155,14 @@ def test_without_a_window_all_is_the_starts(tmp_path):
     r = run(tmp_path, changed(LINE, run__duration=15, tow__ramp=20, output={"panels": True}))
     s = r.summary["impacts"]
     assert r.summary["window"]["verdict"] == "too short" and s["collisions"] == 0 < s["collisions_whole_run"]
-    assert [s[k] for k in ("from_s", "largest", "largest_push_n", "mean_push_resistance_n", "collisions_per_hour")] == [None] * 5
+    assert [s[k] for k in ("from_s", "largest", "largest_push_n", "mean_push_resistance_n", "collisions_per_hour")
+            ] == [None] * 5
     with h5py.File(r.dir / "result.h5") as f:
         p = f["panels"]
-        assert np.isnan(p.attrs["from"]) and p.attrs["steps"] == 0 and np.isnan(p["mean_load"][:]).all() and not p["max_load"][:].any()
-        assert np.array_equal(p["start_max_load"][:], p["load"][:].max(axis=0)) and s["start_largest_peak_n"] == f["impacts/peak"][:].max()
+        assert np.isnan(p.attrs["from"]) and p.attrs["steps"] == 0 and np.isnan(
+            p["mean_load"][:]).all() and not p["max_load"][:].any()
+        assert np.array_equal(p["start_max_load"][:],
+                              p["load"][:].max(axis=0)) and s["start_largest_peak_n"] == f["impacts/peak"][:].max()
     assert "collisions  " not in r.result.stdout
 
 
@@ -148,10 +172,13 @@ def test_samples_of_several_steps_hold_means(line, tmp_path):
     assert seven.shape[0] == len(r.series("time")) == 43
     np.testing.assert_allclose(seven[:42], one[:294].reshape(42, 7, 24, 2).mean(axis=1), atol=1e-12)
     np.testing.assert_allclose(seven[42], one[294:].mean(axis=0), atol=1e-12)
-    np.testing.assert_allclose(r.dataset("/panels/load")[:42], line.dataset("/panels/load")[:294].reshape(42, 7, 24).mean(axis=1), atol=1e-12)
+    np.testing.assert_allclose(r.dataset("/panels/load")[:42],
+                               line.dataset("/panels/load")[:294].reshape(42, 7, 24).mean(axis=1),
+                               atol=1e-12)
     # Rows do not go by samples, nor do counts.
     assert all(np.array_equal(a, b) for a, b in zip(rows(line).values(), rows(r).values()))
-    assert r.series("collisions").sum() == line.series("collisions").sum() and r.summary["impacts"] == line.summary["impacts"]
+    assert r.series("collisions").sum() == line.series(
+        "collisions").sum() and r.summary["impacts"] == line.summary["impacts"]
 
 
 def test_crushing_and_its_keys(line, tmp_path):
@@ -167,7 +194,9 @@ def test_crushing_and_its_keys(line, tmp_path):
     np.testing.assert_allclose(c["mean"], 2 / np.pi * c["peak"], rtol=1e-12)
     assert np.array_equal(c["impulse"], rows(line)["impulse"])
     # Smaller floes, so that enough of them are met: 19 to 22 different corners in fields of three seeds.
-    real = rows(run(tmp_path, changed(LINE, ice__size=0.4, impact={"conversion": "crushing", "corner": "real"}), name="real"))["corner"]
+    real = rows(
+        run(tmp_path, changed(LINE, ice__size=0.4, impact={"conversion": "crushing", "corner": "real"}),
+            name="real"))["corner"]
     assert len(np.unique(real.round(6))) > 10 and np.all((real > 0.3) & (real < np.pi))
 
 
@@ -178,17 +207,23 @@ def test_none_tells_nothing_and_changes_nothing(line, tmp_path):
         assert "impacts" not in f and "panels" not in f
         assert np.all(np.isnan(f["series/collisions"][:])) and np.all(np.isnan(f["series/collision_resistance"][:]))
     told = {f"/series/{n}" for n in ("collisions", "collision_resistance", "impact_peak", "largest_push")}
-    assert {n for n in differing(line.dir / "result.h5", r.dir / "result.h5", but=("/case", "/case_as_given")) if not n.startswith(("/impacts", "/panels"))} == told
+    assert {
+        n
+        for n in differing(line.dir / "result.h5", r.dir / "result.h5", but=("/case", "/case_as_given"))
+        if not n.startswith(("/impacts", "/panels"))
+    } == told
 
 
 def test_the_resolved_file_holds_what_follows_from_other_keys(line, tmp_path):
     text = (line.dir / "case.resolved.yml").read_text()
     assert float(re.search(r"least_speed: (\S+) m/s", text)[1]) == pytest.approx(0.0065) and "duration: 0.04 s" in text
     plain = run(tmp_path, changed(TOW, run__duration=0.2))
-    assert "  duration: 0.1 s" in (plain.dir / "case.resolved.yml").read_text() and plain.summary["impacts"]["largest"] is None
+    assert "  duration: 0.1 s" in (plain.dir /
+                                   "case.resolved.yml").read_text() and plain.summary["impacts"]["largest"] is None
 
 
-@pytest.mark.parametrize("key, value", [("duration", 0), ("panels", 0), ("pressure", "1 kN"), ("corner_angle", 180), ("conversion", "impulse"), ("least_speed", -1)])
+@pytest.mark.parametrize("key, value", [("duration", 0), ("panels", 0), ("pressure", "1 kN"), ("corner_angle", 180),
+                                        ("conversion", "impulse"), ("least_speed", -1)])
 def test_bad_values_are_refused(tmp_path, key, value):
     r = call("check", write_case(tmp_path, changed(TOW, **{f"impact__{key}": value})))
     assert r.returncode == CASE and f"impact.{key}" in r.stderr
@@ -211,7 +246,8 @@ def test_the_picture_shows_what_the_file_holds(line, tmp_path):
         assert np.array_equal(curve.get_xdata(), late)
         np.testing.assert_allclose(curve.get_ydata(), np.arange(1, len(late) + 1) / line.summary["impacts"]["hours"])
     script = [sys.executable, ROOT / "postproc/plot_impacts.py"]
-    assert subprocess.run([*script, line.dir, "-o", tmp_path / "a.png"]).returncode == 0 and (tmp_path / "a.png").stat().st_size > 20000
+    assert subprocess.run([*script, line.dir, "-o", tmp_path / "a.png"
+                           ]).returncode == 0 and (tmp_path / "a.png").stat().st_size > 20000
     none = run(tmp_path, changed(TOW, run__duration=0.2, impact={"conversion": "none"}))
     refused = subprocess.run([*script, none.dir], capture_output=True, text=True)
     assert refused.returncode == IO and "impact.conversion" in refused.stderr and "Traceback" not in refused.stderr

@@ -10,8 +10,13 @@ from harness import CASE, area, call, changed, placed, run, worst_overlap, write
 
 # A body of 2 m in half-open ice of 0.8 m.
 BASE = {
-    "run": {"dt": 0.1, "duration": 25}, "domain": {"length": 16, "width": 9}, "ice": {"concentration": 0.5, "size": 0.8, "x_min": 4.5, "thickness_law": "lognormal"},
-    "body": {"x": 2.5, "length": 2, "shape": "square"}, "tow": {"speed": 0.2, "ramp": 2}, "solver": {"max_sweeps": 200}, "output": {"frame_interval": 10},
+    "run": {"dt": 0.1, "duration": 25},
+    "domain": {"length": 16, "width": 9},
+    "ice": {"concentration": 0.5, "size": 0.8, "x_min": 4.5, "thickness_law": "lognormal"},
+    "body": {"x": 2.5, "length": 2, "shape": "square"},
+    "tow": {"speed": 0.2, "ramp": 2},
+    "solver": {"max_sweeps": 200},
+    "output": {"frame_interval": 10},
 }
 CHANNEL = {"mode": "channel", "width": 2.2}
 MANAGED = {"mode": "managed", "width": 2.2, "floe_size": 0.35, "length": 8}
@@ -37,7 +42,8 @@ def test_a_channel_as_wide_as_the_body_is_open_water(tmp_path):
     assert lead["area_removed_m2"] == pytest.approx(sum(map(area, removed)), rel=1e-9)
     assert all(np.any(np.abs(p[:, 1]) < 1.1) or np.ptp(np.sign(p[:, 1])) == 2 for p in removed)
     ice = (16 - 4.5) * 9
-    assert lead["concentration_before"] == pytest.approx(0.5, abs=0.004) and r.summary["concentration"] == lead["concentration_before"]
+    assert lead["concentration_before"] == pytest.approx(
+        0.5, abs=0.004) and r.summary["concentration"] == lead["concentration_before"]
     assert lead["concentration_after"] == pytest.approx(sum(map(area, now)) / ice, rel=1e-9)
     assert f"{len(removed)} floes" in r.result.stdout and "removed; concentration" in r.result.stdout
 
@@ -74,9 +80,12 @@ def test_a_field_that_is_read_gets_the_same_lead(tmp_path):
 
 
 BAD = {
-    "nothing is towed": ({"tow": {"mode": "none"}, "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow, and nothing is towed"),
-    "no body": ({"body": {"shape": "none"}, "tow": {"mode": "none"}, "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow"),
-    "no piece size": ({"lead": {"mode": "managed"}}, "lead.floe_size: is 0 m and a managed lead needs the size of its pieces"),
+    "nothing is towed": ({"tow": {"mode": "none"},
+                          "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow, and nothing is towed"),
+    "no body": ({"body": {"shape": "none"}, "tow": {"mode": "none"},
+                 "lead": {"mode": "channel"}}, "lead.mode: a lead lies along the tow"),
+    "no piece size": ({"lead": {"mode": "managed"}},
+                      "lead.floe_size: is 0 m and a managed lead needs the size of its pieces"),
     "no width": ({"lead": {"mode": "channel", "width": 0}}, "lead.width: is 0 m"),
     "no length": ({"lead": {"mode": "channel", "length": 0}}, "lead.length: is 0 m"),
     "tiny pieces": ({"lead": {"mode": "managed", "floe_size": 1e-5}}, "lead.floe_size: 1e-05 m makes up to"),
@@ -93,8 +102,14 @@ def test_leads_that_are_refused(tmp_path, kind):
 
 
 def test_pieces_beyond_the_end_of_a_moving_window_come_round(tmp_path):
-    """They were refused as floes outside the domain: the lead goes to the front of the window, and a floe there reaches over it."""
-    case = changed(BASE, run__duration=2, domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"}, body__x=6, body__shape=None, ice={"concentration": 0.8, "size": 0.7},
+    """They were refused as floes outside the domain: the lead goes to the front of the window, and a floe there reaches
+    over it."""
+    case = changed(BASE,
+                   run__duration=2,
+                   domain={"length": 15, "width": 8, "ends": "moving", "sides": "periodic"},
+                   body__x=6,
+                   body__shape=None,
+                   ice={"concentration": 0.8, "size": 0.7},
                    lead={"mode": "managed", "floe_size": 0.4, "length": 9, "width": 3})
     r = run(tmp_path, case, "--quiet")
     x = r.dataset("/frames/pose")[0][:, 0]

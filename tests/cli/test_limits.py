@@ -11,7 +11,8 @@ SMALL = changed(TOW, run__duration=1)
 
 
 def frugal():
-    """What a refusal may use: 20 s and 1.5 GB, so that asking for everything is an error of the test and not of the machine."""
+    """What a refusal may use: 20 s and 1.5 GB, so that asking for everything is an error of the test and not of the
+    machine."""
     resource.setrlimit(resource.RLIMIT_CPU, (20, 20))
     if "ASAN_OPTIONS" not in os.environ:  # its shadow takes terabytes of addresses
         resource.setrlimit(resource.RLIMIT_AS, (3 << 29, 3 << 29))
@@ -27,18 +28,26 @@ def refusal(folder, case, *fragments, code=CASE, command="run"):
 
 GREEDY = {
     "floes": ({"ice__size": 1e-4}, "ice.size:", "floes, at most 20000000", "take larger floes"),
-    "floes of a power law": ({"ice": {"size_law": "power", "size_min": 1e-5, "size_max": 1}}, "ice.size_min:", "floes, at most 20000000"),
-    "steps": ({"run": {"dt": 1e-6, "duration": 1000}, "tow__speed": 0}, "run.dt:", "steps of run.duration, at most 100000000", "lengthen"),
+    "floes of a power law": ({"ice": {"size_law": "power", "size_min": 1e-5,
+                                      "size_max": 1}}, "ice.size_min:", "floes, at most 20000000"),
+    "steps": ({"run": {"dt": 1e-6, "duration": 1000},
+               "tow__speed": 0}, "run.dt:", "steps of run.duration, at most 100000000", "lengthen"),
     "frames": ({"output__frame_interval": 1e-7}, "output.frame_interval:", "frames, at most 1000000", "lengthen it"),
-    "work": ({"run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"}, "ice": {"concentration": 0.8, "size": 1}},
-             "run.duration:", "s of one core, at most 1e+10", "shorten the run"),
-    "disk": ({"run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"}, "output__frame_interval": 0.1},
-             "output.frame_interval:", "bytes, at most 2e+13", "lengthen output.frame_interval"),
-    "pieces of a lead": ({"lead": {"mode": "managed", "floe_size": 1e-6}}, "lead.floe_size:", "pieces, at most 20000000"),
+    "work": ({
+        "run": {"dt": 0.1, "duration": 9e6}, "domain": {"length": 4000, "width": 4000, "ends": "periodic"},
+        "ice": {"concentration": 0.8, "size": 1}
+    }, "run.duration:", "s of one core, at most 1e+10", "shorten the run"),
+    "disk": ({
+        "run": {"dt": 1, "duration": 1e5}, "domain": {"length": 2000, "width": 2000, "ends": "periodic"},
+        "output__frame_interval": 0.1
+    }, "output.frame_interval:", "bytes, at most 2e+13", "lengthen output.frame_interval"),
+    "pieces of a lead": ({"lead": {"mode": "managed",
+                                   "floe_size": 1e-6}}, "lead.floe_size:", "pieces, at most 20000000"),
     "floes by hand": ({"floes": [{"x": 9, "y": 0, "length": 1}] * 10001}, "floes: has 10001 entries, at most 10000"),
     "way-points": ({"tow__waypoints": [[4, 0]] * 10001}, "tow.waypoints:", "10001 points", "1 to 10000"),
     "text": ({"run__title": "x" * 5000}, "run.title:", "5000 bytes; give at most 4096"),
-    "keys": ({f"k{i}": 1 for i in range(300)}, "more than 256 keys in one map"),
+    "keys": ({f"k{i}": 1
+              for i in range(300)}, "more than 256 keys in one map"),
 }
 
 
@@ -81,7 +90,8 @@ def test_text_of_an_input_does_not_steer_the_terminal(tmp_path):
 
 TABLES = {
     "bytes": ("t,u,v\n" + "#" * (64 << 20), "t.csv", "larger than 64 MiB"),
-    "rows": ("t,u,v\n" + "".join(f"{i},1,1\n" for i in range(2000002)), "t.csv", "t.csv:2000002: more than 2000000 rows"),
+    "rows": ("t,u,v\n" +"".join(f"{i},1,1\n" for i in range(2000002)), "t.csv",
+             "t.csv:2000002: more than 2000000 rows"),
     "a long row": ("t,u,v\n0,1," + "1" * 300 + "\n", "t.csv", "t.csv:2: is longer than a row"),
     "NUL": ("t,u,v\n0,1\0,1\n", "t.csv", "t.csv:2: holds a NUL character"),
 }
@@ -98,13 +108,15 @@ def test_outlines_without_end(tmp_path):
     (tmp_path / "deep.json").write_text("[" * 1000000)
     refusal(tmp_path, changed(SMALL, ice={"outlines": "deep.json"}), "deep.json", "JSON")
     (tmp_path / "many.json").write_text("[]," * 40000001)
-    refusal(tmp_path, changed(SMALL, ice={"outlines": "many.json"}), "many.json: holds 40000001 lists", "at most 40000000", "simplify")
+    refusal(tmp_path, changed(SMALL, ice={"outlines": "many.json"}), "many.json: holds 40000001 lists",
+            "at most 40000000", "simplify")
 
 
 def test_values_of_a_study(tmp_path):
     """Each is compared with those before it: a million of them took hours."""
     write_case(tmp_path, SMALL)
-    (tmp_path / "study.yml").write_text("base: case.yml\nparameters: {ice.friction: [" + ", ".join(f"0.{i:06}" for i in range(10001)) + "]}\n")
+    (tmp_path / "study.yml").write_text("base: case.yml\nparameters: {ice.friction: [" +
+                                        ", ".join(f"0.{i:06}" for i in range(10001)) + "]}\n")
     refusal(tmp_path, "study.yml", "study.yml:2: ice.friction: 10001 values, at most 10000", command="ensemble")
     (tmp_path / "study.yml").write_text("base: case.yml\nrepeats: 100000\nparameters: {ice.friction: [0.1, 0.2]}\n")
     refusal(tmp_path, "study.yml", "more than 100000 members", "fewer repeats", command="ensemble")
@@ -112,7 +124,8 @@ def test_values_of_a_study(tmp_path):
 
 def test_every_limit_is_listed():
     listed = call("--list-keys").stdout
-    for line in ("floes, made or read                          20000000 floes", "steps                                       100000000 steps"):
+    for line in ("floes, made or read                          20000000 floes",
+                 "steps                                       100000000 steps"):
         assert line in listed
     assert "refused as too large" in listed
 
@@ -128,7 +141,8 @@ def contents(folder):
 
 
 def test_no_key_of_a_case_names_output(tmp_path):
-    """Every text key, pointed outside in turn: nothing changes there. A new text key has to be put into one of the two sets."""
+    """Every text key, pointed outside in turn: nothing changes there. A new text key has to be put into one of the two
+    sets."""
     texts = {line.split()[0] for line in call("--list-keys").stdout.splitlines() if line[25:].startswith("text ")}
     assert texts == READ | SHOWN
     outside = tmp_path / "outside"
@@ -138,7 +152,8 @@ def test_no_key_of_a_case_names_output(tmp_path):
     for key in sorted(texts):
         for value in ("../outside/victim", "../outside/new", str(outside / "new"), "../outside"):
             name = key.replace(".", "__")
-            result = call("run", write_case(tmp_path / "in", changed(SMALL, **{name: value})), "-o", tmp_path / "out", "--force", "--steps", 2, "--quiet")
+            result = call("run", write_case(tmp_path / "in", changed(SMALL, **{name: value})), "-o", tmp_path / "out",
+                          "--force", "--steps", 2, "--quiet")
             assert result.returncode == (DONE if key in SHOWN else result.returncode), result.stderr
             assert key in SHOWN or result.returncode in (CASE, IO), (key, value)
     assert contents(outside) == before
@@ -146,7 +161,11 @@ def test_no_key_of_a_case_names_output(tmp_path):
 
 def test_links_in_the_output_folder_are_not_followed(tmp_path):
     """Somebody's links under the names that a run writes: they are replaced."""
-    names = ["result.h5", "result.part.h5", "result.h5.tmp", "checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.previous.h5", "stop", "summary.json", "summary.json.tmp", "frames.xdmf", "frames.xdmf.tmp", "case.resolved.yml", "case.resolved.yml.tmp"]
+    names = [
+        "result.h5", "result.part.h5", "result.h5.tmp", "checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.previous.h5",
+        "stop", "summary.json", "summary.json.tmp", "frames.xdmf", "frames.xdmf.tmp", "case.resolved.yml",
+        "case.resolved.yml.tmp"
+    ]
     outside, out = tmp_path / "outside", tmp_path / "out"
     outside.mkdir()
     out.mkdir()
@@ -173,7 +192,10 @@ def test_folder_by_the_name_of_the_case(tmp_path, name, folder):
 def test_a_study_writes_into_its_folder_only(tmp_path):
     """Names of variants are texts of the study; the members' folders are numbered."""
     write_case(tmp_path / "in", SMALL)
-    (tmp_path / "in" / "study.yml").write_text('base: case.yml\nset: {run.duration: 0.2}\nvariants: {"../../escape": {ice.friction: 0.1}, "/tmp/x": {ice.friction: 0.2}}\n')
+    (tmp_path / "in" / "study.yml").write_text(
+        'base: case.yml\nset: {run.duration: 0.2}\nvariants: {"../../escape": {ice.friction: 0.1}, "/tmp/x": '
+        '{ice.friction: 0.2}}\n'
+    )
     result = call("ensemble", "study.yml", "-o", tmp_path / "out", cwd=tmp_path / "in")
     assert result.returncode == DONE, result.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["in", "out"]

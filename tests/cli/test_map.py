@@ -112,7 +112,9 @@ def test_it_lies_as_on_the_map(tmp_path, frame, crs):
 def test_round_trip_in_degrees(tmp_path, frame):
     """A field that is made goes out as longitude and latitude, lies where geodesics say, and comes back to where it
     was."""
-    made = changed(FRAMES[frame], ice={"concentration": 0.3, "size": 20, "thickness": 0.04, "thickness_law": "lognormal"}, **ORIGIN)
+    made = changed(FRAMES[frame],
+                   ice={"concentration": 0.3, "size": 20, "thickness": 0.04, "thickness_law": "lognormal"},
+                   **ORIGIN)
     rings, thickness, *_ = field(tmp_path, made)
     field(tmp_path, made, name="out.geojson")
     out, crs = rings_of(tmp_path / "out.geojson")

@@ -91,13 +91,17 @@ def test_the_same_bounds(tmp_path, way, fault):
 
 
 def row_by_hand(folder, xs):
-    return write_case(folder, changed(TANK, floes=[{"shape": "square", "length": 1, "x": x, "y": 0, "thickness": 0.5} for x in xs]))
+    return write_case(
+        folder, changed(TANK, floes=[{"shape": "square", "length": 1, "x": x, "y": 0, "thickness": 0.5} for x in xs]))
 
 
 def row_as_geojson(folder, xs):
     path = as_geojson(folder, {})
     ring = np.array(FLOE + FLOE[:1])
-    features = [{"type": "Feature", "properties": {"thickness": 0.5}, "geometry": {"type": "Polygon", "coordinates": [(ring + [x, 0]).tolist()]}} for x in xs]
+    features = [{
+        "type": "Feature", "properties": {"thickness": 0.5},
+        "geometry": {"type": "Polygon", "coordinates": [(ring + [x, 0]).tolist()]}
+    } for x in xs]
     (folder / "floes.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     return path
 
@@ -115,10 +119,11 @@ ROWS = {"by hand": row_by_hand, "GeoJSON": row_as_geojson, "HDF5": row_as_hdf5}
 
 
 @pytest.mark.parametrize("way", ROWS)
-@pytest.mark.parametrize("xs, pairs, deepest", [((5, 5.6, 12), 1, "0.4"), ((5, 5.6, 6.1, 12), 2, "0.5"), (tuple(np.arange(2, 16, 0.9)), 15, "0.1"),
-                                                ((5, 5.9995, 12), 0, "")])
+@pytest.mark.parametrize("xs, pairs, deepest", [((5, 5.6, 12), 1, "0.4"), ((5, 5.6, 6.1, 12), 2, "0.5"),
+                                                (tuple(np.arange(2, 16, 0.9)), 15, "0.1"), ((5, 5.9995, 12), 0, "")])
 def test_floes_in_each_other(tmp_path, way, xs, pairs, deepest):
-    """Refused beyond the solver's slop, with the number of pairs, the deepest and names, in check as in run; less is taken out by the projection."""
+    """Refused beyond the solver's slop, with the number of pairs, the deepest and names, in check as in run; less is
+    taken out by the projection."""
     path = ROWS[way](tmp_path, xs)
     checked, ran = call("check", path), call("run", path, "-o", tmp_path / "out")
     assert checked.returncode == ran.returncode == (CASE if pairs else DONE), ran.stderr
@@ -126,7 +131,9 @@ def test_floes_in_each_other(tmp_path, way, xs, pairs, deepest):
         return
     assert checked.stderr == ran.stderr and not (tmp_path / "out").exists()
     assert "allowed: 0.00113 m" in ran.stderr
-    name = {"by hand": "floes[%d] and floes[%d]", "GeoJSON": "feature %d and feature %d", "HDF5": "floe %d and floe %d"}[way]
+    name = {
+        "by hand": "floes[%d] and floes[%d]", "GeoJSON": "feature %d and feature %d", "HDF5": "floe %d and floe %d"
+    }[way]
     named = {1: (0, 1), 2: (1, 2)}  # the deepest; of 15 alike it may be any
     assert pairs not in named or name % named[pairs] in ran.stderr, ran.stderr
     if pairs > 1 or way == "by hand":
@@ -138,7 +145,8 @@ def test_a_floe_of_a_field_in_the_body(tmp_path):
     row_as_hdf5(tmp_path, (4.0, 5.2, 8.0))
     case = changed(READ, body={"shape": "square", "length": 2, "draft": 0.5, "x": 4, "y": 0}, tow={"mode": "none"})
     result = call("check", write_case(tmp_path, case))
-    assert result.returncode == CASE and "2 pairs" in result.stderr and "by up to 1.5 m" in result.stderr and "deepest floe 0 of the ice and towed body" in result.stderr
+    assert (result.returncode == CASE and "2 pairs" in result.stderr and "by up to 1.5 m" in result.stderr
+            and "deepest floe 0 of the ice and towed body" in result.stderr)
     towed = changed(case, tow={"mode": "speed", "speed": 0.1}, lead={"mode": "channel", "width": 4, "length": 10})
     assert call("check", write_case(tmp_path, towed)).returncode == DONE
 

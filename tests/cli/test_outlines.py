@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Floe outlines in GeoJSON: what gets in, what is refused and by which name, where it lies, and that a round trip loses nothing."""
+"""Floe outlines in GeoJSON: what gets in, what is refused and by which name, where it lies, and that a round trip loses
+nothing."""
 import json
 import math
 
@@ -54,11 +55,15 @@ def same_ring(p, q, tolerance):
 
 
 def test_outlines_as_they_come(tmp_path):
-    """Closed or not, clockwise, with double and needless vertices and heights; ids and thicknesses; all where they were drawn."""
+    """Closed or not, clockwise, with double and needless vertices and heights; ids and thicknesses; all where they were
+    drawn."""
     untidy = [[5, 3], [6, 3], [6, 3], [6, 3.4], [6, 4], [5, 4]]
-    write(tmp_path, feature(at(SQUARE, 5, 0), properties={"thickness": 0.7}), feature(at(SQUARE, 8, 0)[::-1]), feature(untidy, close=False),
-          feature([p + [12.5] for p in at(SQUARE, 8, 3)], properties=None),
-          feature([at(SQUARE, 11, 0) + at(SQUARE, 11, 0)[:1]], close=False, geometry={"type": "MultiPolygon", "coordinates": [[at(SQUARE, 11, 0)]]}))
+    write(
+        tmp_path, feature(at(SQUARE, 5, 0), properties={"thickness": 0.7}), feature(at(SQUARE, 8, 0)[::-1]),
+        feature(untidy, close=False), feature([p + [12.5] for p in at(SQUARE, 8, 3)], properties=None),
+        feature([at(SQUARE, 11, 0) + at(SQUARE, 11, 0)[:1]],
+                close=False,
+                geometry={"type": "MultiPolygon", "coordinates": [[at(SQUARE, 11, 0)]]}))
     rings, thickness, areas, _ = field(tmp_path, BASE)
     for ring, (x, y) in zip(rings, [(5, 0), (8, 0), (5, 3), (8, 3), (11, 0)]):
         assert same_ring(ring, at(SQUARE, x, y), 1e-12)
@@ -81,12 +86,14 @@ REFUSED = {
     "edges touch": ([[8, 0], [10, 0], [10, 2], [9, 0], [8, 2]], "touch", {"ice__nonconvex": "split"}),
     "two vertices": ([[8, 0], [9, 0]], "fewer than 3", {}),
     "on one line": ([[8, 0], [9, 0], [10, 0]], "fewer than 3|area is zero|cross", {}),
-    "too many": ([[9 + math.cos(2 * math.pi * k / 129), math.sin(2 * math.pi * k / 129)] for k in range(129)], "more than 128 vertices", {}),
+    "too many": ([[9 + math.cos(2 * math.pi * k / 129),
+                   math.sin(2 * math.pi * k / 129)] for k in range(129)], "more than 128 vertices", {}),
     "no numbers": ([[8, 0], [9, "x"], [9, 1]], "pair of numbers", {}),
     "hole": ({"geometry": {"type": "Polygon", "coordinates": [at(SQUARE, 8, 0), at(SQUARE, 8.2, 0.2)]}}, "holes", {}),
     "line": ({"geometry": {"type": "LineString", "coordinates": SQUARE}}, "not a Polygon", {}),
     "nothing": ({"geometry": None}, "not a Polygon", {}),
-    "several": ({"geometry": {"type": "MultiPolygon", "coordinates": [[at(SQUARE, 8, 0)], [at(SQUARE, 8, 2)]]}}, "several polygons", {}),
+    "several": ({"geometry": {"type": "MultiPolygon", "coordinates": [[at(SQUARE, 8, 0)],
+                                                                      [at(SQUARE, 8, 2)]]}}, "several polygons", {}),
     "thickness": (feature(at(SQUARE, 8, 0), properties={"thickness": -1}), "thickness", {}),
     "thickness with unit": (feature(at(SQUARE, 8, 0), properties={"thickness": "1 m"}), "thickness", {}),
     "through a wall": (at(SQUARE, 8, 4.5), "outside the domain", {}),
@@ -119,7 +126,8 @@ def test_beyond_an_open_side_by_less_than_half_gets_in(tmp_path):
 
 @pytest.mark.parametrize("shift, found", [(0.9, True), (1.0, False), (0.9999, False)])
 def test_overlap_names_both(tmp_path, shift, found):
-    """The slop of the solver (a thousandth of the floe size) is left to the position projection; touching is no overlap."""
+    """The slop of the solver (a thousandth of the floe size) is left to the position projection; touching is no
+    overlap."""
     write(tmp_path, feature(at(SQUARE, 5, 3)), feature(at(SQUARE, 8, 0)), feature(at(SQUARE, 8 + shift, 0)))
     if found:
         assert "feature 1 and feature 2 overlap by 0.1 m" in field(tmp_path, BASE, code=CASE)
@@ -134,7 +142,9 @@ def test_overlap_of_shores_not_of_hulls(tmp_path):
     rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="split"))
     assert same_ring(rings[0], at(C_SHAPE, 5, 0), 1e-12)
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 5.3, 0.5)))
-    assert "feature 0 and feature 1 overlap by 0.2 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+    assert "feature 0 and feature 1 overlap by 0.2 m" in field(tmp_path,
+                                                               changed(BASE, ice__nonconvex="split"),
+                                                               code=CASE)
     write(tmp_path, feature(at(SQUARE, 5, 0)), feature([[5.4, 0.4], [5.6, 0.4], [5.6, 0.6], [5.4, 0.6]]))
     assert "feature 0 and feature 1 overlap" in field(tmp_path, BASE, code=CASE), "one inside the other"
 
@@ -146,7 +156,9 @@ def test_overlap_with_every_part(tmp_path, x, y, last):
     small = feature([[x, y], [x + 0.4, y], [x + 0.4, y + 0.4], [x, y + 0.4]])
     c = feature(at(C_SHAPE, 5, 0))
     write(tmp_path, *([c, small] if last else [small, c]))
-    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
+    assert "feature 0 and feature 1 overlap by 0.15 m" in field(tmp_path,
+                                                                changed(BASE, ice__nonconvex="split"),
+                                                                code=CASE)
 
 
 def test_hull_and_split_are_counted(tmp_path):
@@ -165,24 +177,32 @@ def test_hull_and_split_are_counted(tmp_path):
     assert r.summary["n_floes"] == 2
     np.testing.assert_allclose(r.dataset("/floes/area"), [2.5, 1], rtol=1e-12)
     assert r.dataset("/floes/offsets").tolist() == [0, 8, 12]
-    assert same_ring(placed(r.dataset("/floes/vertices")[:8], r.dataset("/frames/pose")[0, 0]), at(C_SHAPE, 5, 0), 1e-12)
+    assert same_ring(placed(r.dataset("/floes/vertices")[:8],
+                            r.dataset("/frames/pose")[0, 0]), at(C_SHAPE, 5, 0), 1e-12)
     said = call("check", write_case(tmp_path, changed(BASE, ice__nonconvex="split"))).stdout
     assert "1 floes in 3 convex parts" in said
 
 
 def test_many_vertices_become_a_hull(tmp_path):
     """A finely traced shore: too long for a floe as it is, but not for its hull."""
-    circle = [[9 + (1 - 0.1 * (k % 4 > 0)) * math.cos(2 * math.pi * k / 400), math.sin(2 * math.pi * k / 400) * (1 - 0.1 * (k % 4 > 0))] for k in range(400)]
+    circle = [[
+        9 + (1 - 0.1 * (k % 4 > 0)) * math.cos(2 * math.pi * k / 400),
+        math.sin(2 * math.pi * k / 400) * (1 - 0.1 * (k % 4 > 0))
+    ] for k in range(400)]
     write(tmp_path, feature(circle))
     assert "128" in field(tmp_path, changed(BASE, ice__nonconvex="split"), code=CASE)
     rings, *_ = field(tmp_path, changed(BASE, ice__nonconvex="hull"))
     assert len(rings[0]) == 100
 
 
-@pytest.mark.parametrize("text, says", [("", "JSON"), ("{\"type\": \"FeatureCollection\",\n\"features\": [}", "floes.geojson:2: is not JSON"),
-                                        ("[1, 2]", "FeatureCollection"), ('{"type": "Polygon", "coordinates": []}', "FeatureCollection"),
-                                        ('{"type": "FeatureCollection", "features": []}', "0 features"), ("\x89HDF\r\n\x1a\n", "JSON"),
-                                        ('{"type": "FeatureCollection", "features": [3, null, {}]}', "feature 2")])
+@pytest.mark.parametrize("text, says",
+                         [("", "JSON"),
+                          ("{\"type\": \"FeatureCollection\",\n\"features\": [}", "floes.geojson:2: is not JSON"),
+                          ("[1, 2]", "FeatureCollection"),
+                          ('{"type": "Polygon", "coordinates": []}', "FeatureCollection"),
+                          ('{"type": "FeatureCollection", "features": []}', "0 features"),
+                          ("\x89HDF\r\n\x1a\n", "JSON"),
+                          ('{"type": "FeatureCollection", "features": [3, null, {}]}', "feature 2")])
 def test_files_that_are_no_outlines(tmp_path, text, says):
     (tmp_path / "floes.geojson").write_text(text)
     assert says in field(tmp_path, BASE, code=CASE)
@@ -193,16 +213,19 @@ def test_missing_file(tmp_path):
     assert "floes.geojson" in said and "No such file" in said
 
 
-@pytest.mark.parametrize("changes, key", [
-    ({"ice__field": "a.h5"}, "ice.outlines"), ({"ice__origin_lon": 10}, "ice.origin_lon"), ({"ice__origin_lon": 10, "ice__origin_lat": 70}, "ice.origin_lon"),
-    ({"ice__outlines": None, "ice__outlines_crs": "lonlat"}, "ice.outlines_crs"), ({"ice__outlines": None, "ice__nonconvex": "split"}, "ice.nonconvex")])
+@pytest.mark.parametrize("changes, key", [({"ice__field": "a.h5"}, "ice.outlines"),
+                                          ({"ice__origin_lon": 10}, "ice.origin_lon"),
+                                          ({"ice__origin_lon": 10, "ice__origin_lat": 70}, "ice.origin_lon"),
+                                          ({"ice__outlines": None, "ice__outlines_crs": "lonlat"}, "ice.outlines_crs"),
+                                          ({"ice__outlines": None, "ice__nonconvex": "split"}, "ice.nonconvex")])
 def test_keys_without_effect(tmp_path, changes, key):
     write(tmp_path, feature(at(SQUARE, 8, 0)))
     assert f": {key}: " in field(tmp_path, changed(BASE, **changes), code=CASE)
 
 
 def test_round_trip(tmp_path):
-    """A field made, written as outlines, and read again is the same field; so is one that is periodic and turned at the seams."""
+    """A field made, written as outlines, and read again is the same field; so is one that is periodic and turned at the
+    seams."""
     made = changed(BASE, ice={"concentration": 0.7, "size": 0.8, "thickness_law": "lognormal"}, domain__ends="periodic")
     rings, thickness, areas, pose = field(tmp_path / "made", made)
     field(tmp_path / "made", made, name="made.geojson")
@@ -220,12 +243,14 @@ def test_round_trip(tmp_path):
     second = json.loads((tmp_path / "second.geojson").read_text())["features"]
     for a, b in zip(first, second):
         np.testing.assert_allclose(a["geometry"]["coordinates"], b["geometry"]["coordinates"], atol=1e-13)
-    assert "domain.frame" in field(tmp_path, changed(again, domain__frame="geographic"), code=CASE), "metres of another frame"
+    assert "domain.frame" in field(tmp_path, changed(again, domain__frame="geographic"),
+                                   code=CASE), "metres of another frame"
     assert "lonlat" in field(tmp_path, changed(again, ice__outlines_crs="lonlat"), code=CASE)
 
 
 def test_field_files_with_bays(tmp_path):
-    """HDF5 holds the outline, and the case that reads it says what becomes of it; the run is that of the outlines themselves."""
+    """HDF5 holds the outline, and the case that reads it says what becomes of it; the run is that of the outlines
+    themselves."""
     write(tmp_path, feature(at(C_SHAPE, 5, 0)), feature(at(SQUARE, 10, 0)))
     split = changed(BASE, ice__nonconvex="split")
     field(tmp_path, split)
@@ -239,7 +264,8 @@ def test_field_files_with_bays(tmp_path):
     c = run(tmp_path, changed(stored, ice__nonconvex="hull"), name="c")
     np.testing.assert_allclose(sorted(c.dataset("/floes/area")), [1, 4], rtol=1e-12)
     np.testing.assert_allclose(c.summary["concentration"] * (200 - math.pi), 5, rtol=1e-3)
-    again = call("field", write_case(tmp_path, changed(stored, ice__nonconvex="split")), "-o", tmp_path / "back.geojson")
+    again = call("field", write_case(tmp_path, changed(stored, ice__nonconvex="split")), "-o",
+                 tmp_path / "back.geojson")
     assert again.returncode == DONE, again.stderr
     ring = json.loads((tmp_path / "back.geojson").read_text())["features"][0]["geometry"]["coordinates"][0]
     assert same_ring(ring[:-1], at(C_SHAPE, 5, 0), 1e-12)
@@ -261,7 +287,9 @@ def vincenty(lon1, lat1, lon2, lat2):
     u1, u2 = (math.atan((1 - f) * math.tan(math.radians(x))) for x in (lat1, lat2))
     d = lam = math.radians(lon2 - lon1)
     for _ in range(50):
-        ss = math.hypot(math.cos(u2) * math.sin(lam), math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
+        ss = math.hypot(
+            math.cos(u2) * math.sin(lam),
+            math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
         cs = math.sin(u1) * math.sin(u2) + math.cos(u1) * math.cos(u2) * math.cos(lam)
         sigma = math.atan2(ss, cs)
         sa = math.cos(u1) * math.cos(u2) * math.sin(lam) / ss
@@ -272,13 +300,20 @@ def vincenty(lon1, lat1, lon2, lat2):
     k = c2 * (a * a - b * b) / (b * b)
     big_a = 1 + k / 16384 * (4096 + k * (k * (320 - 175 * k) - 768))
     big_b = k / 1024 * (256 + k * (k * (74 - 47 * k) - 128))
-    ds = big_b * ss * (cm + big_b / 4 * (cs * (2 * cm * cm - 1) - big_b / 6 * cm * (4 * ss * ss - 3) * (4 * cm * cm - 3)))
-    return b * big_a * (sigma - ds), math.atan2(math.cos(u2) * math.sin(lam), math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
+    ds = big_b * ss * (cm + big_b / 4 * (cs * (2 * cm * cm - 1) - big_b / 6 * cm * (4 * ss * ss - 3) *
+                                         (4 * cm * cm - 3)))
+    return b * big_a * (sigma - ds), math.atan2(
+        math.cos(u2) * math.sin(lam),
+        math.cos(u1) * math.sin(u2) - math.sin(u1) * math.cos(u2) * math.cos(lam))
 
 
 LON, LAT = 19.3, 75.0
-LONLAT = changed(BASE, domain={"frame": "geographic", "length": 210e3, "width": 210e3, "ends": "open", "sides": "open"}, body={"shape": "none"},
-                 ice__outlines_crs="lonlat", ice__origin_lon=LON, ice__origin_lat=LAT)
+LONLAT = changed(BASE,
+                 domain={"frame": "geographic", "length": 210e3, "width": 210e3, "ends": "open", "sides": "open"},
+                 body={"shape": "none"},
+                 ice__outlines_crs="lonlat",
+                 ice__origin_lon=LON,
+                 ice__origin_lat=LAT)
 
 
 def triangle(lon, lat, metres):
@@ -290,12 +325,14 @@ def triangle(lon, lat, metres):
 @pytest.mark.parametrize("lat0", [60, 75, 89])
 @pytest.mark.parametrize("frame", ["geographic", "basin"])
 def test_projected_distances_and_azimuths(tmp_path, frame, lat0, distance, error):
-    """Against geodesics; error: how far from their ends (m) corners may lie at a distance (m) from the origin. Azimuthal equidistant means that both are true from the origin."""
+    """Against geodesics; error: how far from their ends (m) corners may lie at a distance (m) from the origin.
+    Azimuthal equidistant means that both are true from the origin."""
     places = [(math.radians(azimuth), distance) for azimuth in range(10, 360, 40)]
     rings = []
     for azimuth, d in places:
         lat = lat0 + d * math.cos(azimuth) / 111.6e3 * (0.9 if lat0 < 89 else 0.5)
-        rings.append(triangle(LON + d * math.sin(azimuth) / (111.3e3 * math.cos(math.radians(lat))), lat, distance / 20))
+        rings.append(triangle(LON + d * math.sin(azimuth) / (111.3e3 * math.cos(math.radians(lat))), lat,
+                              distance / 20))
     write(tmp_path, *(feature(r) for r in rings))
     size = 2.3 * distance
     case = changed(LONLAT, domain__frame=frame, domain__length=size, domain__width=size, ice__origin_lat=lat0)
@@ -316,7 +353,8 @@ def test_projected_distances_and_azimuths(tmp_path, frame, lat0, distance, error
 def test_origin_in_the_middle(tmp_path):
     """Also across the 180th meridian."""
     for lon in (20.0, 179.999):
-        write(tmp_path, feature(triangle(lon - 0.004, 70, 50)), feature([[x if x <= 180 else x - 360, y] for x, y in triangle(lon + 0.004, 70.002, 50)]))
+        write(tmp_path, feature(triangle(lon - 0.004, 70, 50)),
+              feature([[x if x <= 180 else x - 360, y] for x, y in triangle(lon + 0.004, 70.002, 50)]))
         case = changed(LONLAT, domain__length=2e3, domain__width=2e3, ice__origin_lon=None, ice__origin_lat=None)
         got, *_ = field(tmp_path, case)
         corners = np.vstack(got)
@@ -326,7 +364,8 @@ def test_origin_in_the_middle(tmp_path):
         assert abs(o["origin_lat_deg"] - 70.001) < 1e-3 and abs(abs(o["origin_lon_deg"]) - lon) < 2e-3
 
 
-@pytest.mark.parametrize("ring, says", [([[75, 1900], [75, 1910], [80, 1910]], "longitude and latitude"), (triangle(LON + 5, LAT, 50), "100 km")])
+@pytest.mark.parametrize("ring, says", [([[75, 1900], [75, 1910], [80, 1910]], "longitude and latitude"),
+                                        (triangle(LON + 5, LAT, 50), "100 km")])
 def test_what_is_no_place_near_by(tmp_path, ring, says):
     write(tmp_path, feature(triangle(LON, LAT, 50)), feature(ring))
     said = field(tmp_path, LONLAT, code=CASE)

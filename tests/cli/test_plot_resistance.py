@@ -12,8 +12,11 @@ from test_postproc import done, make_run, pixels, script, where
 import plot_resistance  # noqa: E402  (test_postproc has put postproc/ on the path)
 import style  # noqa: E402
 
-BERG = {"run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
-        "ice": {"concentration": 0.8, "size": 30, "size_spread": 0, "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}}
+BERG = {
+    "run": {"dt": 5, "duration": 1000}, "domain": {"frame": "geographic", "length": 5000, "width": 2000},
+    "ice": {"concentration": 0.8, "size": 30, "size_spread": 0,
+            "thickness": 1.0}, "body": {"length": 80, "draft": 50}, "tow": {"speed": 0.5}
+}
 
 
 def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
@@ -22,16 +25,22 @@ def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
     result = call("estimate", "--json", write_case(folder, changed(case, ice__concentration=concentration)))
     assert result.returncode == DONE, result.stderr
     numbers = json.loads((run / "summary.json").read_text())
-    numbers |= {"estimates": json.loads(result.stdout)["estimates"], "mean_ice_resistance_n": mean, "mean_ice_resistance_se_n": se,
-                "concentration": concentration, "warnings": [], "reference": None} | summary
+    numbers |= {
+        "estimates": json.loads(result.stdout)["estimates"], "mean_ice_resistance_n": mean,
+        "mean_ice_resistance_se_n": se, "concentration": concentration, "warnings": [], "reference": None
+    } | summary
     (run / "summary.json").write_text(json.dumps(numbers))
     return run
 
 
 @pytest.fixture
 def runs(tmp_path):
-    return [made_up(tmp_path / "a", 0.1, 2e3), made_up(tmp_path / "b", 0.5, 4e4), made_up(tmp_path / "c", 0.5, 6e4, warnings=["a doubt"]),
-            made_up(tmp_path / "d", 0.95, 8e5, unconverged_steps=3)]
+    return [
+        made_up(tmp_path / "a", 0.1, 2e3),
+        made_up(tmp_path / "b", 0.5, 4e4),
+        made_up(tmp_path / "c", 0.5, 6e4, warnings=["a doubt"]),
+        made_up(tmp_path / "d", 0.95, 8e5, unconverged_steps=3)
+    ]
 
 
 def test_the_picture_has_points_bars_and_curves(runs):
@@ -61,17 +70,20 @@ def test_the_picture_has_points_bars_and_curves(runs):
 
 
 def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
-    done(script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--table", tmp_path / "new/r.md"), tmp_path / "r.png", tmp_path / "new/r.md")
+    done(script("plot_resistance.py", *runs, "-o", tmp_path / "r.png", "--table", tmp_path / "new/r.md"),
+         tmp_path / "r.png", tmp_path / "new/r.md")
     head, _, *lines = (tmp_path / "new/r.md").read_text().splitlines()
     cells = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
-    assert [c.strip() for c in head.strip("|").split("|")][:5] == ["ice, %", "runs", "simulated, N", "standard error, N", "Lichey–Hellmer 2001"]
+    assert [c.strip() for c in head.strip("|").split("|")
+            ][:5] == ["ice, %", "runs", "simulated, N", "standard error, N", "Lichey–Hellmer 2001"]
     assert [c[0] for c in cells] == ["10", "50", "95"] and [c[1] for c in cells] == ["1", "2", "1"]
     assert cells[0][2:5] == ["2000", "1e+03", "0"]
     assert cells[1][2:4] == ["5e+04", "1e+04"]  # scatter of 40 and 60 kN: 14.1 / sqrt 2
     width = plot_resistance.read(runs[0]).estimates["width_m"]
     drag = 0.5 * 910 * width * 0.25
     assert cells[1][4] == f"{drag:.3g} ({5e4 / drag:.3g})"
-    assert cells[1][5].split()[0].endswith("*") and not cells[2][5].split()[0].endswith("*")  # compaction of loose and of dense ice
+    # compaction of loose and of dense ice
+    assert cells[1][5].split()[0].endswith("*") and not cells[2][5].split()[0].endswith("*")
     assert cells[2][7] == "–"  # momentum beyond phi
     assert cells[2][9] == "3 %" and cells[1][10] == "1"
     picture = pixels(tmp_path / "r.png")
@@ -84,7 +96,10 @@ def test_the_default_place_is_beside_the_first_run(runs, tmp_path):
 
 
 def test_a_run_without_resistance_or_error_is_shown_as_such(tmp_path):
-    points = [plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)), plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))]
+    points = [
+        plot_resistance.read(made_up(tmp_path / "a", 0.1, 0.0, se=None)),
+        plot_resistance.read(made_up(tmp_path / "b", 0.5, 4e4, se=None))
+    ]
     figure = plot_resistance.draw(points)
     assert any("1 run(s) without resistance" in text.get_text() for text in figure.texts)
     assert "–" in plot_resistance.table(points).splitlines()[2]

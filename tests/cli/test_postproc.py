@@ -57,7 +57,8 @@ floes:
 
 
 def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (2.0, 0.0)), towed=0, mode="speed"):
-    """A run of a square and a triangle, a towed hull that takes the positions of path, and a wall; known numbers throughout."""
+    """A run of a square and a triangle, a towed hull that takes the positions of path, and a wall; known numbers
+    throughout."""
     folder.mkdir(parents=True, exist_ok=True)
     n, frames = 100, len(path)
     time = 0.1 * np.arange(1, n + 1)
@@ -103,7 +104,9 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
 
 
 def script(name, *arguments):
-    return subprocess.run(["/usr/bin/python3", str(POSTPROC / name), *map(str, arguments)], capture_output=True, text=True,
+    return subprocess.run(["/usr/bin/python3", str(POSTPROC / name), *map(str, arguments)],
+                          capture_output=True,
+                          text=True,
                           timeout=120)
 
 
@@ -385,13 +388,15 @@ def test_field_panels_show_first_middle_and_last_frame(tmp_path):
 
 
 def test_a_moving_window_is_shown_about_the_body(tmp_path):
-    """60 m northward through a window of 40 m whose frames hold wrapped places: title, track and view say where the body is."""
+    """60 m northward through a window of 40 m whose frames hold wrapped places: title, track and view say where the
+    body is."""
     path = [(15.0 * i, 0.0) for i in range(5)]
     folder = make_run(tmp_path / "run", frame="geographic", ends="moving", path=path)
     with h5py.File(folder / "result.h5", "r+") as f:
         f["frames/body_pose"][:, 0, 0] = (np.array(path)[:, 0] + 20) % 40 - 20
         del f["case"]
-        f["case"] = CASE.format(frame="geographic", ends="moving\n  ahead: 25 m", mode="speed").replace("90 deg", "0 deg")
+        f["case"] = CASE.format(frame="geographic", ends="moving\n  ahead: 25 m",
+                                mode="speed").replace("90 deg", "0 deg")
     with Run(folder) as run:
         figure = plot_field.draw(run, window="body")
         axes = figure.axes[:3]
@@ -407,7 +412,8 @@ def test_titles_of_narrow_panels_stand_apart(tmp_path):
     folder = make_run(tmp_path / "run", path=[(1000.0 + i, 0.0) for i in range(5)])
     with h5py.File(folder / "result.h5", "r+") as f:
         del f["case"]
-        f["case"] = CASE.format(frame="geographic", ends="open", mode="speed").replace("length: 40 m", "length: 4 km").replace("90 deg", "0 deg")
+        f["case"] = CASE.format(frame="geographic", ends="open",
+                                mode="speed").replace("length: 40 m", "length: 4 km").replace("90 deg", "0 deg")
     with Run(folder) as run:
         run.summary["title"] = "A tow with a title that is a good deal longer than the figure is wide at full size"
         figure = plot_field.draw(run, window="body")
@@ -424,7 +430,9 @@ def test_tow_line_goes_from_the_hull_to_the_carriage(tmp_path):
     for mode, expected in (("line", [[[10.0, 5.0], [15.0, 3.0]]]), ("speed", [])):
         with Run(make_run(tmp_path / mode, path=((8.0, 5.0),) * 3, mode=mode)) as run:
             axes = plot_field.draw(run).axes[0]
-            lines = [line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "s" and len(line.get_xydata())]
+            lines = [
+                line.get_xydata().tolist() for line in axes.lines if line.get_marker() == "s" and len(line.get_xydata())
+            ]
             assert lines == expected
 
 
@@ -474,8 +482,13 @@ def test_film_as_gif_follows_the_body(tmp_path):
 def test_film_as_mp4_has_every_frame(tmp_path):
     run = make_run(tmp_path / "run", path=[(float(i), 0.0) for i in range(7)])
     done(script("animate.py", run, "--width", 501), run / "film.mp4")
-    probe = subprocess.run(["ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width,height",
-                            "-of", "json", run / "film.mp4"], capture_output=True, text=True, check=True)
+    probe = subprocess.run([
+        "ffprobe", "-v", "error", "-count_frames", "-show_entries", "stream=nb_read_frames,width,height", "-of", "json",
+        run / "film.mp4"
+    ],
+                           capture_output=True,
+                           text=True,
+                           check=True)
     stream = json.loads(probe.stdout)["streams"][0]
     assert stream["nb_read_frames"] == "7" and stream["width"] == 500 and stream["height"] % 2 == 0
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Random cases (random_cases.py): a few dozen, 50 steps each, on the build with sanitizers where it is there; thousands in tests/long."""
+"""Random cases (random_cases.py): a few dozen, 50 steps each, on the build with sanitizers where it is there; thousands
+in tests/long."""
 import collections
 import json
 import os
@@ -43,11 +44,15 @@ def test_draws_reach_every_key_and_choice(table):
         for letter, bound in (("l", "least"), ("m", "most")):
             if spec and isinstance(spec, tuple) and letter in spec[2]:
                 assert any(abs(x - keys[name][bound]) <= 1e-5 * abs(x) for x in seen[name]), (name, bound)
-    assert {k["name"] for k in table["floe_keys"]} <= {k for seed in range(200) for floe in random_cases.draw(seed, table).get("floes", ()) for k in floe}
+    assert {k["name"]
+            for k in table["floe_keys"]
+            } <= {k
+                  for seed in range(200) for floe in random_cases.draw(seed, table).get("floes", ()) for k in floe}
 
 
 def test_a_seed_is_a_case_for_ever(table):
-    assert random_cases.text(random_cases.draw(7, table)) == random_cases.text(random_cases.draw(7, table)) != random_cases.text(random_cases.draw(8, table))
+    assert random_cases.text(random_cases.draw(7, table)) == random_cases.text(random_cases.draw(
+        7, table)) != random_cases.text(random_cases.draw(8, table))
 
 
 def test_random_cases(tmp_path, table):
@@ -66,10 +71,13 @@ def test_keys_as_json(table):
     listed = [line.split()[0] for line in call("--list-keys").stdout.splitlines() if line[:1].isalpha()]
     assert [k["name"] for k in table["keys"]] == [n for n in listed if "." in n][:len(table["keys"])]
     keys = {k["name"]: k for k in table["keys"]}
-    assert keys["run.dt"] | {"doc": ""} == {"name": "run.dt", "type": "real", "required": True, "default": None, "follows": None, "unit": "s", "least": 0, "above_least": True,
-                                            "most": 1000, "below_most": False, "doc": ""}
+    assert keys["run.dt"] | {"doc": ""} == {
+        "name": "run.dt", "type": "real", "required": True, "default": None, "follows": None, "unit": "s", "least": 0,
+        "above_least": True, "most": 1000, "below_most": False, "doc": ""
+    }
     assert (keys["body.yaw"]["least"], keys["body.yaw"]["unit"], keys["body.yaw"]["default"]) == (-360, "deg", "0 deg")
-    assert keys["tow.mode"]["choices"] == ["none", "speed", "line", "thrust"] and keys["body.width"]["follows"] == "body.length"
+    assert keys["tow.mode"]["choices"] == ["none", "speed", "line", "thrust"
+                                           ] and keys["body.width"]["follows"] == "body.length"
     assert {k["name"] for k in table["floe_keys"]} >= {"x", "y", "fixed", "thickness"}
     refused = call("--list-keys", "--jsn")
     assert refused.returncode == USAGE and "did you mean --json?" in refused.stderr

@@ -29,14 +29,29 @@ import style  # noqa: E402
 from bergtow_read import Run  # noqa: E402
 
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
-CASE = changed(TOW, run__title=HOSTILE, ice__concentration=0.7, reference__mean_force=3.0, reference__source="<b>nobody</b>", output__window_start=8)
+CASE = changed(TOW,
+               run__title=HOSTILE,
+               ice__concentration=0.7,
+               reference__mean_force=3.0,
+               reference__source="<b>nobody</b>",
+               output__window_start=8)
 #: in the map's frame, within a window that goes along, on a line that breaks
-MOVING = changed(TOW, domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10}, body={"length": 2, "draft": 0.5}, run__duration=60,
-                 tow={"mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000, "line": {"breaking_load": 1e6}})
+MOVING = changed(
+    TOW,
+    domain={"frame": "geographic", "length": 20, "width": 8, "ends": "moving", "sides": "periodic", "ahead": 10},
+    body={"length": 2, "draft": 0.5},
+    run__duration=60,
+    tow={
+        "mode": "line", "speed": 0.2, "ramp": 2, "line_stiffness": 50e3, "line_damping": 1000,
+        "line": {"breaking_load": 1e6}
+    })
 
 
 def script(*arguments):
-    return subprocess.run(["/usr/bin/python3", str(POSTPROC / "report.py"), *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    return subprocess.run(["/usr/bin/python3", str(POSTPROC / "report.py"), *map(str, arguments)],
+                          capture_output=True,
+                          text=True,
+                          timeout=120)
 
 
 def page_without_pictures(folder, path, monkeypatch, *arguments):
@@ -80,7 +95,10 @@ def ready(driver, path):
 
 def seek(driver, frame):
     """Go to a frame and wait until it is drawn."""
-    driver.execute_async_script("const done = arguments[1]; bergtow.seek(arguments[0]); requestAnimationFrame(() => requestAnimationFrame(done))", frame)
+    driver.execute_async_script(
+        "const done = arguments[1]; bergtow.seek(arguments[0]); requestAnimationFrame(() => "
+        "requestAnimationFrame(done))",
+        frame)
 
 
 @pytest.fixture
@@ -106,7 +124,8 @@ def test_needs_nothing_but_itself(page, alone):
     assert all(js(page, "return [...document.images].map((i) => i.complete && i.naturalWidth > 300)"))
     assert len(page.find_elements("tag name", "img")) == 6
     # What it cannot do: ask the network.
-    blocked = page.execute_async_script("const done = arguments[0]; fetch('http://127.0.0.1:9/').then(() => done('reached'), (e) => done(e.name))")
+    blocked = page.execute_async_script(
+        "const done = arguments[0]; fetch('http://127.0.0.1:9/').then(() => done('reached'), (e) => done(e.name))")
     assert blocked == "TypeError" and any("Content Security Policy" in c for c in complaints(page))
 
 
@@ -126,9 +145,15 @@ def test_says_the_numbers_of_the_run(page, tow):
     assert np.allclose([float(v) for v in said.groups()], [mean, low, high], rtol=0.03, atol=0.051 * (high - mean))
     assert s["window"]["verdict"] == "steady" or s["window"]["reason"] in body
     assert text(page, ".warning li") == s["warnings"] and len(s["warnings"]) > 0
-    rows = {r.find_element("tag name", "th").text: r.text for r in page.find_elements("css selector", "#estimates tbody tr")}
-    names = {"Lichey–Hellmer 2001": "lichey_hellmer", "Marchenko, compaction": "marchenko_compaction", "Marchenko, rafting": "marchenko_rafting", "Marchenko, momentum": "marchenko_momentum",
-             "dilute limit": "dilute_limit", "open-water drag": "open_water_drag"}
+    rows = {
+        r.find_element("tag name", "th").text: r.text
+        for r in page.find_elements("css selector", "#estimates tbody tr")
+    }
+    names = {
+        "Lichey–Hellmer 2001": "lichey_hellmer", "Marchenko, compaction": "marchenko_compaction",
+        "Marchenko, rafting": "marchenko_rafting", "Marchenko, momentum": "marchenko_momentum",
+        "dilute limit": "dilute_limit", "open-water drag": "open_water_drag"
+    }
     assert set(rows) == set(names)
     for label, name in names.items():
         e = s["estimates"][name]
@@ -139,11 +164,15 @@ def test_says_the_numbers_of_the_run(page, tow):
 
 
 def test_fits_a_narrow_window_and_a_dark_one(page):
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
-    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                         {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia",
+                         {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
     try:
         assert js(page, "return document.documentElement.scrollWidth") <= 380
-        paper = [int(v) for v in re.findall(r"\d+", js(page, "return getComputedStyle(document.body).backgroundColor"))[:3]]
+        paper = [
+            int(v) for v in re.findall(r"\d+", js(page, "return getComputedStyle(document.body).backgroundColor"))[:3]
+        ]
         ink = [int(v) for v in re.findall(r"\d+", js(page, "return getComputedStyle(document.body).color"))[:3]]
         assert max(paper) < 60 and min(ink) > 200
     finally:
@@ -154,7 +183,8 @@ def test_fits_a_narrow_window_and_a_dark_one(page):
 # ---- the replay
 
 def test_poses_and_values_are_those_of_the_file(page, tow):
-    pose, body, force, speed, time = (tow.dataset(f"frames/{n}") for n in ("pose", "body_pose", "contact_force", "speed", "time"))
+    pose, body, force, speed, time = (tow.dataset(f"frames/{n}")
+                                      for n in ("pose", "body_pose", "contact_force", "speed", "time"))
     n, last = pose.shape[1], len(time) - 1
     quantum = np.ptp(pose[:, :, :2].reshape(-1, 2), axis=0) / 65535
     for frame in (0, 1, last // 2, last):
@@ -166,11 +196,14 @@ def test_poses_and_values_are_those_of_the_file(page, tow):
         assert np.allclose(js(page, "return bergtow.body(0)"), body[frame, 0], atol=1e-12)
         for kind, values in (("force", force[frame]), ("speed", speed[frame, :n])):
             got = np.array(js(page, f"return [...Array({n}).keys()].map((i) => bergtow.value('{kind}', i))"))
-            assert np.all(np.abs(got - values) <= 2e-5 * np.sqrt(np.maximum(got, values) * {"force": force, "speed": speed}[kind].max()) + 1e-9)
+            assert np.all(
+                np.abs(got - values) <= 2e-5 *
+                np.sqrt(np.maximum(got, values) * {"force": force, "speed": speed}[kind].max()) + 1e-9)
     assert force.max() > 0
     seek(page, last // 2 + 0.25)
     between = 0.75 * pose[last // 2] + 0.25 * pose[last // 2 + 1]
-    assert np.all(np.abs(shown(page, n)[:, :2] - between[:, :2]) <= 0.5001 * quantum) and np.ptp(pose[last // 2:last // 2 + 2], axis=0).max() > 3 * quantum.max()
+    assert np.all(np.abs(shown(page, n)[:, :2] - between[:, :2]) <= 0.5001 * quantum) and np.ptp(
+        pose[last // 2:last // 2 + 2], axis=0).max() > 3 * quantum.max()
     turn = np.abs(pose[1:, :, 2] - pose[:-1, :, 2]).max(axis=1)
     k = int(np.argmax(turn))
     seek(page, k + 0.25)
@@ -214,16 +247,22 @@ def test_slider_scrubs(page, tow):
 
 def pixel(driver, i):
     """Colour in the middle of a floe."""
-    return js(driver, """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth, at = bergtow.screen(arguments[0]);
-                         return [...c.getContext('2d').getImageData(at[0] * ratio, at[1] * ratio, 1, 1).data].slice(0, 3)""", i)
+    return js(
+        driver,
+        """const c = document.getElementById('replay-field'), ratio = c.width / c.clientWidth;
+           const [x, y] = bergtow.screen(arguments[0]);
+           return [...c.getContext('2d').getImageData(x * ratio, y * ratio, 1, 1).data].slice(0, 3)""",
+        i)
 
 
 def test_colours_by_speed_and_by_force(page, tow):
     speed, force, pose, body = (tow.dataset(f"frames/{n}") for n in ("speed", "contact_force", "pose", "body_pose"))
-    clear = np.hypot(*(pose[:, :, :2] - body[:, :1, :2]).transpose(2, 0, 1)) > 2.5  # no body, line, arrow or track above the floe
+    # no body, line, arrow or track above the floe
+    clear = np.hypot(*(pose[:, :, :2] - body[:, :1, :2]).transpose(2, 0, 1)) > 2.5
     clear &= np.abs(pose[:, :, 1] - body[:, :1, 1]) > 1.5
     top = np.percentile(force[force > 0], 99)
-    frame, floe = np.unravel_index(np.argmin(np.where(clear & (force > 0), np.abs(force - 0.2 * top), np.inf)), force.shape)
+    frame, floe = np.unravel_index(np.argmin(np.where(clear & (force > 0), np.abs(force - 0.2 * top), np.inf)),
+                                   force.shape)
     assert 0.1 * top < force[frame, floe] < 0.3 * top
     still = int(np.argmax(clear[frame] & (force[frame] == 0)))
     seek(page, int(frame))
@@ -232,9 +271,14 @@ def test_colours_by_speed_and_by_force(page, tow):
     Select(page.find_element("id", "replay-colour")).select_by_visible_text("contact force")
     seek(page, int(frame))
     shade = np.array(pixel(page, int(floe)))
-    assert js(page, "return bergtow.colour") == "force" and text(page, "#replay-bar-label")[0].startswith("largest contact force")
+    assert js(page, "return bergtow.colour") == "force" and text(
+        page, "#replay-bar-label")[0].startswith("largest contact force")
     # The scale is a square root up to a limit near the largest forces of some of the frames.
-    limit = js(page, "const c = JSON.parse(document.getElementById('replay-head').textContent).colouring[1]; return c.high * c.factor")
+    limit = js(
+        page,
+        "const c = JSON.parse(document.getElementById('replay-head').textContent).colouring[1]; return c.high * "
+        "c.factor"
+    )
     assert np.percentile(force[force > 0], 95) < limit < np.percentile(force[force > 0], 99.9)
     assert np.abs(shade - 255 * np.array(style.FORCE_MAP(np.sqrt(force[frame, floe] / limit))[:3])).max() < 9
     assert np.abs(shade - want).max() > 30
@@ -249,8 +293,15 @@ def test_a_click_on_the_curve_goes_there(page, tow):
         ActionChains(page).move_to_element_with_offset(chart, int((share - 0.5) * wide), 0).click().perform()
         times.append(js(page, "return bergtow.time"))
         seek(page, js(page, "return bergtow.playhead"))
-        columns = js(page, """const c = arguments[0], d = c.getContext('2d').getImageData(0, Math.round(c.height / 2), c.width, 1).data, out = [];
-                              for (let x = 0; x < c.width; x++) if (d[4 * x] > 180 && d[4 * x + 1] < 60 && d[4 * x + 2] > 70 && d[4 * x + 2] < 120) out.push(x * c.clientWidth / c.width); return out""", chart)
+        columns = js(
+            page,
+            """const c = arguments[0], out = [];
+               const d = c.getContext('2d').getImageData(0, Math.round(c.height / 2), c.width, 1).data;
+               for (let x = 0; x < c.width; x++)
+                 if (d[4 * x] > 180 && d[4 * x + 1] < 60 && d[4 * x + 2] > 70 && d[4 * x + 2] < 120)
+                   out.push(x * c.clientWidth / c.width);
+               return out""",
+            chart)
         assert columns and abs(np.mean(columns) - int((share - 0.5) * wide) - wide / 2) < 3
     # The axis runs from 0 to the end of the run over most of the width.
     assert 0.85 < (times[1] - times[0]) / (0.4 * tow.summary["sim_time_s"]) < 1.25
@@ -265,9 +316,12 @@ def test_pointing_at_a_floe_tells_its_values(page, tow):
     pose, force = tow.dataset("frames/pose")[60], tow.dataset("frames/contact_force")[60]
     floe = int(np.argmax(np.where(pose[:, 0] > 5, force, -1)))
     x, y = js(page, "return bergtow.screen(arguments[0])", floe)
-    ActionChains(page).move_to_element_with_offset(field, round(x - field.size["width"] / 2), round(y - field.size["height"] / 2)).perform()
-    lines = until(lambda: js(page, "const t = document.getElementById('replay-tip'); return t.hidden ? '' : t.textContent")).split("\n")
-    assert lines[0] == f"floe {floe}" and float(re.search(r"force ([\d.e-]+) N", lines[2])[1]) == pytest.approx(force[floe], rel=0.006)
+    ActionChains(page).move_to_element_with_offset(field, round(x - field.size["width"] / 2),
+                                                   round(y - field.size["height"] / 2)).perform()
+    lines = until(lambda: js(
+        page, "const t = document.getElementById('replay-tip'); return t.hidden ? '' : t.textContent")).split("\n")
+    assert lines[0] == f"floe {floe}" and float(re.search(r"force ([\d.e-]+) N", lines[2])[1]) == pytest.approx(
+        force[floe], rel=0.006)
 
 
 def test_zoom_drag_and_fit(page):
@@ -291,14 +345,18 @@ def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
     assert r.summary["moving_window"]["renewed"] > 0 and way[-1] - way[0] > 5
     for follow in (True, False):
         seek(chrome, frame)
-        assert js(chrome, "return bergtow.follow") == follow and js(chrome, "return bergtow.body(0)[0]") == pytest.approx(way[sample], abs=1e-6)
-        # A map: x points up, y to the right. Each floe stands at the image within the window; across, at the one nearest to the middle of the view.
+        assert js(chrome, "return bergtow.follow") == follow and js(
+            chrome, "return bergtow.body(0)[0]") == pytest.approx(way[sample], abs=1e-6)
+        # A map: x points up, y to the right. Each floe stands at the image within the window; across, at the one
+        # nearest to the middle of the view.
         centre = body[frame, 0, 1] if follow else 0.0
         north = window[sample] + (pose[frame, :, 0] - window[sample]) % 20 - way[sample]
         east = centre + (pose[frame, :, 1] - centre + 4) % 8 - 4 - (body[frame, 0, 1] + 4) % 8 + 4
-        at = np.array(js(chrome, f"return [...Array({len(north)}).keys()].map((i) => bergtow.screen(i))")) - js(chrome, "return bergtow.towed()")
+        at = np.array(js(chrome, f"return [...Array({len(north)}).keys()].map((i) => bergtow.screen(i))")) - js(
+            chrome, "return bergtow.towed()")
         # A floe within rounding of the seam may stand at either end.
-        inside = (np.abs((pose[frame, :, 0] - window[sample] + 10) % 20 - 10) > 0.01) & (np.abs((pose[frame, :, 1] - centre) % 8 - 4) > 0.01)
+        inside = (np.abs((pose[frame, :, 0] - window[sample] + 10) % 20 - 10) > 0.01) & (np.abs(
+            (pose[frame, :, 1] - centre) % 8 - 4) > 0.01)
         assert inside.sum() > 0.9 * len(north)
         assert np.abs(at / js(chrome, "return bergtow.metre") - np.column_stack([east, -north]))[inside].max() < 0.01
         chrome.find_element("id", "replay-follow").click()
@@ -307,8 +365,13 @@ def test_follows_the_body_in_a_moving_window(chrome, tmp_path, monkeypatch):
 
 def test_leaves_out_frames_and_floes_and_says_so(chrome, tow, tmp_path, monkeypatch):
     """A page of 0.1 MB, not packed: fewer frames, those floes that the body comes near to, and their own ids."""
-    ready(chrome, page_without_pictures(tow.dir, tmp_path / "page.html", monkeypatch, "--size", "0.1", "--no-compression"))
-    assert sum(len(t) for t in js(chrome, "return ['x', 'y', 'yaw', 'speed', 'force'].map((n) => document.getElementById('replay-' + n).textContent)")) <= 0.101e6
+    ready(chrome,
+          page_without_pictures(tow.dir, tmp_path / "page.html", monkeypatch, "--size", "0.1", "--no-compression"))
+    assert sum(
+        len(t) for t in js(
+            chrome,
+            "return ['x', 'y', 'yaw', 'speed', 'force'].map((n) => document.getElementById('replay-' + n).textContent)")
+    ) <= 0.101e6
     pose, body, time = (tow.dataset(f"frames/{n}") for n in ("pose", "body_pose", "time"))
     frames, floes = js(chrome, "return bergtow.frames"), js(chrome, "return bergtow.floes")
     assert 30 < frames < len(time) and 10 < floes < pose.shape[1]
@@ -324,7 +387,8 @@ def test_leaves_out_frames_and_floes_and_says_so(chrome, tow, tmp_path, monkeypa
 
 
 def test_says_when_the_browser_cannot_unpack(chrome, alone):
-    hide = chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": "delete window.DecompressionStream"})
+    hide = chrome.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument",
+                                  {"source": "delete window.DecompressionStream"})
     try:
         opened(chrome, alone)
         said = until(lambda: text(chrome, "#replay-state.warning"))
@@ -337,7 +401,13 @@ def test_says_when_the_browser_cannot_unpack(chrome, alone):
 
 def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
     """Every section that a run has nothing for is left out; a picture of a line of which nothing is left is drawn."""
-    adrift = run(tmp_path / "adrift", changed(MOVING, domain={"length": 15, "width": 8}, ice__concentration=0.2, run__duration=6, tow__line__breaking_load=10))
+    adrift = run(
+        tmp_path / "adrift",
+        changed(MOVING,
+                domain={"length": 15, "width": 8},
+                ice__concentration=0.2,
+                run__duration=6,
+                tow__line__breaking_load=10))
     assert [e["kind"] for e in adrift.summary["events"]] == ["line_broken", "adrift"]
     assert script(adrift.dir).returncode == 0
     page = (adrift.dir / "report.html").read_text()
@@ -345,10 +415,12 @@ def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
     drift = run(tmp_path / "drift", changed(TOW, run__duration=2, body={"shape": "none"}, tow=None, air={"wind_x": 5}))
     assert script(drift.dir).returncode == 0
     page = (drift.dir / "report.html").read_text()
-    assert "No body was towed" in page and "<nav" in page and "Estimates" not in page and page.count('src="data:image/png') == 2
+    assert "No body was towed" in page and "<nav" in page and "Estimates" not in page and page.count(
+        'src="data:image/png') == 2
 
 
-@pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"), ("truncated", "not readable as HDF5"), ("frames", "/frames/pose")])
+@pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"),
+                                         ("truncated", "not readable as HDF5"), ("frames", "/frames/pose")])
 def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, words):
     folder = tmp_path / "run"
     if harm != "folder":
@@ -365,7 +437,8 @@ def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, w
             f["frames/pose"][3, 4, 0] = np.nan
             del f["frames/pose"]
     result = script(folder)
-    assert result.returncode == 4 and words in result.stderr and str(folder) in result.stderr and "Traceback" not in result.stderr
+    assert result.returncode == 4 and words in result.stderr and str(
+        folder) in result.stderr and "Traceback" not in result.stderr
     assert harm == "folder" or (folder / "report.html").read_text() == "old"
     assert sorted(p.name for p in folder.glob("report*")) == ([] if harm == "folder" else ["report.html"])
 
@@ -410,29 +483,42 @@ tow:
 
 class Told:
     path = Path("nowhere/run")
-    case_text, resolved_text, attributes = GIVEN, RESOLVED, {"command_line": "bergtow run a.yml --set tow.speed=0.2 --set=ice.sides=6 -o 'x y'"}
+    case_text, resolved_text, attributes = GIVEN, RESOLVED, {
+        "command_line": "bergtow run a.yml --set tow.speed=0.2 --set=ice.sides=6 -o 'x y'"
+    }
 
 
 def test_where_each_value_comes_from():
     values = {v.key: v for v in report_case.values(Told)}
     kinds = {k: v.kind for k, v in values.items()}
-    assert kinds == {"run.dt": "given", "run.title": "given", "ice.size": "source", "ice.thickness": "assumed", "ice.friction": "given", "ice.length": "memory", "ice.density": "source",
-                     "ice.shake": "assumed", "ice.basin": "memory", "ice.sides": "set", "tow.speed": "set", "tow.waypoints": "assumed"}
-    assert values["ice.size"].origin == "Yulmetov & Løset 2017" and values["run.title"].value == "a # b" and values["tow.waypoints"].value == "[[1, 2], [3, 4]]"
+    assert kinds == {
+        "run.dt": "given", "run.title": "given", "ice.size": "source", "ice.thickness": "assumed",
+        "ice.friction": "given", "ice.length": "memory", "ice.density": "source", "ice.shake": "assumed",
+        "ice.basin": "memory", "ice.sides": "set", "tow.speed": "set", "tow.waypoints": "assumed"
+    }
+    assert values["ice.size"].origin == "Yulmetov & Løset 2017" and values["run.title"].value == "a # b" and values[
+        "tow.waypoints"].value == "[[1, 2], [3, 4]]"
     assert "no source stated" in values["ice.friction"].origin and "Sukhorukov" not in values["ice.friction"].origin
-    assert values["ice.density"].origin == "default: Hunke & Comeau 2011" and values["ice.shake"].origin == "default, assumed" and values["tow.speed"].value == "0.2 m/s"
+    assert values["ice.density"].origin == "default: Hunke & Comeau 2011" and values[
+        "ice.shake"].origin == "default, assumed" and values["tow.speed"].value == "0.2 m/s"
     assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
 
 
 def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
-    (tmp_path / "study.yml").write_text("base: b.yml\nset:\n  ice.size: 2 m  # assumed: larger\n  run.dt: 0.2 s\nparameters: {ice.friction: [0.1, 0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\n")
+    (tmp_path / "study.yml").write_text(
+        "base: b.yml\nset:\n  ice.size: 2 m  # assumed: larger\n  run.dt: 0.2 s\nparameters: {ice.friction: [0.1, "
+        "0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\n"
+    )
 
     class Member(Told):
         path = tmp_path / "members" / "c001-r001"
 
     values = {v.key: v for v in report_case.values(Member)}
-    assert {k for k, v in values.items() if v.origin.startswith("set by the study")} == {"ice.size", "run.dt", "ice.friction", "ice.thickness"}
-    assert values["ice.size"].kind == "assumed" and values["ice.size"].origin == "set by the study: assumed: larger" and values["run.dt"].kind == "study"
+    assert {k
+            for k, v in values.items()
+            if v.origin.startswith("set by the study")} == {"ice.size", "run.dt", "ice.friction", "ice.thickness"}
+    assert values["ice.size"].kind == "assumed" and values[
+        "ice.size"].origin == "set by the study: assumed: larger" and values["run.dt"].kind == "study"
     assert values["ice.length"].kind == "memory"
 
 
@@ -441,13 +527,15 @@ def test_every_key_is_labelled(tow):
         values = report_case.values(r)
         assert {v.key for v in values} >= set(r.case) and {v.kind for v in values} <= set(report_case.KINDS)
         by_key = {v.key: v for v in values}
-        assert by_key["tow.ramp"].kind == "given" and by_key["ice.size_spread"].kind == "assumed" and by_key["ice.density"].kind == "source"
+        assert by_key["tow.ramp"].kind == "given" and by_key["ice.size_spread"].kind == "assumed" and by_key[
+            "ice.density"].kind == "source"
         assert {key for keys in report_run.KEY_VALUES.values() for key in keys} <= set(by_key)
 
 
 def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
     """Real size, thickness and concentration of the floes, not the defaults of a field that nobody made."""
-    assert call("field", write_case(tmp_path, changed(TOW, ice__concentration=0.3)), "-o", tmp_path / "made.geojson").returncode == 0
+    assert call("field", write_case(tmp_path, changed(TOW, ice__concentration=0.3)), "-o",
+                tmp_path / "made.geojson").returncode == 0
     drawn = json.loads((tmp_path / "made.geojson").read_text())
 
     def told(name, thicknesses):
@@ -462,22 +550,29 @@ def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
 
     n = len(drawn["features"])
     r, ice, every = told("own", [0.5 + 0.4 * k / (n - 1) for k in range(n)])
-    assert ice["floes"] == (str(n), "field") and ice["floe thickness"] == ("0.7 m, 0.5 to 0.9 m", "field") and ice["concentration"] == (f"{r.summary['concentration']:.4g}", "field")
+    assert ice["floes"] == (str(n), "field") and ice["floe thickness"] == (
+        "0.7 m, 0.5 to 0.9 m", "field") and ice["concentration"] == (f"{r.summary['concentration']:.4g}", "field")
     assert 0.29 < r.summary["concentration"] < 0.31
     size = np.sqrt(4 * r.dataset("floes/area") / np.pi)
-    assert ice["floe size"] == (f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m", "field") and 0.6 < size.mean() < 0.8
-    assert not {"ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.seed"} & set(ice) and "ice.friction" in ice
-    assert every["ice.size"].kind == "unused" and every["ice.size"].origin == "not used: the ice is read by ice.outlines"
+    assert ice["floe size"] == (f"{size.mean():.3g} m, {size.min():.3g} to {size.max():.3g} m",
+                                "field") and 0.6 < size.mean() < 0.8
+    assert not {
+        "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.seed"
+    } & set(ice) and "ice.friction" in ice
+    assert (every["ice.size"].kind == "unused"
+            and every["ice.size"].origin == "not used: the ice is read by ice.outlines")
     text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
     assert ice["floe size"][0] in text and "as read" in text
     some = told("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first
-    assert some["floe thickness"][0].endswith(", 0.04 to 0.5 m") and some["ice.thickness"][0] == "0.04 m" and "ice.size" not in some
+    assert some["floe thickness"][0].endswith(
+        ", 0.04 to 0.5 m") and some["ice.thickness"][0] == "0.04 m" and "ice.size" not in some
 
 
 def test_numbers_survive_packing():
     rng = np.random.default_rng(1)
     q = rng.integers(0, 65536, (7, 13)).astype(np.uint16)
-    raw = np.frombuffer(zlib.decompress(base64.b64decode(replay_data.pack_frames(q))), np.uint8).reshape(2, 7, 13).astype(np.uint16)
+    raw = np.frombuffer(zlib.decompress(base64.b64decode(replay_data.pack_frames(q))),
+                        np.uint8).reshape(2, 7, 13).astype(np.uint16)
     assert np.array_equal(np.cumsum(raw[0] + 256 * raw[1], axis=0).astype(np.uint16), q)
     x = np.array([0.0, 0.1, 9.99999, 5.0])
     numbers, low, step = replay_data.quantise(x, 0.0, 10.0, 10.0)

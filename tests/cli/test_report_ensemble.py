@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The report of an ensemble: the numbers of ensemble.py, every member with its doubts, nothing that a browser would complain of."""
+"""The report of an ensemble: the numbers of ensemble.py, every member with its doubts, nothing that a browser would
+complain of."""
 import argparse
 import sys
 from pathlib import Path
@@ -32,7 +33,10 @@ def study(tmp_path_factory):
     for c, (concentration, mean) in enumerate([(0.2, 100.0), (0.5, 3000.0)]):
         for k in range(5):
             times = np.sort(rng.uniform(1, 599, 60))
-            some.append(member(made_up.ar1(0.6, 600, rng, mean + 4 * k, 10.0), {"ice.concentration": concentration}, c, peaks=(times, rng.exponential(50.0, 60))))
+            some.append(
+                member(made_up.ar1(0.6, 600, rng, mean + 4 * k, 10.0), {"ice.concentration": concentration},
+                       c,
+                       peaks=(times, rng.exponential(50.0, 60))))
     some[3] |= {"status": FAILED, "reason": "exit code 5: not <finite>"}
     some[6] |= {"warnings": [JAM], "summary": {"stalled_windows": 2}}
     some[9] |= {"status": WAITING}
@@ -55,8 +59,12 @@ def page(study, tmp_path_factory):
 
 def tables(page):
     """{heading: rows of texts} of the sections."""
-    return page.execute_script("""return Object.fromEntries([...document.querySelectorAll('section')].filter((s) => s.querySelector('h2') && s.querySelector('table')).map((s) =>
-        [s.querySelector('h2').textContent, [...s.querySelectorAll('tr')].map((r) => [...r.cells].map((c) => c.textContent.trim()))]))""")
+    return page.execute_script(
+        """const rows = (s) => [...s.querySelectorAll('tr')].map((r) => [...r.cells].map((c) => c.textContent.trim()));
+           const with_table = (s) => s.querySelector('h2') && s.querySelector('table');
+           return Object.fromEntries([...document.querySelectorAll('section')].filter(with_table)
+                                     .map((s) => [s.querySelector('h2').textContent, rows(s)]))"""
+    )
 
 
 def test_numbers_are_those_of_the_statistics(page, study):
@@ -64,7 +72,8 @@ def test_numbers_are_those_of_the_statistics(page, study):
     found = tables(page)
     head, *rows = found["Mean ice resistance"]
     factor = 1000.0 if "kN" in head[2] else 1.0
-    assert [row[0] for row in rows] == ["concentration 0.2", "concentration 0.5"] and [row[1] for row in rows] == ["4 (1 failed)", "4 (1 waiting)"]
+    assert [row[0] for row in rows] == ["concentration 0.2", "concentration 0.5"
+                                        ] and [row[1] for row in rows] == ["4 (1 failed)", "4 (1 waiting)"]
     for row, c in zip(rows, s["conditions"]):
         assert float(row[2]) * factor == pytest.approx(c["resistance"]["mean"], rel=0.006)
         assert [float(v) * factor for v in row[3].split(" to ")] == pytest.approx(c["resistance"]["t_95"], rel=0.006)
@@ -79,9 +88,15 @@ def test_numbers_are_those_of_the_statistics(page, study):
 def test_every_member_stands_there_with_its_doubts(page, study):
     rows = {row[0]: row for row in tables(page)["Members"][1:]}
     assert len(rows) == 10
-    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][6] == "jammed" and rows["c001-r001"][6] == "none"
-    details = {d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent") for d in page.find_elements("css selector", "#members details")}
-    assert set(details) == {"c001-r004: failed", "c002-r002: 1 warning"} and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
+    assert rows["c001-r004"][3] == "failed" and rows["c002-r005"][3] == "waiting" and rows["c002-r002"][
+        6] == "jammed" and rows["c001-r001"][6] == "none"
+    details = {
+        d.find_element("tag name", "summary").get_attribute("textContent"): d.get_attribute("textContent")
+        for d in page.find_elements("css selector", "#members details")
+    }
+    assert set(details) == {
+        "c001-r004: failed", "c002-r002: 1 warning"
+    } and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
     warning = page.find_element("css selector", ".warning").text
     assert "1 member failed" in warning and "not complete: 1 member to come" in warning and "carry warnings" in warning
     assert "8 finished, 1 failed, 1 waiting" in page.find_element("css selector", "header").text
@@ -91,8 +106,10 @@ def test_page_stands_alone_and_text_stays_text(page):
     assert page.requests == [page.path.resolve().as_uri()] and complaints(page) == []
     assert page.execute_script("return window.hacked") is None and page.find_element("tag name", "h1").text == TITLE
     assert page.find_elements("css selector", "script, #members i") == []
-    assert page.execute_script("return [...document.images].every((i) => i.complete && i.naturalWidth > 300)") and len(page.find_elements("tag name", "img")) >= 2
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    assert page.execute_script("return [...document.images].every((i) => i.complete && i.naturalWidth > 300)") and len(
+        page.find_elements("tag name", "img")) >= 2
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                         {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
     assert page.execute_script("return document.documentElement.scrollWidth") <= 380
 
 
@@ -111,26 +128,38 @@ def test_members_of_other_builds_and_lost_folders_are_told(study):
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):
-    """Conditions without a field, a member whose process died, one that has finished since the file was made: all told, none a fault of the page."""
+    """Conditions without a field, a member whose process died, one that has finished since the file was made: all told,
+    none a fault of the page."""
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     rng = np.random.default_rng(6)
-    some = [member(made_up.ar1(0.6, 600, rng, 100.0, 10.0), {"ice.concentration": c}, k) | {"status": made_up.FINISHED if k == 0 else WAITING} for k, c in enumerate((0.2, 0.5, 0.8)) for _ in range(3)]
+    some = [
+        member(made_up.ar1(0.6, 600, rng, 100.0, 10.0), {"ice.concentration": c}, k)
+        | {"status": made_up.FINISHED if k == 0 else WAITING} for k, c in enumerate((0.2, 0.5, 0.8)) for _ in range(3)
+    ]
     some[4] |= {"reason": "its process died in 1 attempt"}
     folder = made_up.write(tmp_path / "half", some)
     (folder / "members/c002-r001").mkdir(exist_ok=True)
     (folder / "members/c002-r001/finished").write_text("")
     report.main([str(folder)])
     text = (folder / "report.html").read_text()
-    for part in ("3 of 9 members in 3 conditions.", "not complete: 6 members to come", "1 member of these finished after ensemble.h5 was made", "1 member whose process died; the first: c002-r002: its process died in 1 attempt",
-                 "0 (3 waiting)", "<code>c002-r002</code>: waiting", "3 finished, 0 failed, 6 waiting"):
+    for part in ("3 of 9 members in 3 conditions.", "not complete: 6 members to come",
+                 "1 member of these finished after ensemble.h5 was made",
+                 "1 member whose process died; the first: c002-r002: its process died in 1 attempt", "0 (3 waiting)",
+                 "<code>c002-r002</code>: waiting", "3 finished, 0 failed, 6 waiting"):
         assert part in text, part
     assert text.count("no field finished") == 2
 
 
-@pytest.mark.parametrize("status, behind, told", [(WAITING, False, "has no member that has finished; run the ensemble further"), (WAITING, True, "knows of none of the 1 members that have finished; run `bergtow ensemble`"),
-                                                  (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; mend the study")])
+@pytest.mark.parametrize(
+    "status, behind, told",
+    [(WAITING, False, "has no member that has finished; run the ensemble further"),
+     (WAITING, True, "knows of none of the 1 members that have finished; run `bergtow ensemble`"),
+     (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; mend the study")])
 def test_nothing_has_finished(tmp_path, status, behind, told):
-    folder = made_up.write(tmp_path / "out", [member(np.ones(600), {"ice.concentration": 0.5}, 0) | {"status": status, "reason": "it is wrong\n" if status == FAILED else ""} for _ in range(2)])
+    folder = made_up.write(tmp_path / "out", [
+        member(np.ones(600), {"ice.concentration": 0.5}, 0)
+        | {"status": status, "reason": "it is wrong\n" if status == FAILED else ""} for _ in range(2)
+    ])
     (folder / "members/c001-r001").mkdir(parents=True)
     if behind:
         (folder / "members/c001-r001/finished").write_text("")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Checkpoints as a user meets them: stops and limits, damage, full disks, two processes in one folder, failures that can be met again."""
+"""Checkpoints as a user meets them: stops and limits, damage, full disks, two processes in one folder, failures that
+can be met again."""
 import os
 import re
 import resource
@@ -11,7 +12,8 @@ import time
 import h5py
 import pytest
 
-from harness import BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed, environment, run, write_case
+from harness import (BERGTOW, CASE as REFUSED, DONE, IO, NUMERIC, SIGNAL, TOW, USAGE, Run, call, changed, environment,
+                     run, write_case)
 from resuming import assert_same_result, check_readable
 
 # Long enough to strike at, with steps that cost next to nothing.
@@ -27,8 +29,12 @@ def whole(tmp_path_factory):
 
 
 def begun(folder, name, *arguments):
-    p = subprocess.Popen([BERGTOW, "run", "case.yml", "-o", name, "--quiet", *map(str, arguments)], cwd=folder, env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE,
-                         stderr=subprocess.PIPE, text=True)
+    p = subprocess.Popen([BERGTOW, "run", "case.yml", "-o", name, "--quiet", *map(str, arguments)],
+                         cwd=folder,
+                         env=environment(OMP_NUM_THREADS=1),
+                         stdout=subprocess.PIPE,
+                         stderr=subprocess.PIPE,
+                         text=True)
     end = time.time() + 30
     while not (folder / name / "result.part.h5").exists() and time.time() < end:
         time.sleep(0.005)
@@ -94,7 +100,9 @@ def test_the_stop_file(whole):
 def test_the_wall_time(whole):
     folder, one = whole
     result = call("run", "case.yml", "-o", "walled", "--quiet", "--max-wall", "0.2", cwd=folder)
-    assert result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr, result.stderr
+    assert (
+        result.returncode == SIGNAL and "stopped by the limit of 0.2 s of wall time after step" in result.stderr
+    ), result.stderr
     pieces = 1
     while call("resume", "walled", "--quiet", "--max-wall", "0.2s", cwd=folder).returncode == SIGNAL:
         pieces += 1
@@ -134,7 +142,9 @@ def test_an_unfinished_run_is_not_replaced_by_a_slip(tmp_path):
     assert again.returncode == IO and "holds an unfinished run; go on with it by `bergtow resume out`" in again.stderr
     # Killed before its first checkpoint: from its case, at time zero.
     result = call("resume", "out", cwd=tmp_path)
-    assert result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout, result.stderr
+    assert (
+        result.returncode == DONE and "holds no checkpoint: the run starts at time zero" in result.stdout
+    ), result.stderr
     assert Run(tmp_path / "out", None).summary["n_steps"] == STEPS
 
 
@@ -202,7 +212,8 @@ def test_a_damaged_result_is_not_continued(stopped):
     kept = (folder / "out/result.h5").read_bytes()
     flip(folder / "out/result.h5", 99999)
     assert "out/result.h5: is damaged" in resumed(folder, "out", code=REFUSED)
-    shutil.copy(whole / "result.h5", folder / "out/result.h5") # later, and of the same run: what is too much is left out
+    # later, and of the same run: what is too much is left out
+    shutil.copy(whole / "result.h5", folder / "out/result.h5")
     assert resumed(folder, "out", "--steps", 2) == ""
     (folder / "out/result.h5").unlink()
     assert "out/result.h5: cannot read the file: No such file" in resumed(folder, "out", code=IO)
@@ -233,9 +244,11 @@ def test_diff_names_the_first_difference(stopped):
     same = call("diff", out, out)
     assert same.returncode == DONE and same.stdout == "the states are the same\n"
     other = call("diff", out, old)
-    assert other.returncode == 1 and re.match(r"/bodies/\w+: row \d+, column \d+: \S+ and \S+ \(\d+ of \d+ numbers differ\)\n", other.stdout), other.stdout
+    assert other.returncode == 1 and re.match(
+        r"/bodies/\w+: row \d+, column \d+: \S+ and \S+ \(\d+ of \d+ numbers differ\)\n", other.stdout), other.stdout
     shown = call("diff", "out", cwd=folder)
-    assert shown.returncode == DONE and re.search(r"world/step +int64 +160\n", shown.stdout) and "tow/travel_x" in shown.stdout
+    assert shown.returncode == DONE and re.search(r"world/step +int64 +160\n",
+                                                  shown.stdout) and "tow/travel_x" in shown.stdout
     flip(old, 5000)
     assert call("diff", out, old).returncode == REFUSED
 
@@ -244,17 +257,20 @@ def test_diff_names_the_first_difference(stopped):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A file system of 6 MB, or, where none can be mounted, None: then a limit on the size of files stands in for it."""
+    """A file system of 6 MB, or, where none can be mounted, None: then a limit on the size of files stands in for
+    it."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", disk], capture_output=True).returncode == 0
+    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", disk],
+                                                   capture_output=True).returncode == 0
     yield disk, mounted
     if mounted:
         subprocess.run(["umount", "-l", disk], check=False)
 
 
 def test_a_disk_that_fills_up(tmp_path, small_disk):
-    """Whatever write meets it, the earlier checkpoint stays, and the run goes on to the same end when there is space."""
+    """Whatever write meets it, the earlier checkpoint stays, and the run goes on to the same end when there is
+    space."""
     disk, mounted = small_disk
     case = changed(TOW, output__checkpoint_steps=20, output__frame_interval=0.5)
     whole = run(tmp_path, case, "--quiet", name="whole")
@@ -270,16 +286,26 @@ def test_a_disk_that_fills_up(tmp_path, small_disk):
             result = call("resume", "out", "--quiet", cwd=disk)
             ballast.unlink()
         else:
-            result = call("resume", "out", "--quiet", cwd=disk, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * left, 1024 * left)))
+            result = call("resume",
+                          "out",
+                          "--quiet",
+                          cwd=disk,
+                          preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1024 * left, 1024 * left)))
         if result.returncode == DONE:
             break
-        assert result.returncode == IO and len(result.stderr.splitlines()) == 1, (left, result.returncode, result.stderr)
-        fault = re.search(r"out/(\S+): cannot (?:write the|make the|create the) file: (?:No space left on device|File too large); (free|raise)", result.stderr)
+        assert result.returncode == IO and len(result.stderr.splitlines()) == 1, (left, result.returncode,
+                                                                                  result.stderr)
+        fault = re.search(
+            r"out/(\S+): cannot (?:write the|make the|create the) file: (?:No space left on device|File too large); "
+            r"(free|raise)",
+            result.stderr)
         assert fault, result.stderr
         faults.add(fault[1])
         check_readable(disk / "out")
         if "checkpoint.h5" not in faults: # none has been completed since
-            checkpoints = [(disk / "out" / n).read_bytes() for n in ("checkpoint.h5", "checkpoint.previous.h5") if (disk / "out" / n).exists()]
+            checkpoints = [(disk / "out" / n).read_bytes()
+                           for n in ("checkpoint.h5", "checkpoint.previous.h5")
+                           if (disk / "out" / n).exists()]
             assert len(checkpoints) == 2 and (before in checkpoints or left > 200)
     assert len(faults) >= 2, faults
     if result.returncode != DONE:
@@ -304,9 +330,15 @@ def test_a_folder_that_must_not_be_written(stopped, somebody):
     out = folder / "out"
     before = (out / "checkpoint.h5").read_bytes()
     out.chmod(0o555)
-    result = subprocess.run([*somebody, BERGTOW, "resume", "out", "--quiet"], cwd=folder, env=environment(OMP_NUM_THREADS=1), capture_output=True, text=True, timeout=60)
+    result = subprocess.run([*somebody, BERGTOW, "resume", "out", "--quiet"],
+                            cwd=folder,
+                            env=environment(OMP_NUM_THREADS=1),
+                            capture_output=True,
+                            text=True,
+                            timeout=60)
     out.chmod(0o755)
-    assert result.returncode == IO and re.search(r"out/run.lock: cannot make the file: Permission denied; change the permissions", result.stderr), result.stderr
+    assert result.returncode == IO and re.search(
+        r"out/run.lock: cannot make the file: Permission denied; change the permissions", result.stderr), result.stderr
     assert (out / "checkpoint.h5").read_bytes() == before
     resumed(folder, "out")
     assert_same_result(whole, out)
@@ -319,7 +351,11 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     out = tmp_path / "out"
     out.mkdir()
     out.chmod(0o777)
-    p = subprocess.Popen([*somebody, BERGTOW, "run", "case.yml", "-o", "out", "--quiet"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1), stderr=subprocess.PIPE, text=True)
+    p = subprocess.Popen([*somebody, BERGTOW, "run", "case.yml", "-o", "out", "--quiet"],
+                         cwd=tmp_path,
+                         env=environment(OMP_NUM_THREADS=1),
+                         stderr=subprocess.PIPE,
+                         text=True)
     end = time.time() + 30
     while not (out / "checkpoint.h5").exists() and time.time() < end:
         time.sleep(0.005)
@@ -329,7 +365,8 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
     p.send_signal(signal.SIGCONT)
     _, err = p.communicate(timeout=60)
     out.chmod(0o777)
-    assert p.returncode == IO and re.fullmatch(r"(bergtow: out/\S+: cannot \w+ the file: Permission denied; change the permissions.*\n){1,2}", err), err
+    assert p.returncode == IO and re.fullmatch(
+        r"(bergtow: out/\S+: cannot \w+ the file: Permission denied; change the permissions.*\n){1,2}", err), err
     assert before in [(out / n).read_bytes() for n in ("checkpoint.h5", "checkpoint.previous.h5") if (out / n).exists()]
     check_readable(out)
     resumed(tmp_path, "out")
@@ -338,7 +375,11 @@ def test_a_folder_that_may_no_longer_be_written(tmp_path, somebody):
 
 # ---- guards ----
 
-JAM = changed(TOW, run__duration=25, ice__concentration=0.8, solver={"max_sweeps": 3, "tolerance": 1e-6}, output__checkpoint_steps=30)
+JAM = changed(TOW,
+              run__duration=25,
+              ice__concentration=0.8,
+              solver={"max_sweeps": 3, "tolerance": 1e-6},
+              output__checkpoint_steps=30)
 
 
 @pytest.mark.parametrize("guard, value, text", [

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""`bergtow run` as a user meets it: what it writes, prints and refuses, and how it ends when it is stopped or the disk is full."""
+"""`bergtow run` as a user meets it: what it writes, prints and refuses, and how it ends when it is stopped or the disk
+is full."""
 import os
 import pty
 import re
@@ -18,8 +19,10 @@ from harness import BERGTOW, DONE, IO, SIGNAL, TOW, Run, call, changed, environm
 # Nothing happens in it, for ever: to be stopped.
 ENDLESS = changed(TOW, run__duration=1e6, domain__ends="periodic", output={"frame_interval": 1e5, "progress": 0.05})
 
-NUMBERS = ("dt_s sim_time_s wall_time_s mean_ice_resistance_n mean_ice_resistance_se_n mean_tow_force_n max_overlap_m mean_sweeps "
-           "contacts_mean ns_per_floe_step momentum_residual").split()
+NUMBERS = (
+    "dt_s sim_time_s wall_time_s mean_ice_resistance_n mean_ice_resistance_se_n mean_tow_force_n max_overlap_m "
+    "mean_sweeps "
+    "contacts_mean ns_per_floe_step momentum_residual").split()
 WHOLE = "n_floes n_steps ranks threads unconverged_steps".split()
 PHASES = "detect colour forces solve advance exchange output".split()
 SERIES = "time tow_force ice_resistance drag_force body_x body_y body_yaw contacts sweeps residual".split()
@@ -64,7 +67,8 @@ def test_series_and_frames(finished):
         n = f["floes/area"].shape[0]
         frames = f["frames/time"][:]
         assert f["frames/pose"].shape == (len(frames), n, 3) and f["floes/offsets"][-1] == len(f["floes/vertices"])
-        # 0.15 s between frames and 0.1 s steps: a frame at the first step at or after each multiple, and one at each end.
+        # 0.15 s between frames and 0.1 s steps: a frame at the first step at or after each multiple, and one at each
+        # end.
         assert frames[0] == 0 and frames[-1] == pytest.approx(30) and np.all(np.diff(frames) > 0.05)
         due = np.unique(np.ceil(np.arange(201) * 0.15 / 0.1 - 1e-9)) * 0.1
         np.testing.assert_allclose(frames, due, atol=1e-9)
@@ -78,8 +82,10 @@ def test_series_and_frames(finished):
 
 
 def test_poses_do_not_jump(finished):
-    """A floe moves no faster than it can: per frame less than the time between frames times the largest speed recorded."""
-    pose, t, speed = finished.dataset("/frames/pose"), finished.dataset("/frames/time"), finished.dataset("/frames/speed")
+    """A floe moves no faster than it can: per frame less than the time between frames times the largest speed
+    recorded."""
+    pose, t, speed = finished.dataset("/frames/pose"), finished.dataset("/frames/time"), finished.dataset(
+        "/frames/speed")
     step = np.hypot(*np.diff(pose[:, :, :2], axis=0).transpose(2, 0, 1)).max(axis=1)
     assert step.max() <= 1.5 * np.diff(t).max() * max(0.13, speed.max())
     assert np.hypot(*(pose[-1, :, :2] - pose[0, :, :2]).T).max() > 0.5, "nothing was pushed"
@@ -128,8 +134,13 @@ def start(tmp_path):
     started = []
 
     def go(case=ENDLESS, *arguments):
-        started.append(subprocess.Popen([BERGTOW, "run", write_case(tmp_path, case), "-o", tmp_path / "out", *arguments],
-                                        env=environment(OMP_NUM_THREADS=1), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+        started.append(
+            subprocess.Popen(
+                [BERGTOW, "run", write_case(tmp_path, case), "-o", tmp_path / "out", *arguments],
+                env=environment(OMP_NUM_THREADS=1),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True))
         return started[-1]
 
     yield go
@@ -173,8 +184,9 @@ def test_a_second_signal_spoils_nothing(tmp_path, start):
 
 
 def test_a_kill_leaves_what_was_flushed(tmp_path, start):
-    """No handler helps against SIGKILL: the file must open all the same, marked incomplete, and hold what was flushed, whole. Struck within a flush, some
-    series have the length of this flush, some of the last (unit/test_h5driver.c strikes at every write)."""
+    """No handler helps against SIGKILL: the file must open all the same, marked incomplete, and hold what was flushed,
+    whole. Struck within a flush, some series have the length of this flush, some of the last (unit/test_h5driver.c
+    strikes at every write)."""
     case = changed(ENDLESS, output__frame_interval=5)
     p = start(case, "--quiet")
     deadline = time.time() + 30
@@ -199,7 +211,8 @@ def test_a_kill_leaves_what_was_flushed(tmp_path, start):
 
 
 def test_control_c_on_a_terminal(tmp_path):
-    """The key, not the signal: the terminal sends SIGINT, and the one line of progress is cleared before the message."""
+    """The key, not the signal: the terminal sends SIGINT, and the one line of progress is cleared before the
+    message."""
     path = write_case(tmp_path, ENDLESS)
     pid, terminal = pty.fork()
     if pid == 0:
@@ -234,11 +247,20 @@ def limited(kilobytes):
 
 @pytest.mark.parametrize("kilobytes, what", [(2, "case.resolved.yml"), (60, "result.part.h5"), (400, "result.part.h5")])
 def test_a_full_disk(tmp_path, kilobytes, what):
-    """A limit on the size of files acts as a disk that fills up: at the start, while the bodies are written, in mid-run."""
+    """A limit on the size of files acts as a disk that fills up: at the start, while the bodies are written, in
+    mid-run."""
     case = changed(ENDLESS, run__duration=1e5, output__frame_interval=0.5)
     path = write_case(tmp_path, case)
     began = time.time()
-    result = call("run", path, "-o", tmp_path / "out", "--steps", 20000, "--quiet", preexec_fn=limited(kilobytes), timeout=60)
+    result = call("run",
+                  path,
+                  "-o",
+                  tmp_path / "out",
+                  "--steps",
+                  20000,
+                  "--quiet",
+                  preexec_fn=limited(kilobytes),
+                  timeout=60)
     assert result.returncode == IO, (result.returncode, result.stderr)
     lines = result.stderr.strip().splitlines()
     assert len(lines) == 1 and what in lines[0] and re.search("File too large.*ulimit", lines[0]), lines

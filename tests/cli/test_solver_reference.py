@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """The contact solver against others: the dumped problem of a step, solved here by an interior-point method.
 
-    u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= μ r_n, r_t against u_t                       (files: FCLIB, local form)
+    u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= μ r_n, r_t against u_t        (files: FCLIB, local form)
 
-Without friction this is the convex problem min ½ rᵀWr + qᵀr, r >= 0, whose velocities are unique. With friction it is solved as
-a sequence of such problems, each with the friction bounds of the last (Haslinger, Hlaváček & Nečas 1996, Handbook of
-Numerical Analysis IV): nothing of it is shared with Gauss–Seidel sweeps over contacts, or with their acceleration.
+Without friction this is the convex problem min ½ rᵀWr + qᵀr, r >= 0, whose velocities are unique. With friction it is
+solved as a sequence of such problems, each with the friction bounds of the last (Haslinger, Hlaváček & Nečas 1996,
+Handbook of Numerical Analysis IV): nothing of it is shared with Gauss–Seidel sweeps over contacts, or with their
+acceleration.
 """
 import h5py
 import numpy as np
@@ -29,11 +30,22 @@ CASES = {
     "no friction, e = 0.4": changed(BASE, ice__restitution=0.4, domain__wall_restitution=0.7),
     "friction": changed(BASE, ice__friction=0.15, domain__wall_friction=0.1),
     "strong friction, loose": changed(BASE, ice__friction=0.5, domain__wall_friction=0.3, ice__concentration=0.7),
-    "tow": changed(BASE, body=TOWED, tow={"mode": "speed", "speed": SPEED, "ramp": 0}, domain={"length": 9, "width": 6}, ice__friction=0.1),
-    "crushing": changed(BASE, ice__friction=0.15, domain__wall_friction=0.1, ice__crushing={"pressure": "30 Pa", "least_length": 0.2}),
+    "tow": changed(BASE,
+                   body=TOWED,
+                   tow={"mode": "speed", "speed": SPEED, "ramp": 0},
+                   domain={"length": 9, "width": 6},
+                   ice__friction=0.1),
+    "crushing": changed(BASE,
+                        ice__friction=0.15,
+                        domain__wall_friction=0.1,
+                        ice__crushing={"pressure": "30 Pa", "least_length": 0.2}),
     "crushing, e = 0.4": changed(BASE, ice__restitution=0.4, ice__crushing={"pressure": "30 Pa"}),
-    "line": changed(BASE, body=TOWED, tow={"mode": "line", "speed": SPEED, "ramp": 0, "line_length": 1, "line_damping": 300},
-                    domain={"length": 9, "width": 6}, ice__friction=0.1, run__duration=8),
+    "line": changed(BASE,
+                    body=TOWED,
+                    tow={"mode": "line", "speed": SPEED, "ramp": 0, "line_length": 1, "line_damping": 300},
+                    domain={"length": 9, "width": 6},
+                    ice__friction=0.1,
+                    run__duration=8),
 }
 
 
@@ -42,7 +54,8 @@ class Problem:
         with h5py.File(path) as f:
             g = f["fclib_local"]
             assert g["spacedim"][0] == 2 and g["W/nz"][0] == -2
-            self.W = scipy.sparse.csr_matrix((g["W/x"][:], g["W/i"][:], g["W/p"][:]), shape=(g["W/m"][0],) * 2).toarray()
+            self.W = scipy.sparse.csr_matrix((g["W/x"][:], g["W/i"][:], g["W/p"][:]),
+                                             shape=(g["W/m"][0], ) * 2).toarray()
             self.q, self.mu = g["vectors/q"][:], g["vectors/mu"][:]
             self.u, self.r = f["solution/u"][:], f["solution/r"][:]
             self.bound = f["bound"][:] if "bound" in f else np.full(len(self.mu), np.inf)
@@ -55,7 +68,8 @@ def dump(folder, case, step, name="out"):
 
 
 def box_problem(A, c, low, high):
-    """min ½xᵀAx + cᵀx in low <= x <= high (high may be infinite), A positive semidefinite: primal-dual interior point."""
+    """min ½xᵀAx + cᵀx in low <= x <= high (high may be infinite), A positive semidefinite: primal-dual interior
+    point."""
     bounded = np.isfinite(high)
     x = np.where(bounded, 0.5 * (low + np.where(bounded, high, 0)), low + 1.0)
     zl, zu = np.ones_like(x), np.where(bounded, 1.0, 0.0)
@@ -67,7 +81,8 @@ def box_problem(A, c, low, high):
             return x
         target = 0.1 * gap
         barrier = zl / a + zu / b
-        d = 1 / np.sqrt(np.diag(A) + barrier)  # the barrier spans twenty orders of magnitude; scaled, the system is tame
+        # the barrier spans twenty orders of magnitude; scaled, the system is tame
+        d = 1 / np.sqrt(np.diag(A) + barrier)
         H = d[:, None] * A * d + np.diag(barrier * d * d + 1e-15)
         dx = d * np.linalg.solve(H, d * (target / a - target / b - slope))
         dzl, dzu = (target - zl * dx) / a - zl, np.where(bounded, (target + zu * dx) / b - zu, 0)
@@ -156,7 +171,8 @@ def test_stored_solution_obeys_the_law(solved):
 
 
 def test_matrix(solved):
-    """W is symmetric and positive semidefinite; contacts couple where they share a body that moves, and nowhere else."""
+    """W is symmetric and positive semidefinite; contacts couple where they share a body that moves, and nowhere
+    else."""
     _, p, _ = solved
     assert np.abs(p.W - p.W.T).max() <= 1e-12 * np.abs(p.W).max()
     assert np.linalg.eigvalsh(p.W)[0] >= -1e-12 * np.abs(p.W).max()
@@ -165,7 +181,8 @@ def test_matrix(solved):
 
 
 def test_velocities_are_those_of_another_method(solved):
-    """Given the friction bounds μ r_n the problem is convex and its velocities unique: they must be those of the solver.
+    """Given the friction bounds μ r_n the problem is convex and its velocities unique: they must be those of the
+    solver.
 
     Impulses may be shared out in several ways (two floes on two corners against two walls), velocities may not.
     """
@@ -185,9 +202,14 @@ def test_friction_from_scratch(tmp_path):
 
 
 def test_the_problem_does_not_come_from_the_solution(tmp_path):
-    """W, q, μ of the first step are the same whether the solver had one sweep or all it wanted; the solution is not. The
-    water moves, so that contacts are looked for everywhere: a solution that reaches floes at rest has the step detected once more."""
-    case = changed(BASE, ice__friction=0.2, domain__ends_closing=0.5, domain__sides_closing=0.5, ice__concentration=0.93,
+    """W, q, μ of the first step are the same whether the solver had one sweep or all it wanted; the solution is not.
+    The water moves, so that contacts are looked for everywhere: a solution that reaches floes at rest has the step
+    detected once more."""
+    case = changed(BASE,
+                   ice__friction=0.2,
+                   domain__ends_closing=0.5,
+                   domain__sides_closing=0.5,
+                   ice__concentration=0.93,
                    water={"current_x": 1.5})
     one, _ = dump(tmp_path, changed(case, solver__max_sweeps=1), 1, "one")
     all_, _ = dump(tmp_path, case, 1, "all")
@@ -196,10 +218,17 @@ def test_the_problem_does_not_come_from_the_solution(tmp_path):
     np.testing.assert_allclose(one.q, all_.q, atol=1e-12)
 
 
-@pytest.mark.parametrize("ice", [{"friction": 0}, {"friction": 0.2}, {"friction": 0.2, "crushing": {"pressure": "200 Pa"}}], ids=["no friction", "friction", "crushing"])
+@pytest.mark.parametrize("ice",
+                         [{"friction": 0}, {"friction": 0.2}, {"friction": 0.2, "crushing": {"pressure": "200 Pa"}}],
+                         ids=["no friction", "friction", "crushing"])
 def test_momentum_and_the_plain_sweep_agree(tmp_path, ice):
-    """The first step of a squeeze, solved with lists and momentum and by plain sweeps over all contacts: the same problem, the same velocities."""
-    case = changed(BASE, ice={**BASE["ice"], **ice, "concentration": 0.93}, domain={**BASE["domain"], "length": 6, "width": 5}, domain__ends_closing=0.3, water={"current_x": 1.5},
+    """The first step of a squeeze, solved with lists and momentum and by plain sweeps over all contacts: the same
+    problem, the same velocities."""
+    case = changed(BASE,
+                   ice={**BASE["ice"], **ice, "concentration": 0.93},
+                   domain={**BASE["domain"], "length": 6, "width": 5},
+                   domain__ends_closing=0.3,
+                   water={"current_x": 1.5},
                    solver={"tolerance": 1e-7, "max_sweeps": 1000000})
     fast, r = dump(tmp_path, case, 1, "fast")
     plain, s = dump(tmp_path, changed(case, solver__plain=True), 1, "plain")
@@ -210,12 +239,18 @@ def test_momentum_and_the_plain_sweep_agree(tmp_path, ice):
 
 
 def test_two_floes_from_first_principles(tmp_path):
-    """W, q and the impulse of one oblique eccentric hit with friction, from masses, arms and velocities worked out here."""
+    """W, q and the impulse of one oblique eccentric hit with friction, from masses, arms and velocities worked out
+    here."""
     case = {
-        "run": {"dt": 0.01, "duration": 1}, "domain": {"length": 20, "width": 10, "ends": "open", "sides": "open"},
-        "ice": {"concentration": 0, "thickness": 0.2, "density": 900, "friction": 0.1, "added_mass": 0.3, "added_inertia": 0.6,
-                "restitution": 0, "drag": dict.fromkeys(["water_form", "water_skin", "air_form", "air_skin"], 0)},
-        "body": {"shape": "none"}, "solver": {"tolerance": 1e-12, "reference_speed": 1},
+        "run": {"dt": 0.01, "duration": 1},
+        "domain": {"length": 20, "width": 10, "ends": "open", "sides": "open"},
+        "ice": {
+            "concentration": 0, "thickness": 0.2, "density": 900, "friction": 0.1, "added_mass": 0.3,
+            "added_inertia": 0.6, "restitution": 0,
+            "drag": dict.fromkeys(["water_form", "water_skin", "air_form", "air_skin"], 0)
+        },
+        "body": {"shape": "none"},
+        "solver": {"tolerance": 1e-12, "reference_speed": 1},
         # A square of 1 m with a corner ahead meets the long side of a bar, 0.6 m above the middle of it.
         "floes": [{"shape": "square", "length": 1, "x": 5, "y": 0, "yaw": 45, "vx": 2, "vy": 1.5},
                   {"shape": "rectangle", "length": 0.8, "width": 3, "x": 5 + np.sqrt(0.5) + 0.4 + 0.005, "y": -0.6}],
@@ -224,7 +259,8 @@ def test_two_floes_from_first_principles(tmp_path):
     assert p.n == 1
     ma, mb = 900 * 0.2 * 1 * 1.3, 900 * 0.2 * 2.4 * 1.3
     ia, ib = 900 * 0.2 * (1 / 6) * 1.6, 900 * 0.2 * 2.4 * (0.8 ** 2 + 3 ** 2) / 12 * 1.6
-    x = np.sqrt(0.5) + 0.0025                      # the point half-way between the two surfaces, from the square's centre
+    # the point half-way between the two surfaces, from the square's centre
+    x = np.sqrt(0.5) + 0.0025
     ra, rb = np.array([x, 0]), np.array([x - (np.sqrt(0.5) + 0.405), 0.6])
     n, t = np.array([1, 0]), np.array([0, 1])
     cross = lambda r, d: r[0] * d[1] - r[1] * d[0]

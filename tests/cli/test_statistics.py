@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""postproc/ensemble.py, plot_ensemble.py and plot_chains.py: made-up ensembles with known answers, and a small one that the program runs."""
+"""postproc/ensemble.py, plot_ensemble.py and plot_chains.py: made-up ensembles with known answers, and a small one that
+the program runs."""
 import csv
 import json
 import os
@@ -27,7 +28,8 @@ FIELDS, LENGTH = 8, 400
 
 
 def grid(folder, concentrations=(0.2, 0.5), speeds=(0.1, 0.2, 0.4), change=lambda c, r: {}):
-    """Fields of known means, F = 1000 A V^2 (1 + field's part), with a correlated series and collisions of exponential peaks."""
+    """Fields of known means, F = 1000 A V^2 (1 + field's part), with a correlated series and collisions of exponential
+    peaks."""
     rng, members = np.random.default_rng(1), []
     for i, a in enumerate(concentrations):
         for j, v in enumerate(speeds):
@@ -36,20 +38,27 @@ def grid(folder, concentrations=(0.2, 0.5), speeds=(0.1, 0.2, 0.4), change=lambd
                 x = np.abs(made_up.ar1(0.5, LENGTH, rng, mean, 0.1 * mean))
                 x *= mean / x.mean()
                 n = rng.poisson(100)
-                members.append(made_up.member(x, {"ice.concentration": a, "tow.speed": v}, i * len(speeds) + j,
-                                              peaks=(np.sort(rng.uniform(0, LENGTH, n)), rng.exponential(50 * v, n)), **change(i * len(speeds) + j, r)))
+                members.append(
+                    made_up.member(x, {"ice.concentration": a, "tow.speed": v},
+                                   i * len(speeds) + j,
+                                   peaks=(np.sort(rng.uniform(0, LENGTH, n)), rng.exponential(50 * v, n)),
+                                   **change(i * len(speeds) + j, r)))
     return made_up.write(folder, members)
 
 
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory):
-    """A grid with doubts: in condition 0 one field jammed, two did not converge; in condition 1 one failed and one waits."""
+    """A grid with doubts: in condition 0 one field jammed, two did not converge; in condition 1 one failed and one
+    waits."""
     def change(c, r):
         if c == 0:
-            return {"summary": {"stalled_windows": 2}, "warnings": ["stood still"]} if r == 7 else {"summary": {"unconverged_steps": 5}, "warnings": ["x"]} if r < 2 else {}
+            return {"summary": {"stalled_windows": 2}, "warnings": ["stood still"]
+                    } if r == 7 else {"summary": {"unconverged_steps": 5}, "warnings": ["x"]} if r < 2 else {}
         if c == 1:
-            return {"status": made_up.FAILED, "reason": "base.yml: too short"} if r == 0 else {"status": made_up.WAITING} if r == 1 else {}
-        return {"window_warning": "no steady state was found", "warnings": ["no steady state was found", "floes left"]} if (c, r) == (2, 0) else {}
+            return {"status": made_up.FAILED, "reason": "base.yml: too short"
+                    } if r == 0 else {"status": made_up.WAITING} if r == 1 else {}
+        return {"window_warning": "no steady state was found", "warnings": ["no steady state was found", "floes left"]
+                } if (c, r) == (2, 0) else {}
     folder = grid(tmp_path_factory.mktemp("plain") / "all", change=change)
     result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10, "--partial")
     assert result.returncode == 0, result.stderr
@@ -68,7 +77,8 @@ def test_a_drift_that_no_single_run_can_see_shows_between_the_fields(tmp_path):
     s = json.loads((tmp_path / "all/statistics.json").read_text())
     drifts = [c["drift"] for c in s["conditions"]]
     assert drifts[0]["change"] == pytest.approx(20) and drifts[1]["change"] == pytest.approx(0)
-    assert drifts[0]["change_95"] == pytest.approx(list(stats.t.interval(0.95, 7, 20, stats.sem(10 * (np.arange(8) - 3.5)))))
+    assert drifts[0]["change_95"] == pytest.approx(
+        list(stats.t.interval(0.95, 7, 20, stats.sem(10 * (np.arange(8) - 3.5)))))
     assert [d["verdict"] for d in drifts[:2]] == ["steady", "steady"]  # 20 ± 20: not yet
     assert s["conditions"][1]["members"]["doubts"] == dict.fromkeys(s["doubts"], 0) | {"unsteady": 1, "short": 1}
     assert "1 N, 1 S" in result.stdout and "NOT STEADY" not in result.stdout
@@ -89,36 +99,45 @@ def test_means_and_intervals_of_known_fields(plain):
         mean = 1000 * c["values"]["ice.concentration"] * c["values"]["tow.speed"] ** 2
         fields = mean * (1 + 0.1 * (np.arange(8) - 3.5))
         r = c["resistance"]
-        assert r["mean"] == pytest.approx(mean) and r["median"] == pytest.approx(mean) and r["trimmed_mean"] == pytest.approx(mean)
+        assert r["mean"] == pytest.approx(mean) and r["median"] == pytest.approx(
+            mean) and r["trimmed_mean"] == pytest.approx(mean)
         assert r["sd_between"] == pytest.approx(np.std(fields, ddof=1)) and r["n"] == 8
         assert r["t_95"] == pytest.approx(list(stats.t.interval(0.95, 7, mean, stats.sem(fields))))
         assert r["bootstrap_95"][0] < mean < r["bootstrap_95"][1]
-        assert r["fields_needed"] == stat_mean.fields_needed(mean, np.std(fields, ddof=1), 0.05) and r["largest_share"] == pytest.approx(1.35 / 8)
+        assert r["fields_needed"] == stat_mean.fields_needed(mean, np.std(fields, ddof=1),
+                                                             0.05) and r["largest_share"] == pytest.approx(1.35 / 8)
         # AR(1) of 0.5: standard deviation 0.1 of a field's mean, tau 1.5 samples
         assert r["se_within"] == pytest.approx(0.1 * mean * np.sqrt(3 / LENGTH), rel=0.3)
         assert FIELDS * LENGTH / 5 < c["samples"]["independent"] < FIELDS * LENGTH / 2  # every third or fourth
-        assert c["estimates"]["lichey_hellmer"] == {"force": 80, "valid": True, "ratio": pytest.approx(mean / 80)} and not c["estimates"]["marchenko_compaction"]["valid"]
+        assert c["estimates"]["lichey_hellmer"] == {"force": 80, "valid": True, "ratio": pytest.approx(mean / 80)
+                                                    } and not c["estimates"]["marchenko_compaction"]["valid"]
         assert c["estimates"]["open_water_drag"]["ratio"] is None
 
 
 def test_doubts_failures_and_gaps_are_counted(plain):
     folder, result, s = plain
     first, second, third = (c["members"] for c in s["conditions"][:3])
-    assert first["doubts"] == {"unconverged": 2, "jammed": 1, "unsteady": 0, "short": 0, "stopped": 0, "other": 0} and first["doubtful"] == 3 and first["used"] == 8
+    assert first["doubts"] == {"unconverged": 2, "jammed": 1, "unsteady": 0, "short": 0, "stopped": 0, "other": 0
+                               } and first["doubtful"] == 3 and first["used"] == 8
     assert second["failed"] == 1 and second["waiting"] == 1 and second["used"] == 6 and not s["complete"]
     assert third["doubts"]["short"] == 1 and third["doubts"]["other"] == 1 and third["doubtful"] == 1
     assert s["failed"] == {"c002-r001": "base.yml: too short"}
-    assert "base.yml: too short" in result.stdout and "4 of 46 members carry warnings" in result.stdout and "not complete" in result.stdout and "6 (1 failed, 1 waiting)" in result.stdout
+    assert ("base.yml: too short" in result.stdout and "4 of 46 members carry warnings" in result.stdout
+            and "not complete" in result.stdout and "6 (1 failed, 1 waiting)" in result.stdout)
     rows = list(csv.DictReader(open(folder / "statistics.csv")))
-    assert len(rows) == 6 and rows[0]["doubt_jammed"] == "1" and float(rows[0]["mean"]) == s["conditions"][0]["resistance"]["mean"] and rows[1]["failed"] == "1"
+    assert len(rows) == 6 and rows[0]["doubt_jammed"] == "1" and float(
+        rows[0]["mean"]) == s["conditions"][0]["resistance"]["mean"] and rows[1]["failed"] == "1"
 
 
 def test_exclude_names_what_it_drops(plain, tmp_path):
     folder, _, before = plain
-    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude", "short", "--partial")
+    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--exclude", "jammed", "--exclude",
+                    "short", "--partial")
     s = json.loads((tmp_path / "statistics.json").read_text())
-    assert s["excluded"] == {"c001-r008": ["jammed"], "c003-r001": ["short"]} and "c001-r008 (jammed)" in result.stdout and "7 (1 excluded)" in result.stdout
-    assert s["conditions"][0]["resistance"]["mean"] == pytest.approx(before["conditions"][0]["resistance"]["mean"] * np.mean(1 + 0.1 * (np.arange(7) - 3.5)))
+    assert s["excluded"] == {"c001-r008": ["jammed"], "c003-r001": ["short"]
+                             } and "c001-r008 (jammed)" in result.stdout and "7 (1 excluded)" in result.stdout
+    assert s["conditions"][0]["resistance"]["mean"] == pytest.approx(before["conditions"][0]["resistance"]["mean"] *
+                                                                     np.mean(1 + 0.1 * (np.arange(7) - 3.5)))
     assert before == json.loads((folder / "statistics.json").read_text())  # -o leaves the other alone
 
 
@@ -126,13 +145,16 @@ def test_peaks_of_the_fields_together(plain):
     _, _, s = plain
     for c in s["conditions"][2:]:
         x, scale = c["extremes"], 50 * c["values"]["tow.speed"]
-        assert x["conversion"] == "half-sine of 0.1 s" and x["hours"] == pytest.approx(FIELDS * LENGTH / 3600) and x["collisions_per_hour"] == pytest.approx(900, rel=0.15)
+        assert x["conversion"] == "half-sine of 0.1 s" and x["hours"] == pytest.approx(
+            FIELDS * LENGTH / 3600) and x["collisions_per_hour"] == pytest.approx(900, rel=0.15)
         tail = x["over_threshold"]
         assert tail["clusters"] >= 30 and tail["gap_s"] == 2.0
         rate = {e["peak"]: e["per_hour"] for e in x["exceedance"]}
         assert min(rate.values()) == pytest.approx(1 / x["hours"])
-        # clusters of 2 s hide few of the peaks above the threshold: once in an hour exponential peaks reach scale ln(900)
-        assert tail["levels"][0]["level"] == pytest.approx(scale * np.log(900), rel=0.5) and tail["levels"][0]["beyond_data"] and "level_95" in tail["levels"][0]
+        # clusters of 2 s hide few of the peaks above the threshold: once in an hour exponential peaks reach scale
+        # ln(900)
+        assert tail["levels"][0]["level"] == pytest.approx(
+            scale * np.log(900), rel=0.5) and tail["levels"][0]["beyond_data"] and "level_95" in tail["levels"][0]
 
 
 def unlike(a, b, at=""):
@@ -153,7 +175,8 @@ def test_markdown_and_stable_numbers(plain, tmp_path):
     assert list(unlike(s, json.loads((tmp_path / "statistics.json").read_text()))) == []
     lines = again.stdout.splitlines()
     tables = [line for line in lines if line.startswith("|")]
-    assert "## made up" in lines and "### Mean ice resistance" in lines and tables[0].count("|") == tables[2].count("|") and "NaN" not in again.stdout and "nan" not in again.stdout
+    assert "## made up" in lines and "### Mean ice resistance" in lines and tables[0].count("|") == tables[2].count(
+        "|") and "NaN" not in again.stdout and "nan" not in again.stdout
 
 
 def test_which_parameter_matters(plain):
@@ -162,16 +185,20 @@ def test_which_parameter_matters(plain):
     assert ranks["tow.speed"]["prcc"] > ranks["ice.concentration"]["prcc"] > 0.8
     # ln F = ln A + 2 ln V + const: variances of the three and two levels
     a, v = np.var(np.log([0.2, 0.5])), 4 * np.var(np.log([0.1, 0.2, 0.4]))
-    assert logs["indices"]["tow.speed"]["first"] == pytest.approx(v / (a + v), abs=0.05) and logs["indices"]["ice.concentration"]["total"] == pytest.approx(a / (a + v), abs=0.05)
+    assert logs["indices"]["tow.speed"]["first"] == pytest.approx(
+        v / (a + v), abs=0.05) and logs["indices"]["ice.concentration"]["total"] == pytest.approx(a / (a + v), abs=0.05)
 
 
 def test_what_is_refused(tmp_path, plain, capsys):
     result = script("ensemble.py", tmp_path / "none")
     assert result.returncode == 4 and "no such folder" in result.stderr and "Traceback" not in result.stderr
-    for arguments, words in (((tmp_path,), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5", "--resamples", "1", "--partial"), "cannot be written")):
+    for arguments, words in (((tmp_path, ), "holds no ensemble.h5"), ((plain[0], "-o", plain[0] / "ensemble.h5",
+                                                                       "--resamples", "1", "--partial"),
+                                                                      "cannot be written")):
         with pytest.raises(RunError, match=words):
             ensemble.main([str(a) for a in arguments])
-    for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"), (("--blocks", "0"), "below 1")):
+    for arguments, words in ((("--error", "0"), "not above zero"), (("--exclude", "unlike"), "invalid choice"),
+                             (("--blocks", "0"), "below 1")):
         with pytest.raises(SystemExit) as stop:
             ensemble.main([str(plain[0]), *arguments])
         assert stop.value.code == 2 and words in capsys.readouterr().err
@@ -182,7 +209,10 @@ def test_what_is_refused(tmp_path, plain, capsys):
     for main in (ensemble.main, plot_ensemble.main):
         with pytest.raises(RunError, match="no member that has finished; run the ensemble further"):
             main([str(waiting)])
-    mixed = made_up.write(tmp_path / "m", [made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c) for c in ("half-sine of 0.1 s", "crushing")])
+    mixed = made_up.write(tmp_path / "m", [
+        made_up.member(np.arange(30.0), {}, 0, peaks=([1.0], [2.0]), conversion=c)
+        for c in ("half-sine of 0.1 s", "crushing")
+    ])
     ensemble.main([str(mixed)])
     assert "peaks of different conversions" in capsys.readouterr().out
 
@@ -192,19 +222,24 @@ def test_no_part_is_taken_for_the_whole(plain, tmp_path):
     folder, complete, _ = plain
     assert complete.stderr == ""
     result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1)
-    assert result.returncode == 4 and "2 of 48 members are in no number: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr and "--partial" in result.stderr
+    assert (result.returncode == 4
+            and "2 of 48 members are in no number: 1 waiting (c002-r002), 1 failed (c002-r001)" in result.stderr
+            and "--partial" in result.stderr)
     assert json.loads((tmp_path / "statistics.json").read_text())["waiting"] == ["c002-r002"]
     assert "1 member to come, and in no number (c002-r002)" in result.stdout
 
 
 DAMAGES = {
     "a flipped bit": lambda m: flip(m / "result.h5", 700),
-    "a changed digit": lambda m: (m / "summary.json").write_text((m / "summary.json").read_text().replace("100.0", "200.0", 1)),
+    "a changed digit": lambda m: (m / "summary.json").write_text(
+        (m / "summary.json").read_text().replace("100.0", "200.0", 1)),
     "a summary cut short": lambda m: os.truncate(m / "summary.json", 100),
     "an empty result": lambda m: os.truncate(m / "result.h5", 0),
     "no summary": lambda m: (m / "summary.json").unlink(),
-    "another member's files": lambda m: [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5")],
-    "another member": lambda m: [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5", "finished")],
+    "another member's files": lambda m:
+    [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5")],
+    "another member": lambda m:
+    [shutil.copy(m.parent / "c001-r002" / name, m) for name in ("summary.json", "result.h5", "finished")],
     "no record": lambda m: (m / "finished").unlink(),
     "a pipe": lambda m: ((m / "result.h5").unlink(), os.mkfifo(m / "result.h5")),
 }
@@ -218,13 +253,17 @@ def flip(path, at):
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_member_is_in_no_number(tmp_path, damage):
-    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + 10 * r, {}, 0, peaks=([2.0 + r], [5.0])) for r in range(3)])
+    folder = made_up.write(
+        tmp_path / "a", [made_up.member(np.arange(30.0) + 10 * r, {}, 0, peaks=([2.0 + r], [5.0])) for r in range(3)])
     DAMAGES[damage](folder / "members" / "c001-r001")
     result = script("ensemble.py", folder, "--resamples", 1)
     s = json.loads((folder / "statistics.json").read_text())
-    assert result.returncode == 4 and "1 of 3 members are in no number: 1 not sound (c001-r001)" in result.stderr and "Traceback" not in result.stderr
-    assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"] and s["checked"]
-    assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"]["fields"] == 2
+    assert (result.returncode == 4 and "1 of 3 members are in no number: 1 not sound (c001-r001)" in result.stderr
+            and "Traceback" not in result.stderr)
+    assert [m["name"] for m in s["members"]] == ["c001-r002", "c001-r003"] and list(s["unsound"]) == ["c001-r001"
+                                                                                                      ] and s["checked"]
+    assert "1 member not sound, and in no number (c001-r001)" in result.stdout and s["conditions"][0]["extremes"][
+        "fields"] == 2
 
 
 def test_a_damaged_ensemble_file_is_refused(tmp_path):
@@ -244,7 +283,9 @@ def test_what_cannot_be_checked_is_told(tmp_path, monkeypatch, capsys):
 
 
 def test_members_without_a_folder_are_told(tmp_path, capsys):
-    folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + r, {}, 0, summary={"unconverged_steps": 1}) for r in range(3)])
+    folder = made_up.write(
+        tmp_path / "a",
+        [made_up.member(np.arange(30.0) + r, {}, 0, summary={"unconverged_steps": 1}) for r in range(3)])
     (folder / "members").rename(folder / "elsewhere")
     ensemble.main([str(folder)])
     out = capsys.readouterr().out
@@ -256,7 +297,8 @@ def test_members_without_a_folder_are_told(tmp_path, capsys):
 def test_the_law_of_the_speed_is_found(plain):
     e = Ensemble(plain[0])
     for words, some in plot_ensemble.groups(e, "tow.speed"):
-        exponent, low, high, _ = plot_ensemble.power_law([c.values["tow.speed"] for c in some], [plot_ensemble.of(e, c.finished) for c in some])
+        exponent, low, high, _ = plot_ensemble.power_law([c.values["tow.speed"] for c in some],
+                                                         [plot_ensemble.of(e, c.finished) for c in some])
         assert exponent == pytest.approx(2, abs=0.1) and low < 2 < high and words.startswith("concentration")
     figure = plot_ensemble.draw_sweep(e, "tow.speed")
     law = next(line for line in figure.axes[0].lines if line.get_color() == plot_ensemble.style.TOW)
@@ -273,7 +315,8 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
     expected = np.concatenate([1000 * a * 0.01 * (1 + 0.1 * (np.arange(8) - 3.5)) for a in (0.2, 0.5)])
     assert sorted(shown) == pytest.approx(sorted(expected)) and list(jams) == pytest.approx([2 * 1.35])
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
-    assert "Lichey–Hellmer 2001" in labels and "dilute limit" in labels and "a field where the body stood still" in labels
+    assert ("Lichey–Hellmer 2001" in labels and "dilute limit" in labels
+            and "a field where the body stood still" in labels)
     matplotlib.pyplot.close("all")
 
 
@@ -286,10 +329,15 @@ def test_every_picture_of_a_grid(plain, tmp_path):
 
 def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
     rng = np.random.default_rng(2)
-    members = [made_up.member(np.full(30, 5 * a + t), {"ice.concentration": a, "ice.thickness": t, "variant": "x"}, i) for i, (a, t) in enumerate(rng.random((40, 2)))]
+    members = [
+        made_up.member(np.full(30, 5 * a + t), {"ice.concentration": a, "ice.thickness": t, "variant": "x"}, i)
+        for i, (a, t) in enumerate(rng.random((40, 2)))
+    ]
     folder = made_up.write(tmp_path / "a", members, sampling="latin-hypercube")
     e = Ensemble(folder)
-    assert e.sampled and plot_ensemble.numeric(e) == ["ice.concentration", "ice.thickness"] and [n for n, _ in plot_ensemble.pictures(e, None)][-1] == "sensitivity"
+    assert e.sampled and plot_ensemble.numeric(e) == ["ice.concentration", "ice.thickness"] and [
+        n for n, _ in plot_ensemble.pictures(e, None)
+    ][-1] == "sensitivity"
     dots = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].lines[0]
     assert list(dots.get_xdata()) == [m["parameters"]["ice.thickness"] for m in members]
     matplotlib.pyplot.close("all")
@@ -300,13 +348,18 @@ def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
 def flat_names(path):
     with h5py.File(path) as f:
         names = {}
-        f.visititems(lambda name, node: names.update({name: (node.dtype.kind, node.ndim)}) if isinstance(node, h5py.Dataset) else None)
+        f.visititems(lambda name, node: names.update({name: (node.dtype.kind, node.ndim)})
+                     if isinstance(node, h5py.Dataset) else None)
     return names
 
 
 def test_a_small_ensemble_of_the_program(tmp_path):
     write_case(tmp_path, changed(TOW, run__duration=60, output__window_start=5, domain__length=20), "base.yml")
-    (tmp_path / "study.yml").write_text(json.dumps({"title": "tiny", "base": "base.yml", "repeats": 5, "seed": 4, "parameters": {"ice.concentration": [0.2, 0.5]}}))
+    (tmp_path / "study.yml").write_text(
+        json.dumps({
+            "title": "tiny", "base": "base.yml", "repeats": 5, "seed": 4,
+            "parameters": {"ice.concentration": [0.2, 0.5]}
+        }))
     assert call("ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=tmp_path).returncode == DONE
     result = script("ensemble.py", tmp_path / "all", "--resamples", 9)
     assert result.returncode == 0, result.stderr
@@ -316,17 +369,28 @@ def test_a_small_ensemble_of_the_program(tmp_path):
         with Run(e.folder(m)) as r:
             found = stat_mean.series_mean(e.steady(m))
             assert found.n == r.number("window.n_samples")
-            assert (found.mean, found.se, found.n_eff) == pytest.approx((r.number("mean_ice_resistance_n"), r.number("mean_ice_resistance_se_n"), r.number("window.n_independent")), rel=1e-9)
+            assert (found.mean, found.se, found.n_eff) == pytest.approx(
+                (r.number("mean_ice_resistance_n"), r.number("mean_ice_resistance_se_n"),
+                 r.number("window.n_independent")),
+                rel=1e-9)
             told = len(r.summary["warnings"])
             assert bool(told) == bool(e.doubts(m))
             assert len(e.impacts(m)[0]) == r.number("impacts.collisions")
     for c in s["conditions"]:
-        assert c["resistance"]["mean"] == pytest.approx(np.mean([e.summary["mean_ice_resistance_n"][m] for m in e.conditions()[c["index"]].finished]))
+        assert c["resistance"]["mean"] == pytest.approx(
+            np.mean([e.summary["mean_ice_resistance_n"][m] for m in e.conditions()[c["index"]].finished]))
         assert c["extremes"]["collisions"] > 0 and c["estimates"]["dilute_limit"]["force"] > 0
-    done(script("plot_ensemble.py", tmp_path / "all"), tmp_path / "all/sweep-ice-concentration.png", tmp_path / "all/exceedance.png")
+    done(script("plot_ensemble.py", tmp_path / "all"), tmp_path / "all/sweep-ice-concentration.png",
+         tmp_path / "all/exceedance.png")
     # what the made-up files claim to look like
-    ours, theirs = flat_names(made_up.write(tmp_path / "made", [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0)]) / "ensemble.h5"), flat_names(tmp_path / "all/ensemble.h5")
-    assert {k: v for k, v in ours.items() if k in theirs} == {k: theirs[k] for k in ours if k in theirs} and set(ours) <= set(theirs), sorted(set(ours) - set(theirs))
+    ours, theirs = flat_names(
+        made_up.write(tmp_path / "made", [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0)]) /
+        "ensemble.h5"), flat_names(tmp_path / "all/ensemble.h5")
+    assert {k: v
+            for k, v in ours.items()
+            if k in theirs} == {k: theirs[k]
+                                for k in ours
+                                if k in theirs} and set(ours) <= set(theirs), sorted(set(ours) - set(theirs))
 
 
 def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
@@ -344,9 +408,11 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
     for side, sign in ((0, -1), (1, 1)):
         on = c.body[:, side] == towed
         f, lever = sign * force[on], c.lever[on, side]
-        fx, fy, moment = fx + f[:, 0].sum(), fy + f[:, 1].sum(), moment + np.sum(lever[:, 0] * f[:, 1] - lever[:, 1] * f[:, 0])
+        fx, fy, moment = fx + f[:, 0].sum(), fy + f[:, 1].sum(), moment + np.sum(lever[:, 0] * f[:, 1] -
+                                                                                 lever[:, 1] * f[:, 0])
     scale = np.abs(force[(c.body == towed).any(axis=1)]).sum()
-    assert scale > 0 and (fx, fy) == pytest.approx([r.series(n)[k] for n in ("ice_force_x", "ice_force_y")], abs=1e-9 * scale)
+    assert scale > 0 and (fx, fy) == pytest.approx([r.series(n)[k] for n in ("ice_force_x", "ice_force_y")],
+                                                   abs=1e-9 * scale)
     assert moment == pytest.approx(r.series("ice_moment")[k], abs=1e-9 * scale)
     # both levers lead to one point, but for the motion within the step
     ends = [c.pose[c.body[:, side], :2] + c.lever[:, side] for side in (0, 1)]
@@ -355,9 +421,11 @@ def test_force_chains_add_up_to_the_force_on_the_body(tmp_path):
     with Run(tmp_path / "out") as picture:
         lines, values = plot_chains.segments(picture, c)
         body, _, total = plot_chains.pairs(c)
-        assert total.sum() == pytest.approx(c.force.sum()) and len(values) == np.sum(body < picture.n_floes) and len(set(map(tuple, body))) == len(body)
+        assert total.sum() == pytest.approx(c.force.sum()) and len(values) == np.sum(body < picture.n_floes) and len(
+            set(map(tuple, body))) == len(body)
     # two points of one pair, 1 and 3 N, and one without force
-    by_hand = plot_chains.Contacts(0.0, np.array([[0, 1], [0, 1], [1, 2]]), np.zeros((3, 2)), np.array([[[0, 0], [8, 0]], [[4, 0], [0, 8]], [[1, 1], [1, 1]]], dtype=float),
+    by_hand = plot_chains.Contacts(0.0, np.array([[0, 1], [0, 1], [1, 2]]), np.zeros((3, 2)),
+                                   np.array([[[0, 0], [8, 0]], [[4, 0], [0, 8]], [[1, 1], [1, 1]]], dtype=float),
                                    np.array([1.0, 3.0, 0.0]), np.zeros((3, 3)))
     body, lever, total = plot_chains.pairs(by_hand)
     assert body.tolist() == [[0, 1]] and lever.tolist() == [[[3, 0], [2, 6]]] and total.tolist() == [4]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The methods behind postproc/ensemble.py against known answers: coverage of intervals, SciPy's fits, closed forms of extremes and of sensitivities."""
+"""The methods behind postproc/ensemble.py against known answers: coverage of intervals, SciPy's fits, closed forms of
+extremes and of sensitivities."""
 import sys
 from pathlib import Path
 
@@ -31,7 +32,8 @@ def test_95_percent_of_the_intervals_within_a_run_hold_the_mean(phi, n):
     found = [stat_mean.series_mean(row) for row in x]
     low, high = np.array([f.interval() for f in found]).T
     assert 0.95 <= np.mean((low <= 0) & (high >= 0)) <= 0.985  # on the safe side: the larger of two estimates
-    # the standard error is right on the average, but for that: var(m) = (1 + phi)/(1 - phi)/n, less what the ends of the series lack
+    # the standard error is right on the average, but for that: var(m) = (1 + phi)/(1 - phi)/n, less what the ends of
+    # the series lack
     true = ((1 + phi) / (1 - phi) - 2 * phi * (1 - phi ** n) / (n * (1 - phi) ** 2)) / n
     assert 1 <= np.sqrt(np.mean([f.se ** 2 for f in found])) / np.sqrt(true) <= 1.2
     if phi > 0:  # what the degrees of freedom are for
@@ -40,8 +42,10 @@ def test_95_percent_of_the_intervals_within_a_run_hold_the_mean(phi, n):
 
 def test_the_mean_of_series_that_are_none():
     assert stat_mean.series_mean([3.0] * 50).interval() == (3.0, 3.0)
-    assert np.isnan(stat_mean.series_mean([1.0]).se) and np.isnan(stat_mean.series_mean([1.0, np.nan]).se) and np.isnan(stat_mean.series_mean([]).mean)
-    swinging = stat_mean.series_mean((-1.0) ** np.arange(200))  # anticorrelated: the mean is better known than of white noise, but not without error
+    assert np.isnan(stat_mean.series_mean([1.0]).se) and np.isnan(stat_mean.series_mean([1.0, np.nan]).se) and np.isnan(
+        stat_mean.series_mean([]).mean)
+    # anticorrelated: the mean is better known than of white noise, but not without error
+    swinging = stat_mean.series_mean((-1.0) ** np.arange(200))
     assert 1 / 200 <= swinging.se * np.sqrt(200) < 1
 
 
@@ -62,7 +66,9 @@ def test_the_studentised_bootstrap_follows_skewness():
     truth, rng = np.exp(0.5), np.random.default_rng(10)
     def miss(intervals):
         return np.mean([high < truth for _, high in intervals])  # dense ice: a mean too low, since no field jammed
-    assert miss([stat_mean.studentised_interval(row, resamples=499, rng=rng) for row in x]) < 0.6 * miss([stat_mean.t_interval(row) for row in x])
+
+    assert miss([stat_mean.studentised_interval(row, resamples=499, rng=rng)
+                 for row in x]) < 0.6 * miss([stat_mean.t_interval(row) for row in x])
 
 
 def test_fields_needed_is_the_least_that_does():
@@ -77,8 +83,10 @@ def test_fields_needed_is_the_least_that_does():
 def test_numbers_of_fields():
     x = [1.0, 2, 3, 4, 5, 6, 7, 100]
     r = stat_mean.between_fields(x, [0.5] * 8)
-    assert r["mean"] == 16 and r["median"] == 4.5 and r["trimmed_mean"] == 4.5 and r["largest_share"] == 100 / 128 and r["trimmed_each_end"] == 1
-    assert r["sd_of_fields"] == pytest.approx(np.sqrt(np.var(x, ddof=1) - 0.25)) and r["se_between"] == pytest.approx(np.std(x, ddof=1) / np.sqrt(8))
+    assert r["mean"] == 16 and r["median"] == 4.5 and r["trimmed_mean"] == 4.5 and r[
+        "largest_share"] == 100 / 128 and r["trimmed_each_end"] == 1
+    assert r["sd_of_fields"] == pytest.approx(np.sqrt(np.var(x, ddof=1) - 0.25)) and r["se_between"] == pytest.approx(
+        np.std(x, ddof=1) / np.sqrt(8))
     assert r["median_95"] == (1, 100)  # of eight: the inner pair would cover 93 %
     one = stat_mean.between_fields([2.0], [0.1])
     assert one["mean"] == 2 and np.isnan(one["t_95"]).all() and np.isnan(one["fields_needed"])
@@ -87,11 +95,17 @@ def test_numbers_of_fields():
 
 # ---- distributions
 
-SAMPLE = {"normal": stats.norm(5, 1), "lognormal": stats.lognorm(0.5, scale=3), "Weibull": stats.weibull_min(1.7, scale=2), "gamma": stats.gamma(3, scale=2),
-          "GEV": stats.genextreme(-0.15, loc=3, scale=1)}
-SCIPY = {"normal": lambda x: stats.norm(*stats.norm.fit(x)), "lognormal": lambda x: stats.lognorm(*stats.lognorm.fit(x, floc=0)),
-         "Weibull": lambda x: stats.weibull_min(*stats.weibull_min.fit(x, floc=0)), "gamma": lambda x: stats.gamma(*stats.gamma.fit(x, floc=0)),
-         "GEV": lambda x: stats.genextreme(*stats.genextreme.fit(x))}
+SAMPLE = {
+    "normal": stats.norm(5, 1), "lognormal": stats.lognorm(0.5, scale=3), "Weibull": stats.weibull_min(1.7, scale=2),
+    "gamma": stats.gamma(3, scale=2), "GEV": stats.genextreme(-0.15, loc=3, scale=1)
+}
+SCIPY = {
+    "normal": lambda x: stats.norm(*stats.norm.fit(x)),
+    "lognormal": lambda x: stats.lognorm(*stats.lognorm.fit(x, floc=0)),
+    "Weibull": lambda x: stats.weibull_min(*stats.weibull_min.fit(x, floc=0)),
+    "gamma": lambda x: stats.gamma(*stats.gamma.fit(x, floc=0)),
+    "GEV": lambda x: stats.genextreme(*stats.genextreme.fit(x))
+}
 
 
 @pytest.mark.parametrize("name", stat_fit.DISTRIBUTIONS)
@@ -102,21 +116,27 @@ def test_fits_have_scipys_likelihood(name):
         theirs = SCIPY[name](x if scale == 1 else x / scale)
         assert f.log_likelihood >= np.sum(theirs.logpdf(x / scale)) - 300 * np.log(scale) - 1e-4
         k = 3 if name == "GEV" else 2
-        assert f.aic == pytest.approx(2 * k - 2 * f.log_likelihood) and f.kolmogorov == stats.kstest(x, f.frozen.cdf).statistic
-    assert stat_fit.gev_minus_log_likelihood([3, np.log(2), 0.15], x / scale) == pytest.approx(-np.sum(stats.genextreme(-0.15, 3, 2).logpdf(x / scale)))
+        assert f.aic == pytest.approx(2 * k - 2 * f.log_likelihood) and f.kolmogorov == stats.kstest(
+            x, f.frozen.cdf).statistic
+    assert stat_fit.gev_minus_log_likelihood(
+        [3, np.log(2), 0.15], x / scale) == pytest.approx(-np.sum(stats.genextreme(-0.15, 3, 2).logpdf(x / scale)))
 
 
 def test_fits_see_no_strides(monkeypatch):
     """numpy's last bits of log and exp depend on what lies behind a view with strides; see fit()."""
     for name, (make, k, positive) in stat_fit.DISTRIBUTIONS.items():
         seen = []
-        monkeypatch.setitem(stat_fit.DISTRIBUTIONS, name, (lambda x, make=make, seen=seen: seen.append(x.flags.c_contiguous) or make(x), k, positive))
-        assert not stat_fit.fit(name, stats.weibull_min(4).rvs(100, random_state=2)[::4], 2).refused and seen == [True] * 3
+        monkeypatch.setitem(stat_fit.DISTRIBUTIONS, name,
+                            (lambda x, make=make, seen=seen: seen.append(x.flags.c_contiguous) or make(x), k, positive))
+        assert not stat_fit.fit(name,
+                                stats.weibull_min(4).rvs(100, random_state=2)[::4], 2).refused and seen == [True] * 3
 
 
 def test_anderson_darling_is_scipys():
     x = stats.norm(0, 1).rvs(80, random_state=1)
-    assert stat_fit.anderson_darling(x, stats.norm(x.mean(), x.std(ddof=1)).cdf) == pytest.approx(stats.anderson(x).statistic)
+    assert stat_fit.anderson_darling(x,
+                                     stats.norm(x.mean(),
+                                                x.std(ddof=1)).cdf) == pytest.approx(stats.anderson(x).statistic)
 
 
 def test_p_values_are_uniform_where_the_model_is_true_and_small_where_it_is_not():
@@ -132,9 +152,11 @@ def test_p_values_are_uniform_where_the_model_is_true_and_small_where_it_is_not(
 
 
 def test_what_no_distribution_is_fitted_to():
-    assert "needs 8" in stat_fit.fit("normal", [1, 2, 3]).refused and "same" in stat_fit.fit("gamma", [2.0] * 20).refused
+    assert "needs 8" in stat_fit.fit("normal", [1, 2, 3]).refused and "same" in stat_fit.fit("gamma",
+                                                                                             [2.0] * 20).refused
     x = np.arange(-2.0, 18)
-    assert "3 values are not positive" in stat_fit.fit("Weibull", x).refused and not stat_fit.fit("normal", x, 0).refused
+    assert "3 values are not positive" in stat_fit.fit("Weibull",
+                                                       x).refused and not stat_fit.fit("normal", x, 0).refused
     assert [bool(f.refused) for f in stat_fit.fit_all(x, 0)] == [False, False, True, True, True]
 
 
@@ -153,7 +175,9 @@ def test_clusters_and_blocks_by_hand():
     time, peak = np.array([1.0, 2, 3, 10, 11, 30, 31]), np.array([5.0, 9, 1, 7, 8, 6, 2])
     assert list(stat_extreme.clusters(time, peak, 4, 2)) == [9, 8, 6]
     assert list(stat_extreme.clusters(time, peak, 4, 0.5)) == [5, 9, 7, 8, 6]
-    assert list(stat_extreme.clusters(time, peak, 4, 6.9)) == [9, 8, 6] and list(stat_extreme.clusters(time, peak, 4, 8)) == [9, 6]  # 2 to 10 s is within the gap
+    # 2 to 10 s is within the gap
+    assert list(stat_extreme.clusters(time, peak, 4, 6.9)) == [9, 8, 6] and list(stat_extreme.clusters(
+        time, peak, 4, 8)) == [9, 6]
     assert len(stat_extreme.clusters(time, peak, 9, 2)) == 0        # above, not at
     found = stat_extreme.block_maxima(time, peak, 0, 40 / 3600, 4)
     assert list(found[[0, 1, 3]]) == [9, 8, 6] and np.isnan(found[2])
@@ -167,18 +191,25 @@ def poisson_fields(rng, n, hours=1.0, rate=400.0, scale=50.0, shape=0.0, factor=
     for i in range(n):
         k = rng.poisson(rate * hours)
         t = np.sort(rng.uniform(0, 3600 * hours, k))
-        out.append({"time": t, "peak": stats.genpareto(shape, scale=scale).rvs(k, random_state=rng) * (factor[i] if factor is not None else 1), "start": 0.0, "hours": hours})
+        out.append({
+            "time": t, "peak": stats.genpareto(shape, scale=scale).rvs(k, random_state=rng) *
+            (factor[i] if factor is not None else 1), "start": 0.0, "hours": hours
+        })
     return out
 
 
 def test_return_levels_of_exponential_peaks():
     fields = poisson_fields(np.random.default_rng(3), 12)
     T = [1.0, 10.0, 100.0]
-    over, blocks = stat_extreme.over_threshold(fields, T, gap=0.0, resamples=39), stat_extreme.by_blocks(fields, T, blocks=4, resamples=39)
+    over, blocks = stat_extreme.over_threshold(fields, T, gap=0.0, resamples=39), stat_extreme.by_blocks(fields,
+                                                                                                         T,
+                                                                                                         blocks=4,
+                                                                                                         resamples=39)
     for found in (over, blocks):
         for level, hours in zip(found["levels"], T):
             true = 50 * np.log(400 * hours)  # exceeded 400 exp(-z/50) times a hour
-            assert level["level_95"][0] < true < level["level_95"][1] and level["level"] == pytest.approx(true, rel=0.15), (found, hours)
+            assert level["level_95"][0] < true < level["level_95"][1] and level["level"] == pytest.approx(
+                true, rel=0.15), (found, hours)
             assert level["beyond_data"] == (hours > 12)
         assert found["shape_95"][0] < 0 < found["shape_95"][1] and found["p_value"] > 0.05
     assert over["extremal_index"] == 1 and over["rate_per_hour"] == pytest.approx(over["clusters"] / 12)
@@ -188,7 +219,8 @@ def test_return_levels_of_exponential_peaks():
 def test_a_field_that_is_unlike_the_others_widens_the_interval():
     rng = np.random.default_rng(4)
     alike, unlike = poisson_fields(rng, 10, rate=100), poisson_fields(rng, 10, rate=100, factor=[1] * 8 + [4, 4])
-    a, b = (stat_extreme.over_threshold(f, [10.0], 0.0, threshold=100.0, resamples=1)["levels"][0] for f in (alike, unlike))
+    a, b = (stat_extreme.over_threshold(f, [10.0], 0.0, threshold=100.0, resamples=1)["levels"][0]
+            for f in (alike, unlike))
     assert (b["level_95"][1] - b["level_95"][0]) / b["level"] > 1.5 * (a["level_95"][1] - a["level_95"][0]) / a["level"]
 
 
@@ -197,7 +229,8 @@ def test_intervals_of_return_levels_hold_the_level():
     for _ in range(40):
         [(_, (low, high))], _ = stat_extreme.gpd_intervals(*tail(poisson_fields(rng, 12, rate=100), 100.0), [10.0])
         hits.append(low <= true <= high)
-    assert sum(hits) >= stats.binom.ppf(1e-3, 40, 0.95)  # percentiles of a bootstrap over fields hold it in three quarters (stat_profile.py)
+    # percentiles of a bootstrap over fields hold it in three quarters (stat_profile.py)
+    assert sum(hits) >= stats.binom.ppf(1e-3, 40, 0.95)
 
 
 def tail(fields, threshold):
@@ -209,7 +242,8 @@ def tail(fields, threshold):
 @pytest.mark.parametrize("T", [3.0, 100.0])
 def test_profile_intervals_are_those_of_the_likelihood_region(T, monkeypatch):
     monkeypatch.setattr(stat_extreme, "rate_share", lambda *_: 1.0)
-    each, hours, threshold, scale, shape = tail(poisson_fields(np.random.default_rng(15), 4, rate=100), 100.0)  # four fields: the likelihood alone
+    # four fields: the likelihood alone
+    each, hours, threshold, scale, shape = tail(poisson_fields(np.random.default_rng(15), 4, rate=100), 100.0)
     y, rate = np.concatenate(each), sum(map(len, each)) / 4
     [(level, ends)], shape_ends = stat_extreme.gpd_intervals(each, hours, threshold, scale, shape, [T])
     a, k = np.meshgrid(scale * np.linspace(0.4, 2.2, 500), np.linspace(-0.6, 1.2, 501))
@@ -218,42 +252,54 @@ def test_profile_intervals_are_those_of_the_likelihood_region(T, monkeypatch):
         z = threshold + a * ((rate * T) ** k - 1) / k
     inside = minus <= np.sum(-stats.genpareto(shape, scale=scale).logpdf(y)) + stats.chi2.ppf(0.95, 1) / 2
     assert level == pytest.approx(threshold + scale * ((rate * T) ** shape - 1) / shape)
-    assert ends == pytest.approx((z[inside].min(), z[inside].max()), rel=0.02) and shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.02)
+    assert ends == pytest.approx((z[inside].min(), z[inside].max()), rel=0.02) and shape_ends == pytest.approx(
+        (k[inside].min(), k[inside].max()), abs=0.02)
 
 
 def test_profile_intervals_of_block_maxima_are_those_of_the_likelihood_region():
     x, shares = 200 + 30 * stats.genextreme(-0.2).rvs(40, random_state=16), (0.05, 0.002)
     location, scale, shape = stat_fit.gev(x)
     levels, shape_ends = stat_extreme.gev_intervals([x[i::4] for i in range(4)], location, scale, shape, shares)
-    a, b, k = np.meshgrid(location + scale * np.linspace(-0.8, 0.8, 70), scale * np.linspace(0.5, 2.0, 70), shape + np.linspace(-0.5, 0.7, 80), indexing="ij")
+    a, b, k = np.meshgrid(location + scale * np.linspace(-0.8, 0.8, 70),
+                          scale * np.linspace(0.5, 2.0, 70),
+                          shape + np.linspace(-0.5, 0.7, 80),
+                          indexing="ij")
     with np.errstate(all="ignore"):
-        minus = sum(np.log(b) + (1 + 1 / k) * np.log(1 + k * (v - a) / b) + (1 + k * (v - a) / b) ** (-1 / k) for v in x)
+        minus = sum(np.log(b) + (1 + 1 / k) * np.log(1 + k * (v - a) / b) + (1 + k * (v - a) / b)**(-1 / k) for v in x)
     frozen = stats.genextreme(-shape, loc=location, scale=scale)
     inside = minus <= -np.sum(frozen.logpdf(x)) + stats.chi2.ppf(0.95, 1) / 2
     for (level, ends), share in zip(levels, shares):
         z = a[inside] + b[inside] * (share ** -k[inside] - 1) / k[inside]
-        assert level == pytest.approx(frozen.ppf(np.exp(-share))) and ends == pytest.approx((z.min(), z.max()), rel=0.05)
+        assert level == pytest.approx(frozen.ppf(np.exp(-share))) and ends == pytest.approx(
+            (z.min(), z.max()), rel=0.05)
     assert shape_ends == pytest.approx((k[inside].min(), k[inside].max()), abs=0.03)
 
 
 def test_profile_likelihood_of_a_normal_mean():
-    # with known variance: mean +- sqrt(2 drop / n), and copies of each value in a field widen by the root of their number
+    # with known variance: mean +- sqrt(2 drop / n), and copies of each value in a field widen by the root of their
+    # number
     x = np.random.default_rng(14).normal(7, 1, 40)
     low, high = stat_profile.interval(lambda q, _: 0.5 * np.sum((x - q) ** 2), x.mean(), [0.0], 2.0, 0.1)
     assert (low, high) == pytest.approx((x.mean() - np.sqrt(4 / 40), x.mean() + np.sqrt(4 / 40)), abs=1e-3)
     fields = np.repeat(x, 9).reshape(40, 9)
     c = stat_profile.dispersion(lambda t: 0.5 * np.sum((fields - t[0]) ** 2, axis=1), lambda t: t[0], [x.mean()])
     assert c == pytest.approx(9 * np.var(x, ddof=1), rel=1e-3)
-    assert stat_profile.drop(8) == pytest.approx(stats.t.ppf(0.975, 7) ** 2 / 2) and stat_profile.drop(3) == pytest.approx(1.96 ** 2 / 2, rel=1e-4)
+    assert stat_profile.drop(8) == pytest.approx(
+        stats.t.ppf(0.975, 7)**2 / 2) and stat_profile.drop(3) == pytest.approx(1.96**2 / 2, rel=1e-4)
     assert stat_profile.interval(lambda q, _: 1 - np.exp(-q * q), 0.0, [0.0], 2.0, 0.1) == (-np.inf, np.inf)
 
 
 def test_clustered_peaks_count_once():
     rng = np.random.default_rng(5)
     fields = poisson_fields(rng, 6, rate=100)
-    doubled = [{**f, "time": np.repeat(f["time"], 2) + np.tile([0, 0.01], len(f["time"])), "peak": np.repeat(f["peak"], 2)} for f in fields]
-    a, b = stat_extreme.over_threshold(fields, [10.0], 0.0, 60.0, 19), stat_extreme.over_threshold(doubled, [10.0], 0.05, 60.0, 19)
-    assert b["levels"][0]["level"] == pytest.approx(a["levels"][0]["level"], rel=0.01) and b["extremal_index"] == pytest.approx(0.5, abs=0.01)
+    doubled = [
+        {**f, "time": np.repeat(f["time"], 2) + np.tile([0, 0.01], len(f["time"])), "peak": np.repeat(f["peak"], 2)}
+        for f in fields
+    ]
+    a, b = stat_extreme.over_threshold(fields, [10.0], 0.0, 60.0,
+                                       19), stat_extreme.over_threshold(doubled, [10.0], 0.05, 60.0, 19)
+    assert b["levels"][0]["level"] == pytest.approx(a["levels"][0]["level"],
+                                                    rel=0.01) and b["extremal_index"] == pytest.approx(0.5, abs=0.01)
 
 
 def test_what_no_tail_is_fitted_to():
@@ -283,7 +329,8 @@ def test_ishigami():
     v1, v2, v13 = 0.5 * (1 + b * pi ** 4 / 5) ** 2, a * a / 8, b * b * pi ** 8 * (1 / 18 - 1 / 50)
     first, total = np.array([v1, v2, 0]) / (v1 + v2 + v13), np.array([v1 + v13, v2, v13]) / (v1 + v2 + v13)
     s = stat_sensitivity.sobol(dict(zip("abc", x.T)), y, resamples=20)
-    assert np.allclose([i["first"] for i in s["indices"].values()], first, atol=0.01) and np.allclose([i["total"] for i in s["indices"].values()], total, atol=0.01)
+    assert np.allclose([i["first"] for i in s["indices"].values()], first, atol=0.01) and np.allclose(
+        [i["total"] for i in s["indices"].values()], total, atol=0.01)
     assert s["q2"] > 0.99
     # a monotone change of scale leaves them
     again = stat_sensitivity.sobol({"a": np.exp(x[:, 0]), "b": x[:, 1], "c": x[:, 2]}, y, resamples=1)
@@ -313,13 +360,17 @@ def test_a_full_factorial_gives_the_analysis_of_variance():
     effect = {("s", 1.0): 0.0, ("s", 2.0): 2.0, ("h", 1.0): 4.0, ("h", 2.0): 12.0, ("v", 1.0): 1.0, ("v", 2.0): 5.0}
     names = [k for k in effect for _ in range(4)]
     y = np.array([effect[k] for k in names]) + np.tile([-1e-3, 1e-3, -1e-3, 1e-3], 6)
-    s = stat_sensitivity.sobol({"variant": np.array([k for k, _ in names], dtype=object), "x": np.array([v for _, v in names])}, y, resamples=5)
+    s = stat_sensitivity.sobol(
+        {"variant": np.array([k for k, _ in names], dtype=object), "x": np.array([v for _, v in names])},
+        y,
+        resamples=5)
     table = np.array(list(effect.values())).reshape(3, 2)
     whole, a, b = table.var(), table.mean(axis=1).var(), table.mean(axis=0).var()
     i = s["indices"]
     assert [i["variant"]["first"], i["x"]["first"]] == pytest.approx([a / whole, b / whole], abs=1e-4)
     assert [i["variant"]["total"], i["x"]["total"]] == pytest.approx([1 - b / whole, 1 - a / whole], abs=1e-4)
-    assert "variant" not in stat_sensitivity.rank_correlations({"variant": np.array(["s", "h"] * 10, dtype=object), "x": np.arange(20.0)}, np.arange(20.0))
+    assert "variant" not in stat_sensitivity.rank_correlations(
+        {"variant": np.array(["s", "h"] * 10, dtype=object), "x": np.arange(20.0)}, np.arange(20.0))
 
 
 def test_samples_that_are_too_small():
@@ -330,4 +381,6 @@ def test_samples_that_are_too_small():
     assert "predicts too little" in noise["refused"]
     both = np.repeat(u[:10, 0], 3)  # two parameters that always go together
     assert "do not suffice" in stat_sensitivity.sobol({"a": both, "b": -both}, both)["refused"]
-    assert "refused" in stat_sensitivity.sobol({"a": np.ones(30)}, np.arange(30.0)) and "does not vary" in stat_sensitivity.sobol(keys, np.ones(200))["refused"]
+    assert "refused" in stat_sensitivity.sobol({"a": np.ones(30)},
+                                               np.arange(30.0)) and "does not vary" in stat_sensitivity.sobol(
+                                                   keys, np.ones(200))["refused"]

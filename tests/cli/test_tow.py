@@ -13,8 +13,13 @@ VESSEL = {
     "ice": {"concentration": 0.4, "size": 40, "thickness": 1, "x_min": -400},
     "body": {"length": 80, "draft": 30, "x": -600, "y": -200},
     "tow": {
-        "mode": "thrust", "programme": [[0, 0], [120, 1.2], [1200, 1.2], [1320, 0]], "waypoints": [[-100, -200], [150, 100], [2000, 100]], "turn_radius": 60,
-        "line_length": 250, "line_damping": "200 kN s/m", "line": {"type": "dyneema", "diameter": "60 mm", "branches": 2, "breaking_load": 0},
+        "mode": "thrust",
+        "programme": [[0, 0], [120, 1.2], [1200, 1.2], [1320, 0]],
+        "waypoints": [[-100, -200], [150, 100], [2000, 100]],
+        "turn_radius": 60,
+        "line_length": 250,
+        "line_damping": "200 kN s/m",
+        "line": {"type": "dyneema", "diameter": "60 mm", "branches": 2, "breaking_load": 0},
         "vessel": {"mass": "3000 t", "bollard_pull": "1.2 MN", "free_speed": "14 kn", "lookahead": 100},
     },
     "water": {"latitude": 75, "current_y": 0.1},
@@ -30,11 +35,13 @@ def events(r):
     with h5py.File(r.dir / "result.h5") as f:
         e = f["events"]
         names = [n.decode() for n in e["kind_names"][:]]
-        return [(t, names[k], int(s), v) for t, k, s, v in zip(e["time"][:], e["kind"][:], e["subject"][:], e["value"][:])]
+        return [(t, names[k], int(s), v)
+                for t, k, s, v in zip(e["time"][:], e["kind"][:], e["subject"][:], e["value"][:])]
 
 
 def test_the_vessel_balances(towed):
-    """thrust = drag + inertia + line at every sample, to 1e-9 of the largest; and the inertia is that of the recorded track."""
+    """thrust = drag + inertia + line at every sample, to 1e-9 of the largest; and the inertia is that of the recorded
+    track."""
     thrust, drag, inertia, line = towed.series("vessel_thrust", "vessel_drag", "vessel_inertia", "vessel_line")
     scale = np.abs([thrust, drag, inertia, line]).max()
     assert scale > 1e5 and np.abs(inertia).max() > 1e4 and np.abs(drag).max() > 1e3
@@ -56,21 +63,25 @@ def test_the_body_balances(towed):
 
 
 def test_the_governor_and_the_power(towed):
-    """Never faster over ground than the programme but by what it coasts, never more thrust than the bollard pull, and none astern."""
+    """Never faster over ground than the programme but by what it coasts, never more thrust than the bollard pull, and
+    none astern."""
     time, speed, thrust = towed.series("time", "vessel_speed", "vessel_thrust")
     programme = np.interp(time, [0, 120, 1200, 1320], [0, 1.2, 1.2, 0])
     faster = speed > programme * (1 + 1e-12)
     assert (thrust[faster] == 0).all() and not faster[time < 1000].any()
-    # Its fall with speed is linearised: in a step in which the line draws the vessel back it may be a little more than at rest.
+    # Its fall with speed is linearised: in a step in which the line draws the vessel back it may be a little more than
+    # at rest.
     assert thrust.min() >= 0 and thrust.max() <= 1.2e6 * (1 + 1e-4)
-    # Slower than the programme only at full power, of which 2 % are lost at 1.2 m/s; less power only at the programme's speed.
+    # Slower than the programme only at full power, of which 2 % are lost at 1.2 m/s; less power only at the programme's
+    # speed.
     slower, partial = speed < programme * (1 - 1e-9), (thrust > 0) & (thrust < 0.97 * 1.2e6)
     assert (thrust[slower] > 0.97 * 1.2e6).all() and slower.sum() > 20
     assert np.abs(speed - programme)[partial].max() < 1e-9 and partial.sum() > 10
 
 
 def test_the_track_is_the_planned_one(towed):
-    """Way-points are passed in order, the vessel stays within some tens of metres of the polyline, and the body comes after."""
+    """Way-points are passed in order, the vessel stays within some tens of metres of the polyline, and the body comes
+    after."""
     e = [v for v in events(towed) if v[1] == "waypoint"]
     assert [v[2] for v in e] == [1, 2] and 0 < e[0][0] < e[1][0]
     x, y = towed.series("vessel_x", "vessel_y")
@@ -102,11 +113,16 @@ def test_the_resolved_case_gives_the_same_run(towed, tmp_path):
 
 
 def test_branches_break_and_the_body_drifts(tmp_path):
-    case = changed(VESSEL, run__duration=400, tow__line__breaking_load="150 kN", tow__branch2={"breaking_load": "120 kN"})
+    case = changed(VESSEL,
+                   run__duration=400,
+                   tow__line__breaking_load="150 kN",
+                   tow__branch2={"breaking_load": "120 kN"})
     r = run(tmp_path, case)
     e = [v for v in events(r) if v[1] != "waypoint"]
     assert [v[1] for v in e] == ["line_broken", "line_broken", "adrift"]
-    assert [(j["time_s"], j["kind"], j["subject"], j["value"]) for j in r.summary["events"] if j["kind"] != "waypoint"] == e
+    assert [(j["time_s"], j["kind"], j["subject"], j["value"])
+            for j in r.summary["events"]
+            if j["kind"] != "waypoint"] == e
     time, one, two = r.series("time", "line_tension_1", "line_tension_2")
     for when, _, branch, value in e[:2]:
         tension, load = (one, 150e3) if branch == 1 else (two, 120e3)
@@ -118,10 +134,15 @@ def test_branches_break_and_the_body_drifts(tmp_path):
 
 
 def test_a_prescribed_body_follows_its_waypoints(tmp_path):
-    """Mode speed through ice on a path with a corner: velocity along the course, yaw kept, forces along the course of the time."""
-    case = changed(VESSEL, run__duration=500, water=None, tow={"mode": "speed", "speed": 1, "ramp": 0, "waypoints": [[-400, -200], [-400, 300]]})
+    """Mode speed through ice on a path with a corner: velocity along the course, yaw kept, forces along the course of
+    the time."""
+    case = changed(VESSEL,
+                   run__duration=500,
+                   water=None,
+                   tow={"mode": "speed", "speed": 1, "ramp": 0, "waypoints": [[-400, -200], [-400, 300]]})
     r = run(tmp_path, case, "--quiet")
-    time, x, y, yaw, tow, ice, drag, inertia = r.series("time", "body_x", "body_y", "body_yaw", "tow_force", "ice_resistance", "drag_force", "inertia_force")
+    time, x, y, yaw, tow, ice, drag, inertia = r.series("time", "body_x", "body_y", "body_yaw", "tow_force",
+                                                        "ice_resistance", "drag_force", "inertia_force")
     assert np.abs(np.where(time <= 200, x + 600 - time, x + 400)).max() < 1e-9
     assert np.abs(np.where(time <= 200, y + 200, y + 200 - (time - 200))).max() < 1e-9
     assert np.ptp(yaw) == 0
@@ -130,10 +151,15 @@ def test_a_prescribed_body_follows_its_waypoints(tmp_path):
 
 
 def test_a_wall_or_a_pier_on_the_way_is_refused(tmp_path):
-    walled = changed(VESSEL, domain__ends="wall", domain__sides="wall", tow={"mode": "speed", "speed": 1, "waypoints": [[-400, -200], [-400, 500]]})
+    walled = changed(VESSEL,
+                     domain__ends="wall",
+                     domain__sides="wall",
+                     tow={"mode": "speed", "speed": 1, "waypoints": [[-400, -200], [-400, 500]]})
     r = run(tmp_path, walled, code=CASE, name="a")
     assert "into a wall" in r.result.stderr
-    pier = changed(VESSEL, ice__concentration=0, floes=[{"shape": "disc", "length": 20, "x": -400, "y": 100, "fixed": True}],
+    pier = changed(VESSEL,
+                   ice__concentration=0,
+                   floes=[{"shape": "disc", "length": 20, "x": -400, "y": 100, "fixed": True}],
                    tow={"mode": "speed", "speed": 1, "waypoints": [[-400, -200], [-400, 500]]})
     r = run(tmp_path, pier, code=CASE, name="b")
     assert "on its prescribed path" in r.result.stderr
@@ -149,7 +175,8 @@ def test_the_froude_twin_is_towed_alike(tmp_path):
     twin = tmp_path / "twin.yml"
     twin.write_text(text.stdout)
     four = run(tmp_path, twin, "--quiet", name="four")
-    for name, factor in (("time", 2), ("vessel_x", 4), ("vessel_y", 4), ("vessel_speed", 2), ("vessel_thrust", 64), ("line_tension_2", 64), ("ice_resistance", 64)):
+    for name, factor in (("time", 2), ("vessel_x", 4), ("vessel_y", 4), ("vessel_speed", 2), ("vessel_thrust", 64),
+                         ("line_tension_2", 64), ("ice_resistance", 64)):
         a, b = one.series(name) * factor, four.series(name)
         assert np.abs(a - b).max() <= 1e-9 * np.abs(b).max(), name
     assert one.series("ice_resistance").max() > 0
@@ -163,7 +190,8 @@ def test_a_lead_goes_round_the_corners(tmp_path):
         centre = run(tmp_path, c, "--quiet", name=name).dataset("/frames/pose")[0][:, :2]
         distance = np.full(len(centre), np.inf)
         # 500 m from (-600, -200) to the first way-point, and 300 of the 390 m to the second.
-        for p, q in (((-600, -200), (-100, -200)), ((-100, -200), (-100 + 300 * 250 / np.hypot(250, 300), -200 + 300 * 300 / np.hypot(250, 300)))):
+        for p, q in (((-600, -200), (-100, -200)), ((-100, -200), (-100 + 300 * 250 / np.hypot(250, 300),
+                                                                   -200 + 300 * 300 / np.hypot(250, 300)))):
             p, d = np.array(p), np.subtract(q, p)
             s = np.clip((centre - p) @ d / (d @ d), 0, 1)
             distance = np.minimum(distance, np.hypot(*(centre - p - s[:, None] * d).T))
@@ -173,11 +201,19 @@ def test_a_lead_goes_round_the_corners(tmp_path):
 
 def test_a_vessel_in_a_moving_window(tmp_path):
     """Towards -x, round two corners, with ice that enters ahead: the window goes along, and all balances hold."""
-    case = changed(VESSEL, run__duration=1000, body={"length": 80, "draft": 30}, domain={"frame": "geographic", "length": 900, "width": 700, "ends": "moving", "sides": "periodic"},
-                   ice={"concentration": 0.4, "size": 40, "thickness": 1}, tow__waypoints=[[-350, 0], [-500, 80], [-2000, 80]], water=None)
+    case = changed(VESSEL,
+                   run__duration=1000,
+                   body={"length": 80, "draft": 30},
+                   domain={"frame": "geographic", "length": 900, "width": 700, "ends": "moving", "sides": "periodic"},
+                   ice={"concentration": 0.4, "size": 40, "thickness": 1},
+                   tow__waypoints=[[-350, 0], [-500, 80], [-2000, 80]],
+                   water=None)
     r = run(tmp_path, case, "--quiet")
-    tow, ice, drag, inertia, thrust, vdrag, vinertia, vline = r.series("tow_force", "ice_resistance", "drag_force", "inertia_force", "vessel_thrust", "vessel_drag", "vessel_inertia", "vessel_line")
-    assert np.abs(tow - ice - drag - inertia).max() <= 1e-9 * np.abs([tow, ice, drag, inertia]).max() and np.abs(ice).max() > 1e3
+    tow, ice, drag, inertia, thrust, vdrag, vinertia, vline = r.series("tow_force", "ice_resistance", "drag_force",
+                                                                       "inertia_force", "vessel_thrust", "vessel_drag",
+                                                                       "vessel_inertia", "vessel_line")
+    assert np.abs(tow - ice - drag -
+                  inertia).max() <= 1e-9 * np.abs([tow, ice, drag, inertia]).max() and np.abs(ice).max() > 1e3
     assert np.abs(thrust - vdrag - vinertia - vline).max() <= 1e-9 * np.abs([thrust, vdrag, vinertia, vline]).max()
     assert r.series("body_x")[-1] < -300 and np.nansum(r.series("window_renewed")) > 0
     assert run(tmp_path, r.dir / "case.resolved.yml", "--quiet", name="again").hash == r.hash

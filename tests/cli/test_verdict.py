@@ -1,18 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""The window of a run as a user meets it: a start that jerks the line, one that does not, and what the verdict says of each."""
+"""The window of a run as a user meets it: a start that jerks the line, one that does not, and what the verdict says of
+each."""
 import math
 import re
 
 import pytest
 from harness import CASE, DONE, ROOT, TOW, call, changed, run, write_case
 
-# A disc of 80 m on a line of 400 m, almost in open water: 3 million kg per metre of draft and a period of a minute and a half.
+# A disc of 80 m on a line of 400 m, almost in open water: 3 million kg per metre of draft and a period of a minute and
+# a half.
 BERG = {
     "run": {"dt": 1, "duration": 1500},
     "domain": {"frame": "geographic", "length": 1500, "width": 400, "ends": "open", "sides": "periodic"},
-    "ice": {"concentration": 0.2, "shape": "polygons", "sides": 6, "size": 30, "thickness": 1, "friction": 0.35, "restitution": 0, "shake": 2},
+    "ice": {
+        "concentration": 0.2, "shape": "polygons", "sides": 6, "size": 30, "thickness": 1, "friction": 0.35,
+        "restitution": 0, "shake": 2
+    },
     "body": {"shape": "disc", "length": 80, "draft": 60, "x": -500, "y": 0},
-    "tow": {"mode": "line", "speed": 0.5, "direction": 0, "line_length": 400, "line": {"type": "dyneema", "diameter": "150 mm", "breaking_load": 0}},
+    "tow": {
+        "mode": "line", "speed": 0.5, "direction": 0, "line_length": 400,
+        "line": {"type": "dyneema", "diameter": "150 mm", "breaking_load": 0}
+    },
     "output": {"frame_interval": 1500},
 }
 
@@ -41,7 +49,8 @@ def ramp_of(r):
 
 def test_a_ramp_that_is_not_given_follows_from_the_line(slow, tmp_path):
     checked = call("check", write_case(tmp_path, BERG))
-    assert checked.returncode == DONE and "at least 2 periods: ok" in checked.stdout and "swings on its line" not in checked.stdout
+    assert (checked.returncode == DONE and "at least 2 periods: ok" in checked.stdout
+            and "swings on its line" not in checked.stdout)
     expected = 2 * period({"result": checked})
     assert ramp_of(slow) == pytest.approx(expected, rel=1e-3) and expected > 80 / 0.5
     vx = slow.series("body_vx")
@@ -56,20 +65,23 @@ def test_a_short_ramp_is_told_by_check_and_by_the_run(jerked, tmp_path):
 
 
 def test_the_start_is_not_in_the_means(slow, jerked):
-    """What the jerk leaves in the mean of the tow force is less than its interval says, or the verdict is not steady."""
+    """What the jerk leaves in the mean of the tow force is less than its interval says, or the verdict is not
+    steady."""
     s, w = jerked.summary, jerked.summary["window"]
     assert s["start_peak_line_tension_n"] > 5 * s["mean_line_tension_n"] > 0
     assert s["start_peak_line_tension_n"] > 2 * slow.summary["start_peak_line_tension_n"]
     assert s["peak_line_tension_n"] < s["start_peak_line_tension_n"]
     time, tension, tow = jerked.series("time", "line_tension", "tow_force")
     inside = time >= w["start_s"]
-    assert s["peak_line_tension_n"] == tension[inside].max() and s["start_peak_line_tension_n"] == tension[~inside].max()
+    assert s["peak_line_tension_n"] == tension[inside].max() and s["start_peak_line_tension_n"] == tension[~inside].max(
+    )
     assert s["mean_tow_force_n"] == pytest.approx(tow[inside].mean(), rel=1e-12)
     x, n = tow[inside], inside.sum()
     quarters = [x[n * k // 4:n * (k + 1) // 4].mean() for k in range(4)]
     assert w["series"]["tow_force"]["quarters_n"] == pytest.approx(quarters, rel=1e-9)
     good = slow.summary
-    assert w["verdict"] != "steady" or s["mean_tow_force_low_n"] <= good["mean_tow_force_n"] <= s["mean_tow_force_high_n"]
+    assert w["verdict"] != "steady" or s["mean_tow_force_low_n"] <= good["mean_tow_force_n"] <= s[
+        "mean_tow_force_high_n"]
 
 
 def test_a_mean_that_is_not_steady_is_called_so(jerked, tmp_path):
@@ -84,7 +96,8 @@ def test_a_mean_that_is_not_steady_is_called_so(jerked, tmp_path):
 def test_a_berg_adrift_is_no_steady_tow(tmp_path):
     tow = {**BERG["tow"], "ramp": 5, "line": {"type": "dyneema", "diameter": "150 mm"}}
     r = run(tmp_path, changed(BERG, tow=tow, run__duration=600))
-    assert r.summary["window"]["verdict"] == "not steady" and "nothing tows the body since" in r.summary["window"]["reason"]
+    assert r.summary["window"]["verdict"] == "not steady" and "nothing tows the body since" in r.summary["window"][
+        "reason"]
 
 
 def test_a_run_within_its_ramp_has_no_window(tmp_path):
@@ -96,7 +109,8 @@ def test_a_run_within_its_ramp_has_no_window(tmp_path):
 def test_the_width_of_the_domain_is_told(tmp_path):
     narrow = changed(BERG, ice__concentration=0.85)
     checked = call("check", write_case(tmp_path, narrow))
-    assert re.search(r"domain width +5 body widths, 13\.\d floe sizes, periodic images: arches of rigid floes POSSIBLE", checked.stdout)
+    assert re.search(r"domain width +5 body widths, 13\.\d floe sizes, periodic images: arches of rigid floes POSSIBLE",
+                     checked.stdout)
     assert "domain.width: 5 body widths of 85 % ice, and periodic images can carry arches" in checked.stdout
     wide = call("check", write_case(tmp_path, changed(narrow, domain__width=2500)))
     assert "arches of rigid floes not expected" in wide.stdout and "can carry arches" not in wide.stdout
@@ -108,14 +122,23 @@ def test_packed_ice_that_reaches_the_end_wall_is_told(tmp_path):
     basin = ROOT / "cases/basin/basin-80.yml"
     for duration, wanted in ((165, False), (360, True)):
         checked = call("check", basin, "--set", f"run.duration={duration}")
-        assert checked.returncode == DONE and re.search(r"wall ahead +reached by packed ice \(0\.9\) at about 206 s, after 25\.8 m of tow \(estimate\)", checked.stdout)
+        assert checked.returncode == DONE and re.search(
+            r"wall ahead +reached by packed ice \(0\.9\) at about 206 s, after 25\.8 m of tow \(estimate\)",
+            checked.stdout)
         assert ("reaches the wall at about 206 s, 179 s at the earliest" in checked.stdout) == wanted
-        assert re.search(r"domain\.length: .* the end is at 360 s", checked.stdout) if wanted else "domain.length" not in checked.stdout
-    # 80 % of ice, 8 m to the wall, a body of half the width: 8 m / (1 + 0.5 * 0.8/0.1) = 1.6 m, at 0.3 m/s from the ramp of 1 s on.
-    case = changed(TOW, run__duration=8, domain={"length": 12, "width": 4}, ice={"concentration": 0.8, "size": 0.5, "thickness": 0.04}, body={"length": 2, "x": 3, "draft": 0.5},
+        assert re.search(r"domain\.length: .* the end is at 360 s",
+                         checked.stdout) if wanted else "domain.length" not in checked.stdout
+    # 80 % of ice, 8 m to the wall, a body of half the width: 8 m / (1 + 0.5 * 0.8/0.1) = 1.6 m, at 0.3 m/s from the
+    # ramp of 1 s on.
+    case = changed(TOW,
+                   run__duration=8,
+                   domain={"length": 12, "width": 4},
+                   ice={"concentration": 0.8, "size": 0.5, "thickness": 0.04},
+                   body={"length": 2, "x": 3, "draft": 0.5},
                    tow={"mode": "line", "speed": 0.3, "ramp": 1, "line_length": 2, "line_stiffness": 500})
     long = run(tmp_path, case, name="long")
     said = [w for w in long.summary["warnings"] if "reaches the wall" in w]
-    assert len(said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
+    assert len(
+        said) == 1 and "at about 5.8" in said[0] and "the end is at 8 s" in said[0] and said[0] in long.result.stdout
     short = run(tmp_path, case, "--steps", 45, name="short")
     assert not any("reaches the wall" in w for w in short.summary["warnings"])

@@ -19,7 +19,11 @@ PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test
 def run(tmp_path_factory):
     subprocess.run(["make", "-s", str(PROGRAM)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
     folder = tmp_path_factory.mktemp("run")
-    done = subprocess.run([ROOT / PROGRAM, "write", folder], check=True, stdout=subprocess.PIPE, text=True, errors="replace")
+    done = subprocess.run([ROOT / PROGRAM, "write", folder],
+                          check=True,
+                          stdout=subprocess.PIPE,
+                          text=True,
+                          errors="replace")
     (folder / "table.txt").write_text(done.stdout, encoding="utf-8")
     return folder
 
@@ -90,9 +94,10 @@ def test_summary_is_json_with_every_promised_number(run):
         raise ValueError(f"{name} is not JSON")
 
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"), parse_constant=no_constant)
-    numbers = """n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n mean_ice_resistance_se_n
-        mean_tow_force_n max_overlap_m unconverged_steps mean_sweeps contacts_mean ns_per_floe_step momentum_residual
-        concentration mean_drag_force_n mean_ice_resistance_budget_n contact_work_j positive_work_steps floes_outside
+    numbers = """""n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n
+        mean_ice_resistance_se_n mean_tow_force_n max_overlap_m unconverged_steps mean_sweeps
+        contacts_mean ns_per_floe_step momentum_residual concentration mean_drag_force_n
+        mean_ice_resistance_budget_n contact_work_j positive_work_steps floes_outside
         p95_ice_resistance_n p99_ice_resistance_n peak_ice_resistance_n sd_ice_resistance_n""".split()
     for name in numbers:
         assert isinstance(summary[name], (int, float)), name
@@ -125,6 +130,7 @@ def test_the_printed_table_says_the_same(run):
     assert told == pytest.approx([force, low, high], rel=1e-3)
     assert f"{summary['window']['start_s']:g} to 60 s (found by MSER-5)" in table
     assert "computed / measured = 2" in table
-    assert "detect 3.6 %, colour 7.1 %, forces 10.7 %, solve 14.3 %, advance 17.9 %, exchange 21.4 %, output 25.0 %" in table
+    shares = "detect 3.6 %, colour 7.1 %, forces 10.7 %, solve 14.3 %, advance 17.9 %, exchange 21.4 %, output 25.0 %"
+    assert shares in table
     assert summary["state_hash"] in table
     assert "warning" not in table

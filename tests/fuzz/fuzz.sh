@@ -1,8 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; a second word "keep" in place of the seconds puts the smallest set of inputs that
-# reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB and 150 files. Found inputs stay in build/fuzz/found/NAME; one that breaks
-# something is in build/fuzz/broken/: mend the program and keep the input.
+# libFuzzer over one harness: tests/fuzz/fuzz.sh NAME [SECONDS]; the word "keep" in place of the seconds puts the
+# smallest set of inputs that reaches what all found inputs reach into tests/fuzz/corpus/NAME, up to 20 kB and 150
+# files. Found inputs stay in build/fuzz/found/NAME; one that breaks something is in build/fuzz/broken/: mend the
+# program and keep the input.
 set -eu
 name=$1 what=${2:-60}
 build=build/fuzz found=build/fuzz/found/$name kept=tests/fuzz/corpus/$name
@@ -16,15 +17,27 @@ TMPDIR=$(mktemp -d)
 export TMPDIR
 trap 'rm -rf "$TMPDIR"' EXIT
 
+# Keys, their last parts and the words of their choices; in the list a blank separates a name from the text after it.
+words_of_keys() {
+    build/release/bergtow --list-keys | awk '$1 ~ /^[a-z][a-z_0-9.]*$/ {
+        n = split($1, part, ".")
+        print part[n] ": "
+        print $1
+        for (i = 3; i < 9; i++) if ($i ~ /^[a-z]+$/) print $i
+    }' | sort -u | awk '{print "\"" $0 "\""}'
+}
+
 # Words of the input: keys, choices, units.
 words=$build/$name.dict
 case $name in
 case | setup | study)
-    # In the list of keys a name is cut from the text after it by a blank.
-    build/release/bergtow --list-keys | awk '$1 ~ /^[a-z][a-z_0-9.]*$/ {n = split($1, p, "."); print p[n] ": "; print $1; for (i = 3; i < 9; i++) if ($i ~ /^[a-z]+$/) print $i}' | sort -u |
-        awk '{print "\"" $0 "\""}' >"$words"
-    printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' 'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>"$words" ;;
-outlines) printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness bergtow frame crs name EPSG:32633 EPSG:3413 EPSG:3857 CRS84 origin coordinates metres '[[0,0],[9,0],[0,9]]' null 1e308 >"$words" ;;
+    words_of_keys >"$words"
+    printf '"%s"\n' ' mm' ' km' ' kN' ' deg' ' kn' '1e300' '-1' '1e-9' none 'from: ' 'to: ' 'parameters: ' \
+        'variants: ' 'with: ' 'repeats: ' '[[0, 0], [1, 0], [0, 1]]' >>"$words" ;;
+outlines)
+    printf '"%s"\n' FeatureCollection features Feature geometry Polygon MultiPolygon coordinates properties thickness \
+        bergtow frame crs name EPSG:32633 EPSG:3413 EPSG:3857 CRS84 origin coordinates metres '[[0,0],[9,0],[0,9]]' \
+        null 1e308 >"$words" ;;
 table) printf '"%s"\n' 't,u,v' ' m/s' ' kn' ' s' ' h' '1e308' '1e-308' '#' >"$words" ;;
 *) printf '"%s"\n' '\x00' >"$words" ;;
 esac
@@ -44,6 +57,6 @@ if [ "$what" = keep ]; then
     rm -rf "$merged"
     du -sb "$kept"
 else
-    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow -dict="$words" -artifact_prefix=$build/broken/"$name"- \
-        -print_final_stats=1 "$found" "$kept" </dev/null
+    $build/fuzz_"$name" -max_total_time="$what" -timeout=60 -rss_limit_mb=3000 -max_len=$most -len_control=$slow \
+        -dict="$words" -artifact_prefix=$build/broken/"$name"- -print_final_stats=1 "$found" "$kept" </dev/null
 fi

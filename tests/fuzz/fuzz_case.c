@@ -9,14 +9,17 @@
 #include "bergtow/field.h"
 #include "field/lead.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "bergtow/world.h"
 #include "case/case_check.h"
 #include "partition/domain.h"
 #include "fuzz.h"
 
 /// Files that a case names are left alone: what they hold is not part of the input.
-static bool names_files(const bt_case *c) { return c->ice.field || c->ice.outlines || c->water.current_table || c->air.wind_table; }
+static bool names_files(const bt_case *c)
+{
+    return c->ice.field || c->ice.outlines || c->water.current_table || c->air.wind_table;
+}
 
 static void read_again(const bt_case *c)
 {
@@ -59,11 +62,12 @@ static void run_a_little(const bt_case *c, const bt_field *f, bt_errors *err)
     const bt_status status = bt_setup_world(c, f, &w, &roster, err);
     if (status == BT_OK) {
         bt_domain_create(w, &bt_comm_alone);
-        bt_tiles_begin(w);
+        bt_cells_begin(w);
         const int64_t n = bt_case_steps(c);
         for (int i = 0; i < 3 && i < n; i++) bt_world_step(w);
         for (bt_idx i = 0; i < w->bodies.n; i++)
-            bt_fuzz_check(isfinite(w->bodies.pose[i].x) && isfinite(w->bodies.pose[i].y), "a pose is not finite after three steps");
+            bt_fuzz_check(isfinite(w->bodies.pose[i].x) && isfinite(w->bodies.pose[i].y),
+                          "a pose is not finite after three steps");
     }
     bt_fuzz_told(status, err);
     bt_roster_free(&roster);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// A checkpoint whose seal is sound and whose contents are anything: refused with a message, or a defined run.
+// A checkpoint whose checksum is sound and whose contents are anything: refused with a message, or a defined run.
 //
-// The seal, a digest of every byte, lets no altered byte through, so the arrays of real checkpoints are altered behind it. The input: a byte for the run that
-// left the checkpoint, one for the way in (most go in as arrays; some into a file with a new seal, which is then taken up as the program does it, with
-// result.h5 and all), then edits of 12 bytes each: which array (2), what is done to it, where (2), and a value in a few forms. (Damaged HDF5 under a
-// sound seal is another matter, as for ice fields: the library is not made for hostile bytes.)
+// The checksum, a digest of every byte, lets no altered byte through, so the arrays of real checkpoints are altered
+// behind it. The input: a byte for the run that left the checkpoint, one for the way in (most go in as arrays; some
+// into a file with a new checksum, which is then taken up as the program does it, with result.h5 and all), then edits
+// of 12 bytes each: which array (2), what is done to it, where (2), and a value in a few forms. (Damaged HDF5 under a
+// sound checksum is another matter, as for ice fields: the library is not made for hostile bytes.)
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,15 +21,26 @@
 #include "fuzz.h"
 #include "run/run_parts.h"
 
-static const struct { const char *text; int64_t steps; } bases[] = {
-    {"run: {dt: 0.1, duration: 3}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.5, size: 1, thickness: 0.05, crushing: {pressure: 20 kPa}}\nbody: {x: 3, length: 1}\n"
-     "tow: {mode: line, speed: 0.5, ramp: 0, line_length: 2, line: {branches: 2}, branch2: {breaking_load: 1}, waypoints: [[5.2, 0], [8, 1]]}\n"
-     "output: {panels: true, sample_every: 3, frame_interval: 0.5}\nsolver: {tile: 2.5, max_sweeps: 20}\n", 14},
-    {"run: {dt: 0.125, duration: 5}\ndomain: {frame: geographic, length: 20, width: 8, ends: moving, sides: periodic, ahead: 10}\nice: {concentration: 0.3, size: 1.5, thickness: 0.04}\n"
-     "body: {length: 2, draft: 0.5}\ntow: {mode: thrust, speed: 1.5, ramp: 0.5, line_length: 3, vessel: {mass: 800, bollard_pull: 600, free_speed: 3}}\n"
-     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\nair: {wind_x: 5}\nsolver: {tile: 2, max_sweeps: 20}\n", 24},
-    {"run: {dt: 0.1, duration: 2}\ndomain: {length: 8, width: 8, ends: periodic, sides: open}\nice: {concentration: 0.5, size: 1, restitution: 0.3, x_max: 5}\n"
-     "floes: [{shape: square, length: 1, x: 6.5, y: 0, vx: -1, thickness: 0.3}]\nbody: {shape: none}\nwater: {current_x: 0.4}\nsolver: {max_sweeps: 20}\n", 9},
+static const struct { const char *text; int64_t steps;
+} bases[] = {
+    {"run: {dt: 0.1, duration: 3}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.5, size: 1, thickness: 0.05, "
+     "crushing: {pressure: 20 kPa}}\nbody: {x: 3, length: 1}\n"
+     "tow: {mode: line, speed: 0.5, ramp: 0, line_length: 2, line: {branches: 2}, branch2: {breaking_load: 1}, "
+     "waypoints: [[5.2, 0], [8, 1]]}\n"
+     "output: {panels: true, sample_every: 3, frame_interval: 0.5}\nsolver: {tile: 2.5, max_sweeps: 20}\n",
+     14},
+    {"run: {dt: 0.125, duration: 5}\ndomain: {frame: geographic, length: 20, width: 8, ends: moving, sides: periodic, "
+     "ahead: 10}\nice: {concentration: 0.3, size: 1.5, thickness: 0.04}\n"
+     "body: {length: 2, draft: 0.5}\ntow: {mode: thrust, speed: 1.5, ramp: 0.5, line_length: 3, vessel: {mass: 800, "
+     "bollard_pull: 600, free_speed: 3}}\n"
+     "water: {latitude: 75, tide: {major: 0.05, minor: 0.02, period: 60}}\nair: {wind_x: 5}\nsolver: {tile: 2, "
+     "max_sweeps: 20}\n",
+     24},
+    {"run: {dt: 0.1, duration: 2}\ndomain: {length: 8, width: 8, ends: periodic, sides: open}\nice: {concentration: "
+     "0.5, size: 1, restitution: 0.3, x_max: 5}\n"
+     "floes: [{shape: square, length: 1, x: 6.5, y: 0, vx: -1, thickness: 0.3}]\nbody: {shape: none}\nwater: "
+     "{current_x: 0.4}\nsolver: {max_sweeps: 20}\n",
+     9},
 };
 enum { N_BASES = sizeof bases / sizeof *bases, EDIT = 12, STEPS = 3, MOST_ROWS = 200 };
 
@@ -72,8 +84,13 @@ static void make_bases(void)
         must(bt_case_read(&c, f.path, NULL, 0, &err), &err);
         bt_fuzz_close(&f);
         kept_run *r = &kept[k];
-        bt_fuzz_check(asprintf(&r->dir, "%s/%d", folder, k) > 0 && asprintf(&r->result, "%s/%d.h5", folder, k) > 0, "no memory");
-        must(bt_run(&bt_comm_alone, &c, &(bt_run_options){.dir = r->dir, .threads = 1, .max_steps = bases[k].steps, .quiet = true, .dump_step = -1}, &err), &err);
+        bt_fuzz_check(asprintf(&r->dir, "%s/%d", folder, k) > 0 && asprintf(&r->result, "%s/%d.h5", folder, k) > 0,
+                      "no memory");
+        must(bt_run(&bt_comm_alone, &c,
+                    &(bt_run_options){
+                        .dir = r->dir, .threads = 1, .max_steps = bases[k].steps, .quiet = true, .dump_step = -1},
+                    &err),
+             &err);
         bt_case_free(&c);
         char *path = bt_file_join(r->dir, BT_CHECKPOINT_FILE), *result = bt_file_join(r->dir, "result.h5");
         must(bt_snapshot_read(&r->state, path, &err), &err);
@@ -96,14 +113,16 @@ static uint64_t bits_of(const uint8_t *p)
 
 static double real_of(const uint8_t *p)
 {
-    static const double marks[] = {0, 1, -1, 0.5, NAN, INFINITY, -INFINITY, 1e300, -1e300, 1e-300, 9.3e18, -9.3e18, 2147483648.0, 1e9, 1e15};
+    static const double marks[] = {0,      1,      -1,     0.5,     NAN,          INFINITY, -INFINITY, 1e300,
+                                   -1e300, 1e-300, 9.3e18, -9.3e18, 2147483648.0, 1e9,      1e15};
     const int16_t i = (int16_t)(p[0] | p[1] << 8);
     return p[2] < sizeof marks / sizeof *marks ? marks[p[2]] : i / 16.0;
 }
 
 static int64_t whole_of(const uint8_t *p)
 {
-    static const int64_t marks[] = {0, 1, -1, 2, 255, 65535, INT32_MAX, INT32_MIN, INT64_MAX, INT64_MIN, 1000000000, 1 << 20};
+    static const int64_t marks[] = {0,         1,         -1,        2,         255,        65535,
+                                    INT32_MAX, INT32_MIN, INT64_MAX, INT64_MIN, 1000000000, 1 << 20};
     return p[2] < sizeof marks / sizeof *marks ? marks[p[2]] : (int16_t)(p[0] | p[1] << 8);
 }
 
@@ -121,7 +140,8 @@ static void set_number(bt_item *i, uint64_t at, const uint8_t *value)
 /// Another shape with the bytes there are, and zeros behind them.
 static void reshape(bt_item *i, bt_item_type type, int64_t n, int width)
 {
-    const size_t had = (size_t)i->n * (size_t)i->width * bt_item_size(i->type), has = (size_t)n * (size_t)width * bt_item_size(type);
+    const size_t had = (size_t)i->n * (size_t)i->width * bt_item_size(i->type),
+                 has = (size_t)n * (size_t)width * bt_item_size(type);
     void *data = bt_alloc(has, 1);
     memcpy(data, i->data, had < has ? had : has);
     free(i->data);
@@ -164,7 +184,9 @@ static void edit(bt_snapshot *s, const uint8_t *e)
         break;
     case ROW_OF: {
         const size_t row = (size_t)i->width * size;
-        if (count && row) memmove((char *)i->data + at / (uint64_t)i->width * row, (char *)i->data + bits % (uint64_t)i->n * row, row);
+        if (count && row)
+            memmove((char *)i->data + at / (uint64_t)i->width * row, (char *)i->data + bits % (uint64_t)i->n * row,
+                    row);
         break;
     }
     case ROWS: reshape(i, i->type, (int64_t)(bits % MOST_ROWS), i->width); break;
@@ -263,11 +285,14 @@ static bool take_up_arrays(bt_snapshot *s)
 static bool take_up_file(const kept_run *r, const bt_snapshot *s)
 {
     bt_errors err = {0};
-    char *path = bt_file_join(r->dir, BT_CHECKPOINT_FILE), *before = bt_file_join(r->dir, BT_CHECKPOINT_BEFORE), *result = bt_file_join(r->dir, "result.h5");
+    char *path = bt_file_join(r->dir, BT_CHECKPOINT_FILE), *before = bt_file_join(r->dir, BT_CHECKPOINT_BEFORE),
+         *result = bt_file_join(r->dir, "result.h5");
     unlink(before);
     must(bt_file_copy(r->result, result, &err), &err);
     must(bt_snapshot_write(s, path, &err), &err);
-    const bt_status status = bt_run_resume(&bt_comm_alone, &(bt_run_options){.dir = r->dir, .threads = 1, .max_steps = STEPS, .quiet = true, .dump_step = -1}, &err);
+    const bt_status status = bt_run_resume(
+        &bt_comm_alone,
+        &(bt_run_options){.dir = r->dir, .threads = 1, .max_steps = STEPS, .quiet = true, .dump_step = -1}, &err);
     bt_fuzz_told(status, &err);
     free(path);
     free(before);

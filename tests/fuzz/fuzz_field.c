@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Any numbers in an HDF5 field file that is sound as such. (Damaged HDF5 is another matter: the library is not made for hostile bytes.)
+// Any numbers in an HDF5 field file that is sound as such. (Damaged HDF5 is another matter: the library is not made for
+// hostile bytes.)
 //
-// The input: a byte for ice.nonconvex, four for the numbers of rows of offsets, vertices, pose and thickness, then the values as doubles. So that
-// the fuzzer finds its way, small whole numbers stand as themselves: a double is i/16 of a 16-bit integer i unless that is one of a few marks.
+// The input: a byte for ice.nonconvex, four for the numbers of rows of offsets, vertices, pose and thickness, then the
+// values as doubles. So that the fuzzer finds its way, small whole numbers stand as themselves: a double is i/16 of a
+// 16-bit integer i unless that is one of a few marks.
 #include <hdf5.h>
 #include <math.h>
 #include <stdlib.h>
@@ -46,8 +48,11 @@ static void put(hid_t file, const char *name, hsize_t rows, hsize_t columns, boo
     }
     const hsize_t dims[2] = {rows, columns};
     const hid_t space = H5Screate_simple(columns > 1 ? 2 : 1, dims, NULL);
-    const hid_t d = H5Dcreate2(file, name, whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    if (rows > 0) H5Dwrite(d, whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, whole ? (void *)integer : (void *)real);
+    const hid_t d = H5Dcreate2(file, name, whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, space, H5P_DEFAULT,
+                               H5P_DEFAULT, H5P_DEFAULT);
+    if (rows > 0)
+        H5Dwrite(d, whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                 whole ? (void *)integer : (void *)real);
     H5Dclose(d);
     H5Sclose(space);
 }
@@ -56,7 +61,8 @@ static void write_file(const char *path, source *s)
 {
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
     bt_fuzz_check(file >= 0, "HDF5 cannot write the file");
-    const hid_t group = H5Gcreate2(file, "/floes", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), scalar = H5Screate(H5S_SCALAR);
+    const hid_t group = H5Gcreate2(file, "/floes", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                scalar = H5Screate(H5S_SCALAR);
     const hsize_t rows[4] = {(hsize_t)byte_of(s), (hsize_t)byte_of(s), (hsize_t)byte_of(s), (hsize_t)byte_of(s)};
     const hid_t a = H5Acreate2(group, "ice_area", H5T_NATIVE_DOUBLE, scalar, H5P_DEFAULT, H5P_DEFAULT);
     const double area = number_of(s);
@@ -89,8 +95,11 @@ void bt_fuzz_field(const uint8_t *data, size_t n)
         const int corners = (int)(f.offsets[i + 1] - f.offsets[i]);
         const double *v = f.vertices + 2 * f.offsets[i];
         bt_parts parts;
-        bt_fuzz_check(nonconvex == BT_NONCONVEX_SPLIT ? bt_outline_split(corners, v, &parts) : bt_outline_convex(corners, v), "an outline was accepted that is no floe");
-        bt_fuzz_check(f.area[i] > 0 && isfinite(f.pose[3 * i]) && f.thickness[i] > 0 && isfinite(f.thickness[i]), "a floe of no place, area or thickness");
+        bt_fuzz_check(nonconvex == BT_NONCONVEX_SPLIT ? bt_outline_split(corners, v, &parts)
+                                                      : bt_outline_convex(corners, v),
+                      "an outline was accepted that is no floe");
+        bt_fuzz_check(f.area[i] > 0 && isfinite(f.pose[3 * i]) && f.thickness[i] > 0 && isfinite(f.thickness[i]),
+                      "a floe of no place, area or thickness");
     }
     bt_fuzz_check(status == BT_OK || f.n == 0, "a refused file left floes");
     bt_field_free(&f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any bytes as GeoJSON outlines. Bits of the first byte: 0, 1 ice.nonconvex; 2 longitude and latitude; 3 periodic ends; 4 geographic frame;
-// 5 as the file says (with 2: metres of the frame).
+// Any bytes as GeoJSON outlines. Bits of the first byte: 0, 1 ice.nonconvex; 2 longitude and latitude; 3 periodic ends;
+// 4 geographic frame; 5 as the file says (with 2: metres of the frame).
 #include <math.h>
 #include <string.h>
 
@@ -36,13 +36,17 @@ static void check_floes(const bt_field *f, bt_nonconvex nonconvex)
         const int n = (int)(f->offsets[i + 1] - f->offsets[i]);
         const double *v = f->vertices + 2 * f->offsets[i], *p = f->pose + 3 * (size_t)i;
         bt_parts parts;
-        bt_fuzz_check(n <= BT_MAX_VERTICES && (nonconvex == BT_NONCONVEX_SPLIT ? bt_outline_split(n, v, &parts) : bt_shape_fault(n, v) == NULL), "an outline was accepted that is no floe");
+        bt_fuzz_check(n <= BT_MAX_VERTICES && (nonconvex == BT_NONCONVEX_SPLIT ? bt_outline_split(n, v, &parts)
+                                                                               : bt_shape_fault(n, v) == NULL),
+                      "an outline was accepted that is no floe");
         char why[BT_ICE_WHY];
         const bt_ice_floe floe = {n, v, p[0], p[1], p[2], f->thickness[i], f->area[i], 1e-6};
         bt_fuzz_check(bt_ice_floe_fault(&floe, why, NULL) == NULL, "a floe beyond the bounds of ice was accepted");
-        bt_fuzz_check(isfinite(p[0]) && isfinite(p[1]) && f->area[i] > 0 && f->thickness[i] > 0, "a floe of no place, area or thickness");
+        bt_fuzz_check(isfinite(p[0]) && isfinite(p[1]) && f->area[i] > 0 && f->thickness[i] > 0,
+                      "a floe of no place, area or thickness");
     }
-    bt_fuzz_check(f->n > 0 && f->concentration >= BT_LEAST_CONCENTRATION && f->concentration <= 1 + 1e-9, "a field of no floe, or of no concentration");
+    bt_fuzz_check(f->n > 0 && f->concentration >= BT_LEAST_CONCENTRATION && f->concentration <= 1 + 1e-9,
+                  "a field of no floe, or of no concentration");
 }
 
 void bt_fuzz_outlines(const uint8_t *data, size_t n)

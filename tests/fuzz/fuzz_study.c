@@ -10,7 +10,8 @@ static void check_member(const bt_study *s, int64_t m)
     bt_member member;
     bt_study_member(s, m, &member);
     bt_fuzz_check(!strchr(member.name, '/') && !strchr(member.name, '.'), "the folder of a member leads elsewhere");
-    for (int i = 0; i < member.n_set; i++) bt_fuzz_check(strchr(member.set[i], '=') != NULL, "an override is not key=value");
+    for (int i = 0; i < member.n_set; i++)
+        bt_fuzz_check(strchr(member.set[i], '=') != NULL, "an override is not key=value");
     bt_fuzz_check(member.seed >= 0, "a seed is out of range");
     bt_member_free(&member);
 }

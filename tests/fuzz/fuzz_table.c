@@ -19,7 +19,8 @@ void bt_fuzz_table(const uint8_t *data, size_t n)
         const double next = i + 1 < t.n ? t.row[3 * i + 3] : 2 * t.row[3 * i];
         double v[2];
         bt_table_at(&t, t.row[3 * i] + 0.3 * (next - t.row[3 * i]), v);
-        bt_fuzz_check(isfinite(v[0]) && isfinite(v[1]) && hypot(v[0], v[1]) <= most * (1 + 1e-12), "a value between rows is beyond both");
+        bt_fuzz_check(isfinite(v[0]) && isfinite(v[1]) && hypot(v[0], v[1]) <= most * (1 + 1e-12),
+                      "a value between rows is beyond both");
     }
     bt_table_free(&t);
     bt_fuzz_close(&f);

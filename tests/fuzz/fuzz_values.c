@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Any keys of a small case set to any values within their ranges, the ends included: what the schema lets through one by one must do no harm together.
+// Any keys of a small case set to any values within their ranges, the ends included: what the schema lets through one
+// by one must do no harm together.
 //
 // The input: a byte for the base case, then a key and a place in its range, a byte each.
 #include <math.h>
@@ -12,12 +13,16 @@
 #include "case/value.h"
 
 static const char *const bases[] = {
-    "run: {dt: 0.1, duration: 1}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.4, size: 1}\nbody: {x: 3, length: 1}\ntow: {speed: 0.1, ramp: 0}\n",
+    "run: {dt: 0.1, duration: 1}\ndomain: {length: 9, width: 6}\nice: {concentration: 0.4, size: 1}\nbody: {x: 3, "
+    "length: 1}\ntow: {speed: 0.1, ramp: 0}\n",
     ("run: {dt: 1, duration: 20}\ndomain: {frame: geographic, length: 300, width: 200, ends: open, sides: periodic}\n"
-    "ice: {concentration: 0.4, size: 40, shape: rectangles, thickness: 1}\nbody: {shape: ship, length: 40, width: 15, draft: 0.5}\n"
-    "tow: {mode: thrust, speed: 1, line_length: 40, vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: 7}}\nwater: {latitude: 75}\n"),
-    ("run: {dt: 0.5, duration: 20}\ndomain: {length: 40, width: 10, ends: moving}\nice: {concentration: 0.3, size: 3, size_law: power, size_min: 2, size_max: 5}\n"
-    "body: {length: 2}\ntow: {mode: line, speed: 0.3}\nlead: {mode: managed, floe_size: 1}\n"),
+     "ice: {concentration: 0.4, size: 40, shape: rectangles, thickness: 1}\nbody: {shape: ship, length: 40, width: 15, "
+     "draft: 0.5}\n"
+     "tow: {mode: thrust, speed: 1, line_length: 40, vessel: {mass: 500 t, bollard_pull: 900 kN, free_speed: "
+     "7}}\nwater: {latitude: 75}\n"),
+    ("run: {dt: 0.5, duration: 20}\ndomain: {length: 40, width: 10, ends: moving}\nice: {concentration: 0.3, size: 3, "
+     "size_law: power, size_min: 2, size_max: 5}\n"
+     "body: {length: 2}\ntow: {mode: line, speed: 0.3}\nlead: {mode: managed, floe_size: 1}\n"),
 };
 enum { N_BASES = sizeof bases / sizeof *bases, MOST = 12 };
 

@@ -34,7 +34,8 @@ static void replay(const char *name, void (*harness)(const uint8_t *, size_t), i
         free(entry[i]);
     }
     if (n >= 0) free(entry);
-    if (done < least) fail_msg("%s: %d inputs, at least %d are kept; start this from the root of the project", folder, done, least);
+    if (done < least)
+        fail_msg("%s: %d inputs, at least %d are kept; start this from the root of the project", folder, done, least);
 }
 
 static void case_files(void **state) { (void)state; replay("case", bt_fuzz_case, 1); }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Fifty runs on two ranks, each killed at a random moment and taken up on 1, 2 or 4 ranks: all end as the run that was never stopped."""
+"""Fifty runs on two ranks, each killed at a random moment and taken up on 1, 2 or 4 ranks: all end as the run that was
+never stopped."""
 import random
 import time
 
@@ -25,7 +26,9 @@ def test_fifty_kills(whole):
     moments, kills, within = random.Random(50), 0, 0
     for k in range(2 * KILLS):
         name = f"k{k}"
-        if not killed_after(seconds * moments.uniform(0.15, 1), 2, "run", "case.yml", "-o", name, "--quiet", "--threads", 1, cwd=folder):
+        if not killed_after(
+                seconds * moments.uniform(0.15, 1), 2, "run", "case.yml", "-o", name, "--quiet", "--threads", 1,
+                cwd=folder):
             continue # over before the kill
         kills += 1
         check_readable(folder / name)

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""20,000 steps through 30,000 floes on two ranks, with checkpoints and rebalancing: memory, residual and time a step stay what they were.
+"""20,000 steps through 30,000 floes on two ranks, with checkpoints and rebalancing: memory, residual and time a step
+stay what they were.
 
-A berg on a line in a moving window, so that it always meets fresh ice and the work of a step is stationary: what grows is a fault.
+A berg on a line in a moving window, so that it always meets fresh ice and the work of a step is stationary: what grows
+is a fault.
 """
 import ctypes
 import os
@@ -19,21 +21,29 @@ CASE = {
     "domain": {"frame": "geographic", "length": 9000, "width": 4500, "ends": "moving", "sides": "periodic"},
     "ice": {"concentration": 0.6, "size": 31, "thickness": 0.5, "thickness_law": "lognormal"},
     "body": {"length": 80, "draft": 30},
-    "tow": {"mode": "line", "speed": 0.8, "ramp": 600, "line_length": 200, "line": {"type": "dyneema", "diameter": "150 mm"}},
-    "output": {"sample_every": 10, "frame_interval": 2000, "checkpoint_steps": 1000, "checkpoint_wall": 0, "progress": "1 s"},
+    "tow": {
+        "mode": "line", "speed": 0.8, "ramp": 600, "line_length": 200,
+        "line": {"type": "dyneema", "diameter": "150 mm"}
+    },
+    "output": {
+        "sample_every": 10, "frame_interval": 2000, "checkpoint_steps": 1000, "checkpoint_wall": 0, "progress": "1 s"
+    },
 }
 WARM_UP = 0.1  # of the steps: first checkpoints, room of lists
-# Of the memory of a rank over the second half; the summary keeps 64 bytes of each step, 0.6 to 1 % here. Before that it grows with the largest of the
-# messages that carry floes to their new ranks: the C library keeps what they free (last at step 7,654, 62 to 67 MB).
+# Of the memory of a rank over the second half; the summary keeps 64 bytes of each step, 0.6 to 1 % here. Before that it
+# grows with the largest of the messages that carry floes to their new ranks: the C library keeps what they free (last
+# at step 7,654, 62 to 67 MB).
 MOST_GROWTH = 0.03
-# Of the time a step: other work on the machine changes it by half and comes and goes. What is sought grows with the steps: a list that is searched each
-# step and gets longer each step would make the last quarter several times the first.
+# Of the time a step: other work on the machine changes it by half and comes and goes. What is sought grows with the
+# steps: a list that is searched each step and gets longer each step would make the last quarter several times the
+# first.
 MOST_DRIFT = 1.6
 
 
 @contextmanager
 def small_pages():
-    """Processes started here, and theirs, get no huge pages: one of them, 2 MB, is 3 % of the memory of a rank, and comes with the first byte of it."""
+    """Processes started here, and theirs, get no huge pages: one of them, 2 MB, is 3 % of the memory of a rank, and
+    comes with the first byte of it."""
     disable_thp, libc = 41, ctypes.CDLL(None)
     assert libc.prctl(disable_thp, 1, 0, 0, 0) == 0
     try:
@@ -114,9 +124,18 @@ def test_memory_residual_and_time_stay(tmp_path):
     seconds = quarters(np.diff(spent) / np.diff(step))
     contacts, sweeps, residual = (quarters(x) for x in r.series("contacts", "sweeps", "momentum_residual"))
     worst = r.series("momentum_residual").max()
-    print(f"{s['n_floes']} floes, {STEPS} steps, {time.monotonic() - began:.0f} s; memory of the ranks {warm.mean(axis=0) / 1e6} MB, growth {100 * growth} %")
-    print(f"processor time a step by quarters {1e3 * seconds} ms; contacts {contacts}, sweeps {sweeps}; momentum residual {residual}, at most {worst:.2g}")
-    print(f"divisions {s['divisions']}, floes moved between ranks {s['moved_floes']}, renewed {s['moving_window']['renewed']}")
+    print(
+        f"{s['n_floes']} floes, {STEPS} steps, {time.monotonic() - began:.0f} s; memory of the ranks "
+        f"{warm.mean(axis=0) / 1e6} MB, growth {100 * growth} %"
+    )
+    print(
+        f"processor time a step by quarters {1e3 * seconds} ms; contacts {contacts}, sweeps {sweeps}; momentum "
+        f"residual {residual}, at most {worst:.2g}"
+    )
+    print(
+        f"divisions {s['divisions']}, floes moved between ranks {s['moved_floes']}, renewed "
+        f"{s['moving_window']['renewed']}"
+    )
     assert (growth < MOST_GROWTH).all()
     # Rounding alone: sums of a thousand contacts, each to 1e-16 of what it exchanges.
     assert worst < 1e-10 and residual[-1] < 3 * residual.min() + 1e-15

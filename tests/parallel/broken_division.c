@@ -3,8 +3,10 @@
 //
 //     mpirun -n 2 broken_division sound|lost|doubled|changed|missing
 //
-// sound: nothing is done to it. lost: nobody owns a floe any more. doubled: two ranks own one. changed: a ghost differs in one bit.
-// missing: a rank that needs a floe does not hold it under its name. The floe is one that both ranks hold; its gid goes to stdout.
+// sound: nothing is done to it. lost: nobody owns a floe any more. doubled: two ranks own one. changed: a ghost differs
+// in one bit.
+// missing: a rank that needs a floe does not hold it under its name. The floe is one that both ranks hold; its gid goes
+// to stdout.
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,17 +18,32 @@
 
 static bt_world *make_world(void)
 {
-    const bt_params p = {.dt = 0.1, .tolerance = 1e-6, .max_sweeps = 100, .warm_start = true, .slop = 1e-3, .position_sweeps = 50, .rest_speed = 1e-3, .size = 1};
+    const bt_params p = {.dt = 0.1,
+                         .tolerance = 1e-6,
+                         .max_sweeps = 100,
+                         .warm_start = true,
+                         .slop = 1e-3,
+                         .position_sweeps = 50,
+                         .rest_speed = 1e-3,
+                         .size = 1};
     bt_world *w = bt_world_create(&p);
     double v[8] = {-0.4, -0.4, 0.4, -0.4, 0.4, 0.4, -0.4, 0.4};
     for (int k = 0; k < 600; k++) {
-        const bt_body_def d = {.motion = BT_DYNAMIC, .n_vertices = 4, .vertices = v, .x = 0.5 + k % 30, .y = 0.5 + k / 30, .vx = k % 7 == 0, .mass = 50, .inertia = 6};
+        const bt_body_def d = {.motion = BT_DYNAMIC,
+                               .n_vertices = 4,
+                               .vertices = v,
+                               .x = 0.5 + k % 30,
+                               .y = 0.5 + k / 30,
+                               .vx = k % 7 == 0,
+                               .mass = 50,
+                               .inertia = 6};
         bt_world_add(w, &d);
     }
     return w;
 }
 
-/// Least gid of a floe that both ranks hold; *mine: this rank owns it. The halo lies on one side: either rank may have all of it.
+/// Least gid of a floe that both ranks hold; *mine: this rank owns it. The halo lies on one side: either rank may have
+/// all of it.
 static bt_gid shared_floe(const bt_world *w, bool *mine)
 {
     for (bt_gid g = 0; g < w->bodies.n_global; g++) {
@@ -63,8 +80,8 @@ int main(int argc, char **argv)
     if (!strcmp(how, "changed") && !mine) w->bodies.vel[i].w = nextafter(w->bodies.vel[i].w, 1);
     if (!strcmp(how, "missing") && !mine) w->bodies.index_of[g] = -1;
     if (!strcmp(how, "changed") || !strcmp(how, "missing")) bt_domain_validate(w);
-    w->tiles->relabel = true;
-    bt_tiles_begin(w);
+    w->cells->relabel = true;
+    bt_cells_begin(w);
     bt_domain_validate(w);
     if (c->rank == 0) printf("sound\n");
     bt_world_free(w);

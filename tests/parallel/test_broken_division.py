@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A floe that is lost or doubled between ranks, or is not the same on both, ends the run with its id: never a wrong result."""
+"""A floe that is lost or doubled between ranks, or is not the same on both, ends the run with its id: never a wrong
+result."""
 import os
 
 import pytest
@@ -23,7 +24,8 @@ def test_a_sound_division():
 
 
 @pytest.mark.parametrize("again", range(3))
-@pytest.mark.parametrize("how, told, count", [("lost", "held by no rank: id {};", 599), ("doubled", "held by several ranks: id {};", 601)])
+@pytest.mark.parametrize("how, told, count", [("lost", "held by no rank: id {};", 599),
+                                              ("doubled", "held by several ranks: id {};", 601)])
 def test_lost_and_doubled(how, told, count, again):
     """More than once: a rank that leaves before the message is out takes the other one down with it."""
     result, gid, more = spoil(how)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The same bits with everything in use at once: a moving window over floes in parts, crushing, a vessel on a bridle that breaks, way-points, tide,
-wind, dynamic tilt, loads on the hull. Each has a test of its own; here one meets the other.
+"""The same bits with everything in use at once: a moving window over floes in parts, crushing, a vessel on a bridle
+that breaks, way-points, tide, wind, dynamic tilt, loads on the hull. Each has a test of its own; here one meets the
+other.
 
-What turned this test red when it was written: an overlap of −0 on one rank and of 0 on two, where a tile had no other contacts than one that just touched.
+What turned this test red when it was written: an overlap of −0 on one rank and of 0 on two, where a tile had no other
+contacts than one that just touched.
 """
 import json
 
@@ -13,13 +15,22 @@ from test_ranks import assert_same, many
 ALL = {
     "run": {"dt": 0.1, "duration": 36},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic", "ahead": 14},
-    "ice": {"concentration": 0.5, "size": 1.2, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal", "friction": 0.3, "restitution": 0.1,
-            "crushing": {"pressure": "2 kPa", "least_length": 0.5}},
+    "ice": {
+        "concentration": 0.5, "size": 1.2, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal",
+        "friction": 0.3, "restitution": 0.1, "crushing": {"pressure": "2 kPa", "least_length": 0.5}
+    },
     "body": {"length": 2, "draft": 0.5},
-    "tow": {"mode": "thrust", "programme": [[0, 0], [2, 0.8], [30, 0.8], [36, 0.5]], "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3, "line_length": 3,
-            "line_stiffness": 2000, "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 150},
-            "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}},
-    "water": {"latitude": 75, "current_x": 0.05, "tilt": "dynamic", "tide": {"major": 0.05, "minor": 0.02, "period": 30, "inclination": 40}},
+    "tow": {
+        "mode": "thrust", "programme": [[0, 0], [2, 0.8], [30, 0.8],
+                                        [36, 0.5]], "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3,
+        "line_length": 3, "line_stiffness": 2000, "line": {"branches": 2,
+                                                           "breaking_load": 0}, "branch2": {"breaking_load": 150},
+        "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
+    },
+    "water": {
+        "latitude": 75, "current_x": 0.05, "tilt": "dynamic",
+        "tide": {"major": 0.05, "minor": 0.02, "period": 30, "inclination": 40}
+    },
     "air": {"wind_x": -3, "wind_y": 3},
     "impact": {"conversion": "crushing", "pressure": "20 kPa"},
     "solver": {"tile": 2.5, "max_sweeps": 40},

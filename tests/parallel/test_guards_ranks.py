@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest overlap of the last state."""
+"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest
+overlap of the last state."""
 import json
 
 import pytest
@@ -32,4 +33,5 @@ def test_the_overlap_of_the_last_state(tmp_path, ranks):
     assert one.summary["max_overlap_m"] > one.series("overlap").max()
     assert mpirun(ranks, "run", write_case(tmp_path, case), "-o", tmp_path / "several", "--quiet").returncode == DONE
     several = json.loads((tmp_path / "several/summary.json").read_text())
-    assert [several[k] for k in ("max_overlap_m", "state_hash")] == [one.summary[k] for k in ("max_overlap_m", "state_hash")]
+    assert [several[k]
+            for k in ("max_overlap_m", "state_hash")] == [one.summary[k] for k in ("max_overlap_m", "state_hash")]

@@ -13,7 +13,14 @@ ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 KEPT = {"output": {"panels": True, "frame_interval": 5}, "run": {"dt": 0.1, "duration": 10}}
 # A body of infinite mass, whose contacts lie in the tiles of the floes, and a free one, whose contacts are one rank's.
 # The first is broad and in many tiles: it hits several floes in a step, found by several threads and ranks.
-CASES = {"speed": changed(TOW, **KEPT, domain={"length": 24, "width": 16}, ice__size=0.5, body={"length": 1.5, "width": 10, "shape": "rectangle", "x": 3}), "line": changed(TOW, **KEPT, tow={"mode": "line", "speed": 0.13, "ramp": 5, "line_length": 3}, body__shape="ship")}
+CASES = {
+    "speed": changed(TOW,
+                     **KEPT,
+                     domain={"length": 24, "width": 16},
+                     ice__size=0.5,
+                     body={"length": 1.5, "width": 10, "shape": "rectangle", "x": 3}),
+    "line": changed(TOW, **KEPT, tow={"mode": "line", "speed": 0.13, "ramp": 5, "line_length": 3}, body__shape="ship")
+}
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -25,8 +32,16 @@ def one(request, tmp_path_factory):
 @pytest.mark.parametrize("ranks, threads", [(1, 3), (2, 1), (3, 2)])
 def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     folder, alone = one
-    result = subprocess.run(["mpirun", "--oversubscribe", "-n", str(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}", "--threads", str(threads)],
-                            cwd=folder, env=environment(**ROOT), capture_output=True, text=True, timeout=100)
+    result = subprocess.run([
+        "mpirun", "--oversubscribe", "-n",
+        str(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}", "--threads",
+        str(threads)
+    ],
+                            cwd=folder,
+                            env=environment(**ROOT),
+                            capture_output=True,
+                            text=True,
+                            timeout=100)
     assert result.returncode == DONE, result.stderr
     many = Run(folder / f"out{ranks}", result)
     assert differing(alone.dir / "result.h5", many.dir / "result.h5") == []
@@ -37,8 +52,12 @@ def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
 
 def test_counted_over_the_window_that_is_found(tmp_path):
     """On two ranks, and after stops before the window begins and within it, on other ranks each time."""
-    case = changed(TOW, tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4}, body={"shape": "square", "length": 1.6, "y": 0.5, "x": 3},
-                   run__duration=60, output={"panels": True}, impact__panels=24)
+    case = changed(TOW,
+                   tow={"mode": "line", "speed": 0.13, "ramp": 2, "line_length": 3, "hull_y": 0.4},
+                   body={"shape": "square", "length": 1.6, "y": 0.5, "x": 3},
+                   run__duration=60,
+                   output={"panels": True},
+                   impact__panels=24)
     alone = run(tmp_path, case, "--threads", 1)
     start = assert_counted_over_the_window(alone)
     assert 5 < start < 31

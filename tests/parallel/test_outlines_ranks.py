@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Floes in convex parts on any number of ranks and threads: the same bits. Parts and what their contacts knew travel with the floe.
+"""Floes in convex parts on any number of ranks and threads: the same bits. Parts and what their contacts knew travel
+with the floe.
 
-What turns these tests red: traces that forget which parts they were of, marks of parts left behind in a migration, parts in the order of memory.
+What turns these tests red: traces that forget which parts they were of, marks of parts left behind in a migration,
+parts in the order of memory.
 """
 import json
 
@@ -14,14 +16,22 @@ from test_ranks import assert_same, many
 GROUNDS = {
     "run": {"dt": 0.1, "duration": 10},
     "domain": {"length": 20, "width": 12},
-    "ice": {"concentration": 0.8, "size": 1.2, "size_law": "lognormal", "size_spread": 0.4, "friction": 0.3, "restitution": 0.1},
+    "ice": {
+        "concentration": 0.8, "size": 1.2, "size_law": "lognormal", "size_spread": 0.4, "friction": 0.3,
+        "restitution": 0.1
+    },
     "body": {"x": 4, "length": 2},
     "tow": {"mode": "line", "speed": 0.5, "ramp": 1, "line_length": 2},
     "solver": {"tile": 2, "max_sweeps": 30},
     "output": {"frame_interval": 2.5},
 }
-PERIODIC = changed(GROUNDS, domain={"length": 20, "width": 12, "ends": "periodic", "sides": "periodic"}, body={"shape": "none"}, tow=None,
-                   ice__concentration=0.8, water={"latitude": 75, "current_x": 0.3, "current_y": -0.2}, air={"wind_x": -6, "wind_y": 8})
+PERIODIC = changed(GROUNDS,
+                   domain={"length": 20, "width": 12, "ends": "periodic", "sides": "periodic"},
+                   body={"shape": "none"},
+                   tow=None,
+                   ice__concentration=0.8,
+                   water={"latitude": 75, "current_x": 0.3, "current_y": -0.2},
+                   air={"wind_x": -6, "wind_y": 8})
 CASES = {"line": GROUNDS, "periodic": PERIODIC}
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The same bits on any number of ranks and threads: state hash, every series and every frame, over 500 steps and more in
-which tiles are dealt anew, floes go from rank to rank, and contacts act across ranks.
+"""The same bits on any number of ranks and threads: state hash, every series and every frame, over 500 steps and more
+in which tiles are dealt anew, floes go from rank to rank, and contacts act across ranks.
 
-What turns these tests red: a sum over ranks in double precision, a shared floe that is not brought up to date after a phase, contacts
-in the order of a rank's memory instead of that of the ids, labels that depend on the division, what a contact
-knew of the last step left behind when it goes to another rank. Each was tried.
+What turns these tests red: a sum over ranks in double precision, a shared floe that is not brought up to date after a
+phase, contacts in the order of a rank's memory instead of that of the ids, labels that depend on the division, what a
+contact knew of the last step left behind when it goes to another rank. Each was tried.
 """
 import numpy as np
 import pytest
@@ -12,7 +12,8 @@ import pytest
 from harness import BERGTOW, DONE, PRESS, VALIDATE, Run, changed, differing, run, write_case
 from test_ranks_output import mpirun
 
-# A heavy berg on a line: one rank does its contacts, and the tiles under it go with it. Tiles are small, so that there are many.
+# A heavy berg on a line: one rank does its contacts, and the tiles under it go with it. Tiles are small, so that there
+# are many.
 LINE = {
     "run": {"dt": 0.05, "duration": 25},
     "domain": {"length": 40, "width": 14},
@@ -24,8 +25,8 @@ LINE = {
 }
 # The same berg at a set speed: every rank does its contacts with the floes of its own tiles.
 SPEED = changed(LINE, tow={"speed": 0.3, "ramp": 1, "direction": 8}, ice__restitution=0)
-# Until it jams, and on: floes shoot apart, farther in a step than the margin. At restitution 1 rebounds are lowered island by island,
-# and islands reach over ranks.
+# Until it jams, and on: floes shoot apart, farther in a step than the margin. At restitution 1 rebounds are lowered
+# island by island, and islands reach over ranks.
 JAM = {
     "run": {"dt": 0.05, "duration": 25},
     "domain": {"length": 18, "width": 14, "ends_closing": 0.06, "sides_closing": 0.048},
@@ -33,39 +34,82 @@ JAM = {
     "body": {"shape": "none"},
     "solver": {"tile": 2.5, "max_sweeps": 15},
     "output": {"frame_interval": 2.5},
-    "guard": {"overlap": 0, "escape": False}, # a jam that no one would run on: overlap beyond a floe, floes through the walls
+    # a jam that no one would run on: overlap beyond a floe, floes through the walls
+    "guard": {"overlap": 0, "escape": False},
 }
-# No walls, every force, and floes of very different size; the current, which the tide turns, carries them through tiles and seams.
+# No walls, every force, and floes of very different size; the current, which the tide turns, carries them through tiles
+# and seams.
 SEAMS = {
     "run": {"dt": 0.2, "duration": 100},
     "domain": {"length": 30, "width": 24, "ends": "periodic", "sides": "periodic"},
-    "ice": {"concentration": 0.6, "size": 1, "size_law": "power", "size_min": 0.6, "size_max": 3, "size_exponent": 2, "thickness_law": "lognormal"},
+    "ice": {
+        "concentration": 0.6, "size": 1, "size_law": "power", "size_min": 0.6, "size_max": 3, "size_exponent": 2,
+        "thickness_law": "lognormal"
+    },
     "body": {"shape": "none"},
-    "water": {"latitude": 75, "current_x": 0.2, "current_y": -0.15, "tilt": "dynamic", "tide": {"major": 0.2, "minor": 0.1, "period": 80, "inclination": 30}},
+    "water": {
+        "latitude": 75, "current_x": 0.2, "current_y": -0.15, "tilt": "dynamic",
+        "tide": {"major": 0.2, "minor": 0.1, "period": 80, "inclination": 30}
+    },
     "air": {"wind_x": -6, "wind_y": 8},
     "solver": {"tile": 2},
     "output": {"frame_interval": 10},
 }
 # A berg that goes round a channel without ends.
-ROUND = changed(LINE, domain={"length": 24, "width": 16, "ends": "periodic"}, ice={"concentration": 0.5, "size": 1}, run__duration=50, run__dt=0.1,
-                body__x=3, tow__speed=0.8)
+ROUND = changed(LINE,
+                domain={"length": 24, "width": 16, "ends": "periodic"},
+                ice={"concentration": 0.5, "size": 1},
+                run__duration=50,
+                run__dt=0.1,
+                body__x=3,
+                tow__speed=0.8)
 # The same where the tide turns, in a managed lead: nothing rests, and between the walls the tiles go with the water.
-TIDE = changed(ROUND, run__dt=0.05, run__duration=25, water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}}, tow__mode="line",
+TIDE = changed(ROUND,
+               run__dt=0.05,
+               run__duration=25,
+               water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}},
+               tow__mode="line",
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
-# Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are labelled anew.
-CRUSH = changed(LINE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, ice__thickness_law="lognormal", domain__ends_closing=0.1, run__duration=26)
-# A ring of tiles in packed ice: many lists, and rounds over a part of them. From rest: what drifts as a whole gives no rank more to do than another.
-RING = changed(SEAMS, domain__length=16, domain__width=90, ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal", "start": "rest"})
-CASES = {"line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH, "ring": RING}
+# Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are
+# labelled anew.
+CRUSH = changed(LINE,
+                ice__crushing={"pressure": "2 kPa", "least_length": 0.5},
+                ice__thickness_law="lognormal",
+                domain__ends_closing=0.1,
+                run__duration=26)
+# A ring of tiles in packed ice: many lists, and rounds over a part of them. From rest: what drifts as a whole gives no
+# rank more to do than another.
+RING = changed(SEAMS,
+               domain__length=16,
+               domain__width=90,
+               ice={"concentration": 0.85, "size": 1, "thickness_law": "lognormal", "start": "rest"})
+CASES = {
+    "line": LINE, "speed": SPEED, "jam": JAM, "seams": SEAMS, "round": ROUND, "tide": TIDE, "crush": CRUSH, "ring": RING
+}
 GRID = [(r, t) for r in (1, 2, 3, 4, 7) for t in (1, 2, 4)]
-PAIRS = {"line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1), (4, 2), (7, 1)],
-         "round": [(2, 1), (3, 2), (4, 1)], "tide": [(2, 2), (3, 1)], "crush": [(1, 4), (2, 2), (3, 1)],
-         "ring": [(1, 2), (3, 2), (4, 1)]}
+PAIRS = {
+    "line": GRID, "speed": [(2, 2), (3, 1), (7, 1)], "jam": [(2, 1), (3, 4), (4, 1), (7, 2)], "seams": [(2, 4), (3, 1),
+                                                                                                        (4, 2), (7, 1)],
+    "round": [(2, 1), (3, 2), (4, 1)], "tide": [(2, 2), (3, 1)], "crush": [(1, 4), (2, 2), (3, 1)], "ring": [(1, 2),
+                                                                                                             (3, 2),
+                                                                                                             (4, 1)]
+}
 
 
 def many(folder, ranks, threads, *arguments, name=None, program=BERGTOW):
     name = name or f"out{ranks}x{threads}"
-    result = mpirun(ranks, "run", "case.yml", "-o", name, "--threads", threads, "--quiet", *arguments, program=(program,), cwd=folder, timeout=300)
+    result = mpirun(ranks,
+                    "run",
+                    "case.yml",
+                    "-o",
+                    name,
+                    "--threads",
+                    threads,
+                    "--quiet",
+                    *arguments,
+                    program=(program, ),
+                    cwd=folder,
+                    timeout=300)
     assert result.returncode == DONE, result.stderr
     r = Run(folder / name, result)
     assert (r.summary["ranks"], r.summary["threads"]) == (ranks, threads)
@@ -105,11 +149,13 @@ def test_the_cases_show_what_they_are_for(alone, name):
         assert contacts[-1] > 3 * r.summary["n_floes"] and r.summary["restitution_cut_steps"] > 20
     if name == "seams":
         pose = r.dataset("/frames/pose")
-        assert (np.abs(np.diff(pose[:, :, 0], axis=0)) > 15).any() and (np.abs(np.diff(pose[:, :, 1], axis=0)) > 12).any()
+        assert (np.abs(np.diff(pose[:, :, 0], axis=0)) > 15).any() and (np.abs(np.diff(pose[:, :, 1], axis=0)) >
+                                                                        12).any()
         area = r.dataset("/floes/area")
         assert area.max() > 15 * area.min()
     if name == "crush":
-        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary["max_crushed_depth_m"] < 0.6, r.summary
+        assert r.summary["crushing_steps"] > 100 and r.summary["max_crushing_contacts"] > 20 and 0.02 < r.summary[
+            "max_crushed_depth_m"] < 0.6, r.summary
     if name == "round":
         assert np.ptp(r.series("body_x")) > 24 # the body came by the seam
 
@@ -131,15 +177,17 @@ def test_the_same_bits(alone, name, ranks, threads):
 @pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
                                                    ("ring", 2, 2), ("ring", 4, 1)])
 def test_the_division_is_sound(alone, name, ranks, threads):
-    """In the validation build: every body that several ranks hold is the same there, bit for bit, after each migration and every
-    20 steps; threads share every loop, however few the contacts. And another optimisation gives the same numbers."""
+    """In the validation build: every body that several ranks hold is the same there, bit for bit, after each migration
+    and every 20 steps; threads share every loop, however few the contacts. And another optimisation gives the same
+    numbers."""
     folder, one = alone(name, "--steps", 200)
     write_case(folder, CASES[name])
     assert_same(one, many(folder, ranks, threads, "--steps", 200, name=f"validated{ranks}x{threads}", program=VALIDATE))
 
 
 def test_threads_within_ranks(tmp_path):
-    """So large that each rank has work for a team of threads (1,500 units of two points), with the exchange under way."""
+    """So large that each rank has work for a team of threads (1,500 units of two points), with the exchange under
+    way."""
     case = changed(PRESS, domain__length=100, domain__width=60, run__duration=1.8, solver__max_sweeps=30)
     one = run(tmp_path, case, "--threads", 1, "--quiet")
     assert one.series("contacts").min() > 2 * 1500 and one.series("contacts").max() > 2 * 3000
@@ -147,11 +195,19 @@ def test_threads_within_ranks(tmp_path):
 
 
 HAND = {
-    "run": {"dt": 0.1, "duration": 60}, "domain": {"length": 12, "width": 9, "ends": "periodic"}, "ice": {"concentration": 0}, "body": {"shape": "none"},
+    "run": {"dt": 0.1, "duration": 60},
+    "domain": {"length": 12, "width": 9, "ends": "periodic"},
+    "ice": {"concentration": 0},
+    "body": {"shape": "none"},
     "floes": [{"shape": "disc", "length": 1, "x": 3, "y": 1, "yaw": 20, "vx": 0.3, "vy": 0.2, "yaw_rate": 5}],
 }
 SMALL = {
-    "fewer tiles than ranks": changed(SEAMS, domain__length=7, domain__width=6, ice__size_max=1.5, solver__tile=5, water__current_x=0.5),
+    "fewer tiles than ranks": changed(SEAMS,
+                                      domain__length=7,
+                                      domain__width=6,
+                                      ice__size_max=1.5,
+                                      solver__tile=5,
+                                      water__current_x=0.5),
     "berg in few tiles": changed(LINE, domain__length=14, domain__width=9, solver__tile=5, run__duration=30),
     "one floe": HAND,
     "none": changed(HAND, floes=None),

@@ -10,11 +10,16 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, USAGE, Run, call, changed, differing, environment, run, write_case
+from harness import (BERGTOW, CASE, DONE, IO, SIGNAL, TOW, USAGE, Run, call, changed, differing, environment, run,
+                     write_case)
 
-# More frames than a chunk of the series, more floes than a rank's share, a body and walls; hand-made floes have the ids after the others.
-SHORT = changed(TOW, run__duration=12, output__frame_interval=0.5,
-                floes=[{"shape": "disc", "length": 0.8, "x": 13, "y": 3.4}, {"shape": "rectangle", "length": 0.9, "width": 0.5, "x": 14, "y": -3.5, "fixed": True}])
+# More frames than a chunk of the series, more floes than a rank's share, a body and walls; hand-made floes have the ids
+# after the others.
+SHORT = changed(TOW,
+                run__duration=12,
+                output__frame_interval=0.5,
+                floes=[{"shape": "disc", "length": 0.8, "x": 13, "y": 3.4},
+                       {"shape": "rectangle", "length": 0.9, "width": 0.5, "x": 14, "y": -3.5, "fixed": True}])
 # Some seconds long, with all but free steps, so that there is a middle of the run to strike at.
 LONG = changed(TOW, run__dt=0.0002, output__frame_interval=0.1)
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
@@ -25,8 +30,12 @@ def command(ranks, *arguments):
 
 
 def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, **more):
-    return subprocess.run(command(ranks)[:4] + [*options, *program, *map(str, arguments)], env=environment(OMP_NUM_THREADS=1, **ROOT),
-                          capture_output=True, text=True, timeout=timeout, **more)
+    return subprocess.run(command(ranks)[:4] + [*options, *program, *map(str, arguments)],
+                          env=environment(OMP_NUM_THREADS=1, **ROOT),
+                          capture_output=True,
+                          text=True,
+                          timeout=timeout,
+                          **more)
 
 
 def ours(result):
@@ -48,7 +57,10 @@ def test_values_do_not_depend_on_ranks(one, ranks):
     many = Run(folder / f"out{ranks}", result)
     assert differing(alone.dir / "result.h5", many.dir / "result.h5") == []
     assert len(many.dataset("/frames/time")) == 25 and many.dataset("/frames/pose").shape[1] == alone.summary["n_floes"]
-    timing = {"wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance", "edge_cut", "halo_share", "memory_per_floe_b"}
+    timing = {
+        "wall_time_s", "ns_per_floe_step", "phases_s", "ranks", "divisions", "moved_floes", "imbalance",
+        "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance", "edge_cut", "halo_share", "memory_per_floe_b"
+    }
     assert many.summary.keys() == alone.summary.keys() and "exchange" in many.summary["phases_s"]
     for key in many.summary.keys() - timing:
         assert many.summary[key] == alone.summary[key], key
@@ -62,15 +74,21 @@ def test_values_do_not_depend_on_ranks(one, ranks):
             assert dict(a["frames"][name].attrs) == dict(b["frames"][name].attrs)
     # The table once, and the same but for times.
     assert result.stdout.count("state hash") == 1 and result.stdout.count("mean floe size") == 1
-    numbers = [[line for line in r.stdout.splitlines() if "wall time" not in line and "detect" not in line] for r in (alone.result, result)]
+    numbers = [[line
+                for line in r.stdout.splitlines()
+                if "wall time" not in line and "detect" not in line]
+               for r in (alone.result, result)]
     assert numbers[0] == numbers[1]
     assert ours(result) == []
 
 
 def test_more_ranks_than_floes(tmp_path):
-    case = {"run": {"dt": 0.1, "duration": 1}, "ice": {"concentration": 0}, "body": {"x": 3, "length": 2}, "tow": {"speed": 0.1},
-            "floes": [{"shape": "disc", "length": 0.8, "x": 8, "y": 1}]}
-    for name, changes in {"one floe": {}, "none": {"floes": None}, "no body": {"body": {"shape": "none"}, "tow": None}}.items():
+    case = {
+        "run": {"dt": 0.1, "duration": 1}, "ice": {"concentration": 0}, "body": {"x": 3, "length": 2},
+        "tow": {"speed": 0.1}, "floes": [{"shape": "disc", "length": 0.8, "x": 8, "y": 1}]
+    }
+    for name, changes in {"one floe": {}, "none": {"floes": None}, "no body": {"body": {"shape": "none"},
+                                                                               "tow": None}}.items():
         folder = tmp_path / name
         alone = run(folder, changed(case, **changes))
         result = mpirun(3, "run", "case.yml", "-o", "many", cwd=folder)
@@ -89,8 +107,11 @@ def test_rows_that_span_several_pieces(tmp_path):
         f["floes/thickness"] = 0.1 + np.arange(n) * 1e-6
         f["floes"].attrs["ice_area"] = 48000.0
         f["floes"].attrs["concentration"] = 0.06
-    case = {"run": {"dt": 0.1, "duration": 0.2}, "domain": {"length": 240, "width": 202, "y0": -101}, "body": {"shape": "none"},
-            "ice": {"field": "field.h5"}, "water": {"current_x": 0.1}, "output": {"frame_interval": 0.1}}
+    case = {
+        "run": {"dt": 0.1, "duration": 0.2}, "domain": {"length": 240, "width": 202,
+                                                        "y0": -101}, "body": {"shape": "none"},
+        "ice": {"field": "field.h5"}, "water": {"current_x": 0.1}, "output": {"frame_interval": 0.1}
+    }
     alone = run(tmp_path, case)
     with h5py.File(alone.dir / "result.h5") as f:
         assert f["frames/pose"].chunks[1] < n and f["xdmf/000001/floe_points"].chunks[0] < 3 * n
@@ -123,12 +144,14 @@ def test_an_error_is_told_once_and_all_leave_with_its_code(tmp_path, arguments, 
     assert len(ours(result)) == 1 and fragment in ours(result)[0], result.stderr
 
 
-@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["--list-keys"], ["check", "case.yml"], ["field", "case.yml", "-o", "f.h5"]])
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["--list-keys"],
+                                       ["check", "case.yml"], ["field", "case.yml", "-o", "f.h5"]])
 def test_what_needs_one_rank_is_done_by_one(tmp_path, arguments):
     write_case(tmp_path, SHORT)
     alone, result = call(*arguments, cwd=tmp_path), mpirun(2, *arguments, cwd=tmp_path)
     assert result.returncode == alone.returncode == DONE, result.stderr
-    said, wanted = (re.sub(r"^(memory|disk) .*", r"\1", r.stdout.split(" made in ")[0], flags=re.M) for r in (result, alone))
+    said, wanted = (re.sub(r"^(memory|disk) .*", r"\1", r.stdout.split(" made in ")[0], flags=re.M)
+                    for r in (result, alone))
     assert said == wanted != ""  # memory and disk are those of the ranks
 
 
@@ -137,9 +160,17 @@ def test_a_disk_that_fills_up_in_the_run(tmp_path, rank):
     """For one rank only: the others must hear of it. Without shared memory, whose files would be too large too."""
     write_case(tmp_path, changed(SHORT, output__frame_interval=0.1))
     limited = f'[ "$OMPI_COMM_WORLD_RANK" != {rank} ] || ulimit -f 900; exec "$@"'
-    result = mpirun(3, "run", "case.yml", "-o", "out", program=("bash", "-c", limited, "bash", BERGTOW), options=("--mca", "btl", "self,tcp"), cwd=tmp_path)
+    result = mpirun(3,
+                    "run",
+                    "case.yml",
+                    "-o",
+                    "out",
+                    program=("bash", "-c", limited, "bash", BERGTOW),
+                    options=("--mca", "btl", "self,tcp"),
+                    cwd=tmp_path)
     assert result.returncode == IO, result.stderr
-    assert len(ours(result)) == 1 and "out/result.part.h5: cannot write the file: File too large; raise" in ours(result)[0], result.stderr
+    assert len(ours(result)) == 1 and "out/result.part.h5: cannot write the file: File too large; raise" in ours(
+        result)[0], result.stderr
     assert not (tmp_path / "out/summary.json").exists()
     with h5py.File(tmp_path / "out/result.part.h5") as f: # as the last flush left it
         n = len(f["frames/time"])
@@ -172,8 +203,12 @@ def start(tmp_path):
 
     def begin():
         write_case(tmp_path, LONG)
-        p = subprocess.Popen(command(3, BERGTOW, "run", "case.yml", "-o", "out", "--threads", 1), cwd=tmp_path,
-                             env=environment(OMP_NUM_THREADS=1, **ROOT), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        p = subprocess.Popen(command(3, BERGTOW, "run", "case.yml", "-o", "out", "--threads", 1),
+                             cwd=tmp_path,
+                             env=environment(OMP_NUM_THREADS=1, **ROOT),
+                             stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE,
+                             text=True)
         running.append(p)
 
         def has_frames():
@@ -256,4 +291,6 @@ def test_a_killed_rank_ends_the_run(tmp_path, start, rank):
     assert not (tmp_path / "out/summary.json").exists()
     with h5py.File(tmp_path / "out/result.part.h5") as f: # what was flushed can be read
         n = len(f["frames/time"])
-        assert f.attrs["complete"] == 0 and n > 2 and len(f["frames/pose"]) == n and len({len(v) for v in f["series"].values()}) == 1
+        assert f.attrs["complete"] == 0 and n > 2 and len(f["frames/pose"]) == n and len(
+            {len(v)
+             for v in f["series"].values()}) == 1

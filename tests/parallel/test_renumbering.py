@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The numbers of the floes order the contacts of a tile, and so decide which of many solutions within the tolerance is found. That
-must not show in the mean force: it may differ by no more than its standard error."""
+"""The numbers of the floes order the contacts of a tile, and so decide which of many solutions within the tolerance is
+found. That must not show in the mean force: it may differ by no more than its standard error."""
 import h5py
 import numpy as np
 import pytest
@@ -33,7 +33,8 @@ def permute(source, target, order):
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """For each of the fields: as made, with the floes in another order, and (a change that does matter) without friction."""
+    """For each of the fields: as made, with the floes in another order, and (a change that does matter) without
+    friction."""
     found = []
     for seed in range(1, FIELDS + 1):
         folder = tmp_path_factory.mktemp(f"field{seed}")
@@ -62,9 +63,9 @@ def test_it_is_the_same_field(runs):
 
 
 def test_the_mean_force_does_not_depend_on_the_numbers(runs):
-    """Two histories of one field part by rounding after some seconds, whatever is done: single runs differ as independent ones do. So
-    each pair is held against the standard error of a difference, and the mean over the fields, where that evens out, against the standard error of
-    one run."""
+    """Two histories of one field part by rounding after some seconds, whatever is done: single runs differ as
+    independent ones do. So each pair is held against the standard error of a difference, and the mean over the fields,
+    where that evens out, against the standard error of one run."""
     made, other, smooth = (np.array([numbers(r[k]) for r in runs]).T for k in (1, 2, 3))
     assert all(r.summary["unconverged_steps"] == 0 for row in runs for r in row[1:3])
     assert np.all(made[1] < 0.3 * made[0]) # or the comparison would say nothing

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """A run that is stopped or killed on some ranks ends, on others, as the run that was never stopped.
 
-What turns these tests red (tried): traces of contacts gathered from one rank alone, the state saved after the open collisions have been closed, the entry of the
-series under way left out, the frame that the end of --steps adds kept, the panel loads or the stall left out, a checkpoint without the result that it counts on.
+What turns these tests red (tried): traces of contacts gathered from one rank alone, the state saved after the open
+collisions have been closed, the entry of the series under way left out, the frame that the end of --steps adds kept,
+the panel loads or the stall left out, a checkpoint without the result that it counts on.
 """
 import json
 import random
@@ -53,7 +54,8 @@ def test_the_window(tmp_path):
 
 
 def test_everything_at_once(tmp_path):
-    """Window, floes in parts, crushing, a vessel on a bridle that breaks, tide, wind: two stops, three numbers of ranks."""
+    """Window, floes in parts, crushing, a vessel on a bridle that breaks, tide, wind: two stops, three numbers of
+    ranks."""
     path = with_bays(tmp_path, ALL)
     case = json.loads(path.read_text())
     case["ice"] |= {"crushing": ALL["ice"]["crushing"]}
@@ -68,13 +70,20 @@ def test_everything_at_once(tmp_path):
 
 
 def kill_and_resume(folder, name, path, share):
-    """Kill a run again and again, on ranks that change each time, after a random part of `share` seconds; True when three kills and more have struck."""
+    """Kill a run again and again, on ranks that change each time, after a random part of `share` seconds; True when
+    three kills and more have struck."""
     moments = random.Random(20)
     kills, early = 0, ()
     command = ["run", "case.yml", "-o", name]
     for k in range(40):
         ranks = [2, 1, 2, 3][k % 4]
-        if killed_after((0.2 + moments.random()) * share * (0.5 + 0.5 * ranks), ranks, *command, "--quiet", "--threads", 1, cwd=folder):
+        if killed_after((0.2 + moments.random()) * share * (0.5 + 0.5 * ranks),
+                        ranks,
+                        *command,
+                        "--quiet",
+                        "--threads",
+                        1,
+                        cwd=folder):
             kills += 1
             check_readable(folder / name)
             if not list((folder / name).glob("checkpoint*.h5")):
@@ -91,10 +100,11 @@ def kill_and_resume(folder, name, path, share):
 
 
 def test_killed_again_and_again(whole):
-    """Eight kills at random moments of one run; most fall into the writing of a checkpoint. How long a run takes depends on what else the machine
-    does: where it was over too soon, another is killed sooner."""
+    """Eight kills at random moments of one run; most fall into the writing of a checkpoint. How long a run takes
+    depends on what else the machine does: where it was over too soon, another is killed sooner."""
     folder, path, seconds = whole
-    assert any(kill_and_resume(folder, f"killed{k}", path, 0.5 * seconds / 2**k) for k in range(5)), "the runs were over too soon"
+    assert any(kill_and_resume(folder, f"killed{k}", path, 0.5 * seconds / 2**k)
+               for k in range(5)), "the runs were over too soon"
 
 
 def test_a_signal_to_all_ranks(whole):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The result does not depend on threads, on the moment, or on the way by which the same case was given.
 
-A data race may hide in a single run. So the cases are large enough for every loop that may run in parallel (3,000 rows in
-the solver, 2,000 bodies elsewhere), go on for many sweeps, and are compared in all series and frames, not in the hash alone.
+A data race may hide in a single run. So the cases are large enough for every loop that may run in parallel (3,000 rows
+in the solver, 2,000 bodies elsewhere), go on for many sweeps, and are compared in all series and frames, not in the
+hash alone.
 """
 import re
 
@@ -15,13 +16,26 @@ from harness import PRESS, TOW, call, changed, differing, environment, run
 ROWS_FOR_THREADS, BODIES_FOR_THREADS = 3000, 2000
 
 # A heavy body on a line among the same floes: rows of the large body, the line's own row, and restitution.
-LINE = changed(PRESS, domain__ends_closing=0, domain__sides_closing=0, body={"shape": "disc", "length": 6, "x": 8},
-               tow={"mode": "line", "speed": 0.5, "ramp": 0, "line_length": 2, "line_damping": 0, "hull_y": 1, "hull_x": 2},
-               ice__restitution=0.3, run__duration=3)
+LINE = changed(
+    PRESS,
+    domain__ends_closing=0,
+    domain__sides_closing=0,
+    body={"shape": "disc", "length": 6, "x": 8},
+    tow={"mode": "line", "speed": 0.5, "ramp": 0, "line_length": 2, "line_damping": 0, "hull_y": 1, "hull_x": 2},
+    ice__restitution=0.3,
+    run__duration=3)
 # Periodic both ways, restless and under every force, in a tide that turns: floes cross the seams.
-SEAMS = changed(PRESS, domain={"length": 66, "width": 40, "ends": "periodic", "sides": "periodic"}, body={"shape": "none"},
-                water={"latitude": 75, "current_x": 0.4, "current_y": -0.3, "tilt": "dynamic", "tide": {"major": 0.2, "minor": -0.1, "period": 5}}, air={"wind_x": -8, "wind_y": 11}, run__duration=3,
-                ice={"concentration": 0.7, "size": 0.8, "thickness_law": "lognormal", "size_law": "lognormal", "size_spread": 0.4})
+SEAMS = changed(
+    PRESS,
+    domain={"length": 66, "width": 40, "ends": "periodic", "sides": "periodic"},
+    body={"shape": "none"},
+    water={
+        "latitude": 75, "current_x": 0.4, "current_y": -0.3, "tilt": "dynamic",
+        "tide": {"major": 0.2, "minor": -0.1, "period": 5}
+    },
+    air={"wind_x": -8, "wind_y": 11},
+    run__duration=3,
+    ice={"concentration": 0.7, "size": 0.8, "thickness_law": "lognormal", "size_law": "lognormal", "size_spread": 0.4})
 CASES = {"press": PRESS, "line": LINE, "seams": SEAMS}
 
 
@@ -80,20 +94,34 @@ def test_threads_of_the_case_file(tmp_path):
 
 
 # A case that sets keys of every type and unit, away from their defaults and from round binary numbers.
-ODD = changed(
-    TOW, run__title="odd: \"quoted\" # not a comment", run__duration="0.1 min", domain__x0="-1.3 m", body__x="2.1 m", body__yaw="17 deg",
-    body__shape="polygon", body__length=None, body__vertices=[[-1.1, -0.7], [1.3, -0.6], [0.4, 0.9], [-0.8, 0.7]],
-    ice={"concentration": "47 %", "size": "63 cm", "thickness": "4.1 cm", "friction": 0.17, "restitution": 0.21, "seed": 987654321,
-         "shape": "polygons", "sides": 5, "drag": {"water_form": 0.7}},
-    tow={"mode": "line", "speed": "0.31 kn", "direction": "7 deg", "ramp": 0.3, "line_stiffness": "3.3 kN", "line_length": 1.7},
-    water={"latitude": "71.3 deg", "current_y": "3 cm/s"}, air={"wind_x": "7 kn"})
+ODD = changed(TOW,
+              run__title="odd: \"quoted\" # not a comment",
+              run__duration="0.1 min",
+              domain__x0="-1.3 m",
+              body__x="2.1 m",
+              body__yaw="17 deg",
+              body__shape="polygon",
+              body__length=None,
+              body__vertices=[[-1.1, -0.7], [1.3, -0.6], [0.4, 0.9], [-0.8, 0.7]],
+              ice={
+                  "concentration": "47 %", "size": "63 cm", "thickness": "4.1 cm", "friction": 0.17,
+                  "restitution": 0.21, "seed": 987654321, "shape": "polygons", "sides": 5, "drag": {"water_form": 0.7}
+              },
+              tow={
+                  "mode": "line", "speed": "0.31 kn", "direction": "7 deg", "ramp": 0.3, "line_stiffness": "3.3 kN",
+                  "line_length": 1.7
+              },
+              water={"latitude": "71.3 deg", "current_y": "3 cm/s"},
+              air={"wind_x": "7 kn"})
 # By hand: outline, pose, velocity, thickness and a fixed one must all come back.
 HAND = {
-    "run": {"dt": 0.1, "duration": 8}, "domain": {"length": 9, "width": 5.3, "sides": "periodic"}, "ice": {"concentration": 0},
+    "run": {"dt": 0.1, "duration": 8},
+    "domain": {"length": 9, "width": 5.3, "sides": "periodic"},
+    "ice": {"concentration": 0},
     "body": {"shape": "none"},
-    "floes": [{"shape": "disc", "length": 1.1, "x": 2, "y": 0.1, "yaw": 50, "vx": 0.37, "vy": -0.11, "yaw_rate": 7},
-              {"shape": "polygon", "vertices": [[0, 0], [1.7, 0], [1, 1.3]], "x": 5, "y": -0.1, "yaw": 31, "thickness": "7 cm"},
-              {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 7.7, "y": 0, "yaw": 80, "fixed": True}],
+    "floes": [{"shape": "disc", "length": 1.1, "x": 2, "y": 0.1, "yaw": 50, "vx": 0.37, "vy": -0.11, "yaw_rate": 7}, {
+        "shape": "polygon", "vertices": [[0, 0], [1.7, 0], [1, 1.3]], "x": 5, "y": -0.1, "yaw": 31, "thickness": "7 cm"
+    }, {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 7.7, "y": 0, "yaw": 80, "fixed": True}],
 }
 
 
@@ -109,7 +137,15 @@ def test_the_resolved_case_is_the_same_case(tmp_path, case):
 
 
 def test_overrides_stand_in_the_resolved_case(tmp_path):
-    given = run(tmp_path, TOW, "--set", "ice.seed=7", "--set", "tow.speed=0.2", "--set", "run.duration=10", name="given")
+    given = run(tmp_path,
+                TOW,
+                "--set",
+                "ice.seed=7",
+                "--set",
+                "tow.speed=0.2",
+                "--set",
+                "run.duration=10",
+                name="given")
     again = run(tmp_path, given.dir / "case.resolved.yml", name="again")
     written = run(tmp_path, changed(TOW, ice__seed=7, tow__speed=0.2, run__duration=10), name="written")
     assert given.hash == again.hash == written.hash
@@ -124,7 +160,8 @@ def test_a_field_read_back_is_the_field_made(tmp_path, case):
     assert result.returncode == 0, result.stderr
     read = run(tmp_path, changed(case, ice__field="field.h5"), name="read")
     assert made.hash == read.hash
-    # The second run had the field from the file: another seed makes no difference to it, but does to a field that is made.
+    # The second run had the field from the file: another seed makes no difference to it, but does to a field that is
+    # made.
     seed = run(tmp_path, changed(case, ice__field="field.h5", ice__seed=99), name="seed")
     other = run(tmp_path, changed(case, ice__seed=99), name="other")
     assert seed.hash == made.hash != other.hash
@@ -147,10 +184,11 @@ def test_sampling_and_frames_do_not_touch_the_state(tmp_path):
 def test_the_hash_sees_the_last_bit(tmp_path):
     """A hash that ignored something would make every test above pass."""
     base = run(tmp_path, changed(HAND, run__duration=0.1), name="base").hash
-    # A few bits more of a velocity are too little to change the pose in one step: the hash must see both. One bit more of x = 2 is, too: x + 0.036 lies half-way
-    # between two numbers, and both are rounded to the same even one.
+    # A few bits more of a velocity are too little to change the pose in one step: the hash must see both. One bit more
+    # of x = 2 is, too: x + 0.036 lies half-way between two numbers, and both are rounded to the same even one.
     nudged = []
-    for key, value in (("x", 2 * (1 - 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 50 * (1 + 2e-16)), ("vx", 0.37 * (1 + 1e-15)), ("yaw_rate", 7 * (1 + 1e-15))):
+    for key, value in (("x", 2 * (1 - 2e-16)), ("y", 0.1 * (1 + 2e-16)), ("yaw", 50 * (1 + 2e-16)),
+                       ("vx", 0.37 * (1 + 1e-15)), ("yaw_rate", 7 * (1 + 1e-15))):
         case = changed(HAND, run__duration=0.1)
         case["floes"][0][key] = value
         assert value != HAND["floes"][0][key]

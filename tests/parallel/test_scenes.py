@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Scenes with every mode and option leave what is stored of them, bit for bit, and the same in another layout.
 
-The digests in scenes.json hold for one libm and one compiler. Where this machine has others, the comparison is between two
-layouts alone, and a warning says so. `tests/scenes.py --compare OLD_BINARY` shows what has moved; after a change that is
-meant to move results, `tests/scenes.py --record` renews the file.
+The digests in scenes.json hold for one libm and one compiler. Where this machine has others, the comparison is between
+two layouts alone, and a warning says so. `tests/scenes.py --compare OLD_BINARY` shows what has moved; after a change
+that is meant to move results, `tests/scenes.py --record` renews the file.
 """
 import json
 import subprocess

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The same bits on any number of ranks and threads with everything a tow can have: bridle, vessel, way-points, a branch that breaks.
+"""The same bits on any number of ranks and threads with everything a tow can have: bridle, vessel, way-points, a branch
+that breaks.
 
-What turns these tests red: the impulse of the second branch not sent to the other ranks after the solve (tried: the branch then breaks there
-at another time, or not), a vessel moved before that.
+What turns these tests red: the impulse of the second branch not sent to the other ranks after the solve (tried: the
+branch then breaks there at another time, or not), a vessel moved before that.
 """
 import h5py
 
@@ -10,17 +11,27 @@ from harness import changed, run
 from test_ranks import LINE, assert_same, many
 
 # From the far end back: the berg belongs to the last rank, the record is made by the first.
-BRIDLE = changed(LINE, run__dt=0.1, run__duration=28, body__x=36, ice={"concentration": 0.8, "size": 1, "x_max": 34}, tow={
-    "mode": "thrust", "programme": [[0, 0], [2, 0.4], [20, 0.4], [28, 0.3]], "waypoints": [[26, 0], [18, 2], [-60, 2]], "turn_radius": 2, "line_length": 3,
-    "line_stiffness": 2000, "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 120},
-    "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}})
+BRIDLE = changed(LINE,
+                 run__dt=0.1,
+                 run__duration=28,
+                 body__x=36,
+                 ice={"concentration": 0.8, "size": 1, "x_max": 34},
+                 tow={
+                     "mode": "thrust", "programme": [[0, 0], [2, 0.4], [20, 0.4], [28, 0.3]], "waypoints": [[26, 0],
+                                                                                                            [18, 2],
+                                                                                                            [-60, 2]],
+                     "turn_radius": 2, "line_length": 3, "line_stiffness": 2000,
+                     "line": {"branches": 2, "breaking_load": 0}, "branch2": {"breaking_load": 120},
+                     "vessel": {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
+                 })
 
 
 def test_a_vessel_on_a_bridle_that_breaks(tmp_path):
     one = run(tmp_path, BRIDLE, "--threads", 1, "--quiet")
     with h5py.File(one.dir / "result.h5") as f:
         kinds = list(f["events/kind"][:])
-    assert kinds.count(0) == 1 and kinds.count(2) >= 1, kinds  # a branch broke while the other held; a way-point was passed
+    # a branch broke while the other held; a way-point was passed
+    assert kinds.count(0) == 1 and kinds.count(2) >= 1, kinds
     assert one.series("ice_resistance").max() > 100
     for ranks, threads in ((2, 2), (3, 1)):
         r = many(tmp_path, ranks, threads)

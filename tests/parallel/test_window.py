@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The moving window: the same bits on any ranks and threads, and what a user sees of it.
 
-What turns the first tests red: a place tested only against the floes of one rank, a floe renewed by its owner alone while others hold copies,
-sums in the order of the ranks, contacts that go on with the impulses of the place a floe has left. The first two were tried.
+What turns the first tests red: a place tested only against the floes of one rank, a floe renewed by its owner alone
+while others hold copies, sums in the order of the ranks, contacts that go on with the impulses of the place a floe has
+left. The first two were tried.
 """
 import numpy as np
 import pytest
@@ -14,15 +15,26 @@ from test_ranks import assert_same, many
 SPEED = {
     "run": {"dt": 0.125, "duration": 70},
     "domain": {"length": 26, "width": 18, "ends": "moving", "sides": "periodic"},
-    "ice": {"concentration": 0.45, "size": 1, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal", "restitution": 0.1},
+    "ice": {
+        "concentration": 0.45, "size": 1, "size_law": "lognormal", "thickness": 0.04, "thickness_law": "lognormal",
+        "restitution": 0.1
+    },
     "body": {"length": 2, "draft": 0.5},
     "tow": {"speed": 0.8, "ramp": 1},
     "solver": {"tile": 2.5, "max_sweeps": 40},
     "output": {"frame_interval": 8},
 }
 # On a line, the other way, in the geographic frame, under every force: the field drifts.
-LINE = changed(SPEED, domain__frame="geographic", domain__sides="wall", domain__ahead=14, domain__width=14, ice__concentration=0.35, ice__restitution=0, ice__seed=3,
-               tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "direction": 180}, water={"latitude": 75, "current_x": 0.1},
+LINE = changed(SPEED,
+               domain__frame="geographic",
+               domain__sides="wall",
+               domain__ahead=14,
+               domain__width=14,
+               ice__concentration=0.35,
+               ice__restitution=0,
+               ice__seed=3,
+               tow={"mode": "line", "speed": 0.8, "ramp": 1, "line_length": 3, "direction": 180},
+               water={"latitude": 75, "current_x": 0.1},
                air={"wind_x": 5, "wind_y": 3})
 CASES = {"speed": SPEED, "line": LINE}
 
@@ -62,10 +74,14 @@ def test_the_division_is_sound(alone):
 
 
 def test_overlap_falls_faster_than_the_step(tmp_path):
-    """The deepest overlap is the step's and nothing that the window leaves: over four fields 0.0099 and 0.0040 of a floe at whole and half steps."""
+    """The deepest overlap is the step's and nothing that the window leaves: over four fields 0.0099 and 0.0040 of a
+    floe at whole and half steps."""
     deepest = []
     for dt in (0.125, 0.0625):
-        runs = [run(tmp_path, changed(LINE, ice__seed=seed, run__dt=dt, run__duration=40), "--quiet", name=f"{dt}-{seed}") for seed in range(1, 5)]
+        runs = [
+            run(tmp_path, changed(LINE, ice__seed=seed, run__dt=dt, run__duration=40), "--quiet", name=f"{dt}-{seed}")
+            for seed in range(1, 5)
+        ]
         assert all(r.summary["unconverged_steps"] == 0 for r in runs)
         deepest.append(np.mean([r.summary["max_overlap_relative"] for r in runs]))
     assert deepest[0] > 0.007 and deepest[1] < 0.5 * deepest[0]
@@ -79,13 +95,15 @@ def test_what_is_recorded(alone):
     # The body keeps its place, within a stride (no more than two floes).
     front = x + 26 - body if name == "speed" else body - x
     assert np.all(front[50:] > w["ahead_m"] - 2) and np.all(front < w["ahead_m"] + 3)
-    # Every place that the front has reached was taken or missed; every floe that fell behind was renewed or kept. The field drifts along x.
+    # Every place that the front has reached was taken or missed; every floe that fell behind was renewed or kept. The
+    # field drifts along x.
     places = (w["laps"] + (w["ice_drift_x_m"] / 26 if name == "line" else 0)) * n
     assert abs(w["renewed"] + w["missed"] - places) < 0.15 * n
     assert abs(w["renewed"] + w["kept"] - places) < 0.15 * n
-    # A step keeps the normal that it found, and floes turn and slide by up to s = V dt = 0.1 m meanwhile, which leaves overlap of the order of s^2 / size: 0.01
-    # at the body's speed, more where a floe is thrown aside faster. Eight fields of the scene on a line have 0.0085 to 0.0212, none of them where a floe
-    # was renewed; that it goes with dt^2 is shown below. So this is a limit on these two fields, and not one of the method.
+    # A step keeps the normal that it found, and floes turn and slide by up to s = V dt = 0.1 m meanwhile, which leaves
+    # overlap of the order of s^2 / size: 0.01 at the body's speed, more where a floe is thrown aside faster. Eight
+    # fields of the scene on a line have 0.0085 to 0.0212, none of them where a floe was renewed; that it goes with dt^2
+    # is shown below. So this is a limit on these two fields, and not one of the method.
     assert r.summary["max_overlap_relative"] < 0.02
     assert r.summary["momentum_residual"] < 1e-9
     assert warned(r, "gone [12]\\.[0-9]+ times its length")
@@ -96,14 +114,21 @@ def test_open_water_does_not_see_it(tmp_path):
     bare = changed(TOW, ice__concentration=0, body__x=6, run__duration=150, tow__ramp=3)
     still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
     assert moving.summary["moving_window"]["laps"] > 1 and still.summary["moving_window"] is None
-    assert differing(still.dir / "result.h5", moving.dir / "result.h5",
-                     but=("/case", "/case_as_given", "/series/window_x", "/series/window_renewed", "/series/window_waiting")) == []
+    assert differing(still.dir / "result.h5",
+                     moving.dir / "result.h5",
+                     but=("/case", "/case_as_given", "/series/window_x", "/series/window_renewed",
+                          "/series/window_waiting")) == []
 
 
 def test_no_lap_no_difference(tmp_path):
-    """What is renewed is far from the body: at first the force is that in a periodic domain, but for the order of the contacts, within the
-    tolerance of the solver."""
-    bare = changed(TOW, body__x=6, domain__sides="periodic", domain__length=30, run__duration=15, solver={"tolerance": 1e-8, "max_sweeps": 5000})
+    """What is renewed is far from the body: at first the force is that in a periodic domain, but for the order of the
+    contacts, within the tolerance of the solver."""
+    bare = changed(TOW,
+                   body__x=6,
+                   domain__sides="periodic",
+                   domain__length=30,
+                   run__duration=15,
+                   solver={"tolerance": 1e-8, "max_sweeps": 5000})
     still, moving = (run(tmp_path, changed(bare, domain__ends=e), name=e) for e in ("periodic", "moving"))
     assert moving.summary["moving_window"]["renewed"] > 3
     assert moving.series("ice_resistance").max() > 0
@@ -121,7 +146,8 @@ def test_the_resolved_case_is_the_same_case(tmp_path):
 
 
 def test_defaults(tmp_path):
-    """The body stands where domain.ahead says, domain.ahead is where the body stands, and in the geographic frame the window lies about it."""
+    """The body stands where domain.ahead says, domain.ahead is where the body stands, and in the geographic frame the
+    window lies about it."""
     def check(**changes):
         r = run(tmp_path, changed(SPEED, run__duration=0.2, **changes), "--force", name="d")
         return r.series("body_x")[0], r.series("window_x")[0], r.summary["moving_window"]["ahead_m"]
@@ -145,7 +171,8 @@ def test_defaults(tmp_path):
     ({"domain__sides": "wall", "domain__sides_closing": 0.01}, "domain.sides_closing: 0.01 m/s: closing walls"),
     ({"domain__ends": "wall", "domain__ahead": 3}, "domain.ahead: 3 m has no effect without domain.ends: moving"),
     ({"domain__sides": "moving"}, "domain.sides"),
-    ({"floes": [{"shape": "disc", "length": 0.5, "x": 3, "y": 9, "fixed": True}], "ice__concentration": 0.1}, "cannot take floes[0] along"),
+    ({"floes": [{"shape": "disc", "length": 0.5, "x": 3, "y": 9, "fixed": True}], "ice__concentration": 0.1
+      }, "cannot take floes[0] along"),
 ])
 def test_refused(tmp_path, changes, text):
     result = run(tmp_path, changed(SPEED, **changes), code=CASE).result

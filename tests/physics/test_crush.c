@@ -35,13 +35,14 @@ static bt_pose *pose(bt_world *w, bt_gid g) { return &w->bodies.pose[bt_world_in
 static double pushed(const bt_world *w)
 {
     double sum = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) sum += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++)
+            sum += w->cells->cell[k].contacts[j].ln[0] + w->cells->cell[k].contacts[j].ln[1];
     return sum;
 }
 
-/// A steady force (the slope of the sea surface) presses a floe edge-on against a wall, limit F = p h L. Below the limit it stands still;
-/// above, it goes on with the acceleration a − F/m into the ice, whose resistance stays F.
+/// A steady force (the slope of the sea surface) presses a floe edge-on against a wall, limit F = p h L. Below the
+/// limit it stands still; above, it goes on with the acceleration a − F/m into the ice, whose resistance stays F.
 static void pressed_against_a_wall(void **state)
 {
     (void)state;
@@ -70,11 +71,13 @@ static void pressed_against_a_wall(void **state)
     }
 }
 
-/// A floe hits a wall edge-on: it stops after t = m v/(p h L), at the depth m v²/(2 p h L), and crushing has taken its energy.
+/// A floe hits a wall edge-on: it stops after t = m v/(p h L), at the depth m v²/(2 p h L), and crushing has taken its
+/// energy.
 static void stop_at_constant_force(void **state)
 {
     (void)state;
-    const double h = 0.1, v = 2, dt = 1e-4, brake = pressure * h / sheet, gap = 1.37 * v * dt; // the way to the wall crushes nothing
+    // the way to the wall crushes nothing
+    const double h = 0.1, v = 2, dt = 1e-4, brake = pressure * h / sheet, gap = 1.37 * v * dt;
     bt_params p = params(dt);
     bt_world *w = bt_world_create(&p);
     add_square(w, -gap, v, h);
@@ -91,12 +94,13 @@ static void stop_at_constant_force(void **state)
     CHECK_CLOSE(pose(w, 0)->x, w->stats.crushed_depth, 1e-9);
     CHECK_CLOSE(w->stats.crushed_depth, 0.5 * v * v / brake, v * dt);
     CHECK_CLOSE(energy, -0.5 * sheet * v * v, 1e-9 * sheet * v * v);
-    CHECK_CLOSE(work, 0.5 * sheet * v * v, sheet * brake * brake * dt * dt); // all but what the last step took below the limit
+    // all but what the last step took below the limit
+    CHECK_CLOSE(work, 0.5 * sheet * v * v, sheet * brake * brake * dt * dt);
     bt_world_free(w);
 }
 
-/// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed, over the part, with
-/// the reduced mass; they end with the common velocity.
+/// Two floes of different mass and thickness meet edge-on, also on a part of their edges only: the thinner is crushed,
+/// over the part, with the reduced mass; they end with the common velocity.
 static void two_floes(void **state)
 {
     (void)state;
@@ -121,7 +125,8 @@ static void two_floes(void **state)
     CHECK_CLOSE(pose(w, 1)->x - pose(w, 0)->x, 2.5 - w->stats.crushed_depth, 1e-8);
     bt_world_free(w);
 
-    w = bt_world_create(&p); // a body that is no ice: the floe's thickness; half a length of overlap on a slab that cannot turn
+    // a body that is no ice: the floe's thickness; half a length of overlap on a slab that cannot turn
+    w = bt_world_create(&p);
     add_square(w, 0, v, 0.3);
     double slab[8] = {-1, -1, 1, -1, 1, 1, -1, 1};
     bt_body_def d = scene_prism(4, slab, sheet);
@@ -132,7 +137,8 @@ static void two_floes(void **state)
     bt_world_free(w);
 }
 
-/// A corner of angle φ: a spring k = 2 p h tan(φ/2) that never gives back, depth v √(m/k), after a quarter of the period.
+/// A corner of angle φ: a spring k = 2 p h tan(φ/2) that never gives back, depth v √(m/k), after a quarter of the
+/// period.
 static void corner(void **state)
 {
     (void)state;
@@ -142,7 +148,8 @@ static void corner(void **state)
         // A kite with its tip at (0.5, 0) before centring.
         double kite[8] = {0.5 - cos(half), -sin(half), 0.5, 0, 0.5 - cos(half), sin(half), -cos(half) - 0.5, 0};
         bt_shape_centre(4, kite);
-        const double m = sheet * bt_shape_moments(4, kite).area, k = 2 * pressure * h * tan(half), deep = v * sqrt(m / k);
+        const double m = sheet * bt_shape_moments(4, kite).area, k = 2 * pressure * h * tan(half),
+                     deep = v * sqrt(m / k);
         const double steps[] = {0.005, 0.1, 1, 8}; // Δt √(k/m)
         for (int j = 0; j < 4; j++) {
             const double dt = steps[j] * sqrt(m / k);
@@ -178,8 +185,8 @@ static void corner(void **state)
     }
 }
 
-/// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what crushing takes is
-/// the kinetic energy lost.
+/// A floe that slides along the wall while it is pressed at the limit: friction is μ p h L, and what it takes and what
+/// crushing takes is the kinetic energy lost.
 static void friction_from_the_limit(void **state)
 {
     (void)state;
@@ -202,7 +209,8 @@ static void friction_from_the_limit(void **state)
         if (s * dt < 0.9 * v / brake) {
             CHECK_CLOSE(slide - vel(w, 0)->y, mu * brake * (s + 1) * dt, 1e-8);
             const double before = 0.5 * sheet * (v * v + slide * slide);
-            const double friction = mu * pressure * h * (pose(w, 0)->y + 0.5 * dt * (slide - vel(w, 0)->y)); // mean of both ends of the steps
+            // mean of both ends of the steps
+            const double friction = mu * pressure * h * (pose(w, 0)->y + 0.5 * dt * (slide - vel(w, 0)->y));
             CHECK_CLOSE(before - w->stats.kinetic_energy, crushed + friction, 1e-7 * before);
         }
         CHECK_CLOSE(work, w->stats.kinetic_energy - 0.5 * sheet * (v * v + slide * slide), 1e-8 * sheet);
@@ -212,8 +220,8 @@ static void friction_from_the_limit(void **state)
     bt_world_free(w);
 }
 
-/// What is crushed stays so: the floe stands in its dent, leaves it, comes back without a force up to the dent's bottom; once it has been
-/// farther away than the memory reaches, it meets the wall's face again.
+/// What is crushed stays so: the floe stands in its dent, leaves it, comes back without a force up to the dent's
+/// bottom; once it has been farther away than the memory reaches, it meets the wall's face again.
 static void memory(void **state)
 {
     (void)state;
@@ -224,20 +232,20 @@ static void memory(void **state)
     scene_wall(w, 0.5, -50, 5, 50, 0);
     for (int s = 0; s < 200; s++) bt_world_step(w);
     const double deep = pose(w, 0)->x;
-    assert_true(deep > 0.02 && w->tiles->tile[0].n_memory == 1);
+    assert_true(deep > 0.02 && w->cells->cell[0].n_memory == 1);
     for (int s = 0; s < 20; s++) bt_world_step(w);
     CHECK_CLOSE(pose(w, 0)->x, deep, 0);
     const uint64_t hash = bt_world_hash(w);
-    w->tiles->tile[0].memory[0].value[0] *= 1 + 1e-15;
+    w->cells->cell[0].memory[0].value[0] *= 1 + 1e-15;
     assert_true(bt_world_hash(w) != hash);
 
     const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
     for (int i = 0; i < 3; i++) {
         const double out = away[i] * BT_CRUSH_MEMORY, start = pose(w, 0)->x;
         vel(w, 0)->x = -0.5;
-        w->bodies.stirred[bt_world_index(w, 0)] = 1;
-        w->tiles->rest[0] = BT_REST_NO;
-        bt_tiles_wake(w->tiles, 0);
+        w->bodies.disturbed[bt_world_index(w, 0)] = 1;
+        w->cells->asleep[0] = BT_AWAKE;
+        bt_cells_wake(w->cells, 0);
         while (pose(w, 0)->x > -out) bt_world_step(w);
         vel(w, 0)->x = back;
         double free_until = 0;
@@ -252,7 +260,8 @@ static void memory(void **state)
     bt_world_free(w);
 }
 
-/// With restitution the floe rebounds once the limit bears it; it never comes back faster than e v, and crushing gives no energy.
+/// With restitution the floe rebounds once the limit bears it; it never comes back faster than e v, and crushing gives
+/// no energy.
 static void rebound_below_the_limit(void **state)
 {
     (void)state;
@@ -276,13 +285,14 @@ static void rebound_below_the_limit(void **state)
         before = now;
     }
     assert_true(before < -1e-3 && depth > 0.01);
-    assert_true(w->tiles->tile[0].n_memory == 1);
+    assert_true(w->cells->cell[0].n_memory == 1);
     for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_CRUSH_MEMORY; s++) bt_world_step(w);
-    assert_true(w->tiles->tile[0].n_memory == 0); // parted, forgotten
+    assert_true(w->cells->cell[0].n_memory == 0); // parted, forgotten
     bt_world_free(w);
 }
 
-/// A body at a set speed presses a row of floes against a wall. Rigid, no force would do; here it is at most p h L of the weakest.
+/// A body at a set speed presses a row of floes against a wall. Rigid, no force would do; here it is at most p h L of
+/// the weakest.
 static void body_at_a_set_speed(void **state)
 {
     (void)state;
@@ -292,16 +302,19 @@ static void body_at_a_set_speed(void **state)
     bt_world *w = bt_world_create(&p);
     for (int k = 0; k < 4; k++) add_square(w, k, 0, k == 2 ? 0.5 * h : h);
     double o[8] = {-1, -1, 1, -1, 1, 1, -1, 1};
-    bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = o, .x = -1.5, .vx = 0.1, .mass = 1};
+    bt_body_def d = {
+        .motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = o, .x = -1.5, .vx = 0.1, .mass = 1};
     bt_world_add(w, &d);
     scene_wall(w, 3.5, -50, 8, 50, 0);
     for (int s = 0; s < 20; s++) {
         bt_world_step(w);
         assert_true(w->stats.converged);
         if (s == 0) continue; // the floes are set in motion
-        const bt_tile *t = w->tiles->tile;
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < t[k].n_units; j++) CHECK_CLOSE((t[k].units[j].ln[0] + t[k].units[j].ln[1]) / dt, 0.5 * pressure * h, 1e-4 * pressure * h);
+        const bt_cell *t = w->cells->cell;
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < t[k].n_contacts; j++)
+                CHECK_CLOSE((t[k].contacts[j].ln[0] + t[k].contacts[j].ln[1]) / dt, 0.5 * pressure * h,
+                            1e-4 * pressure * h);
         CHECK_CLOSE(w->stats.crushed_work, 0.5 * pressure * h * 0.1 * dt, 1e-6 * pressure * h);
     }
     // The thin floe's two sides share what is crushed.

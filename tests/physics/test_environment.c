@@ -27,7 +27,8 @@ static void set_table(bt_table *t, int n, const double *row)
     memcpy(t->row, row, (size_t)n * 3 * sizeof *row);
 }
 
-/// Largest along the major axis at phase/2π T; a quarter of a period later along the minor axis, turned from x towards y.
+/// Largest along the major axis at phase/2π T; a quarter of a period later along the minor axis, turned from x towards
+/// y.
 static void ellipse_by_hand(void **state)
 {
     (void)state;
@@ -42,7 +43,8 @@ static void ellipse_by_hand(void **state)
         CHECK_CLOSE(v[1], -0.05 + want[k % 4][1], 1e-12);
     }
     CHECK_CLOSE(bt_case_fastest_flow(&c, true), hypot(0.1, 0.05) + 0.5, 1e-15);
-    // The mean: of whole periods the constant part; of the half in which the current goes along the axis 2/π of the largest more.
+    // The mean: of whole periods the constant part; of the half in which the current goes along the axis 2/π of the
+    // largest more.
     double mean[2];
     c.run.duration = 24 * hour;
     bt_environment_mean(&c, true, mean);
@@ -60,7 +62,8 @@ static void table_by_hand(void **state)
     (void)state;
     bt_table t;
     set_table(&t, 4, (const double[]){-1, 0, 2, 3, 4, 2, 4, 4, 0, 10, 1, 1});
-    const double want[][3] = {{-5, 0, 2}, {-1, 0, 2}, {0, 1, 2}, {1, 2, 2}, {3, 4, 2}, {3.25, 4, 1.5}, {4, 4, 0}, {7, 2.5, 0.5}, {10, 1, 1}, {99, 1, 1}};
+    const double want[][3] = {{-5, 0, 2},     {-1, 0, 2}, {0, 1, 2},     {1, 2, 2},  {3, 4, 2},
+                              {3.25, 4, 1.5}, {4, 4, 0},  {7, 2.5, 0.5}, {10, 1, 1}, {99, 1, 1}};
     for (size_t k = 0; k < sizeof want / sizeof *want; k++) {
         double v[2];
         bt_table_at(&t, want[k][0], v);
@@ -88,7 +91,8 @@ static bt_world *disc_world(const bt_case *c, double dt, bt_drag drag)
 }
 
 /// A floe that clings to the water goes where the water goes: x = (a/ω)(sin(ωt − φ) + sin φ) along the major axis,
-/// y = (b/ω)(cos φ − cos(ωt − φ)). The way of the water is of second order in Δt: it takes the current of the middle of a step.
+/// y = (b/ω)(cos φ − cos(ωt − φ)). The way of the water is of second order in Δt: it takes the current of the middle of
+/// a step.
 static void light_floe_follows_the_ellipse(void **state)
 {
     (void)state;
@@ -100,7 +104,8 @@ static void light_floe_follows_the_ellipse(void **state)
         error[k] = 0;
         for (int s = 1; s * dt <= 11 * hour; s++) { // not a whole period, over which errors cancel
             bt_world_step(w);
-            const double t = s * dt, x = a / om * (sin(om * t - phase) + sin(phase)), y = b / om * (cos(phase) - cos(om * t - phase));
+            const double t = s * dt, x = a / om * (sin(om * t - phase) + sin(phase)),
+                         y = b / om * (cos(phase) - cos(om * t - phase));
             const bt_pose *p = &w->bodies.pose[bt_world_index(w, 0)];
             error[k] = bt_max(error[k], hypot(p->x - x, p->y - y));
         }
@@ -111,8 +116,8 @@ static void light_floe_follows_the_ellipse(void **state)
     CHECK_CLOSE(error[0] / error[1], 4, 0.1);
 }
 
-/// Without drag: with the dynamic tilt a body moves with the water, Coriolis or not. The geostrophic tilt leaves it behind: of a current
-/// u cos ωt along x, Coriolis apart, it knows nothing.
+/// Without drag: with the dynamic tilt a body moves with the water, Coriolis or not. The geostrophic tilt leaves it
+/// behind: of a current u cos ωt along x, Coriolis apart, it knows nothing.
 static void dynamic_tilt_carries_a_body(void **state)
 {
     (void)state;
@@ -138,8 +143,8 @@ static void dynamic_tilt_carries_a_body(void **state)
 
 enum { SIDE = 20 };
 
-/// A sparse field at rest. stirred: every floe is looked at in every step, whatever its velocity.
-static bt_world *field_world(const bt_case *c, int steps, bool stirred, double *active)
+/// A sparse field at rest. disturbed: every floe is looked at in every step, whatever its velocity.
+static bt_world *field_world(const bt_case *c, int steps, bool disturbed, double *active)
 {
     bt_params p = scene_params(0.5, 1);
     bt_world *w = bt_world_create(&p);
@@ -152,9 +157,9 @@ static bt_world *field_world(const bt_case *c, int steps, bool stirred, double *
         d.x = 3 * (i % SIDE), d.y = 3 * (i / SIDE), d.yaw = i;
         bt_world_add(w, &d);
     }
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     for (int s = 0; s < steps; s++) {
-        if (stirred) memset(w->bodies.stirred, 1, (size_t)w->bodies.n);
+        if (disturbed) memset(w->bodies.disturbed, 1, (size_t)w->bodies.n);
         bt_world_step(w);
         if (active) active[s] = (double)w->stats.n_active;
     }
@@ -178,11 +183,13 @@ static void check_same_field(const bt_case *c)
     bt_world_free(b);
 }
 
-/// A field at rest costs nothing and wakes as a whole: when the current sets in, and also when it only changes for others than the water: a gust.
+/// A field at rest costs nothing and wakes as a whole: when the current sets in, and also when it only changes for
+/// others than the water: a gust.
 static void rest_ends_when_the_water_or_the_wind_moves(void **state)
 {
     (void)state;
-    const double rows[] = {0, 0, 0, 10, 0, 0, 20, 0.3, -0.1, 30, 0.3, -0.1, 50, 0, 0}, gust[] = {0, 0, 0, 10, 0, 0, 11, 20, 0, 12, 0, 0, 50, 0, 0};
+    const double rows[] = {0, 0, 0, 10, 0, 0, 20, 0.3, -0.1, 30, 0.3, -0.1, 50, 0, 0},
+                 gust[] = {0, 0, 0, 10, 0, 0, 11, 20, 0, 12, 0, 0, 50, 0, 0};
     bt_case c;
     bt_case_defaults(&c);
     set_table(&c.water.table, 5, rows);
@@ -194,7 +201,8 @@ static void rest_ends_when_the_water_or_the_wind_moves(void **state)
     bt_case_free(&c);
 }
 
-/// A floe with exactly the water's velocity rests in that step; when the water goes faster in the next, it must not keep its old velocity.
+/// A floe with exactly the water's velocity rests in that step; when the water goes faster in the next, it must not
+/// keep its old velocity.
 static void a_floe_at_rest_follows_a_new_current(void **state)
 {
     (void)state;
@@ -216,7 +224,7 @@ static void a_floe_at_rest_follows_a_new_current(void **state)
         d.x = 3 * (i % 3), d.y = 3 * (i / 3), d.vx = 0.25;
         bt_world_add(w, &d);
     }
-    memset(w->bodies.stirred, 0, (size_t)w->bodies.n);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
     for (int s = 1; s <= 100; s++) {
         bt_world_step(w);
         const bt_vel *v = &w->bodies.vel[bt_world_index(w, 4)];
@@ -228,8 +236,9 @@ static void a_floe_at_rest_follows_a_new_current(void **state)
     bt_case_free(&c);
 }
 
-/// Tiles go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, tiles of some metres).
-static void tiles_go_with_the_tide(void **state)
+/// Cells go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, cells
+/// of some metres).
+static void cells_go_with_the_tide(void **state)
 {
     (void)state;
     bt_case c = tidal_case(0.5, 0.3, 40 * deg, 0);
@@ -253,7 +262,7 @@ static void tiles_go_with_the_tide(void **state)
     }
     assert_true(most > 3000);
     // Once at the start, once when the first speed was seen.
-    assert_true(w->tiles->n_labellings <= 3);
+    assert_true(w->cells->n_labellings <= 3);
     CHECK_CLOSE(w->drift_x, w->bodies.pose[bt_world_index(w, 0)].x, 1);
     bt_world_free(w);
     bt_case_free(&c);
@@ -268,7 +277,7 @@ int main(void)
         cmocka_unit_test(dynamic_tilt_carries_a_body),
         cmocka_unit_test(rest_ends_when_the_water_or_the_wind_moves),
         cmocka_unit_test(a_floe_at_rest_follows_a_new_current),
-        cmocka_unit_test(tiles_go_with_the_tide),
+        cmocka_unit_test(cells_go_with_the_tide),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -18,7 +18,8 @@ static void add_body(bt_world *w, bt_impact_rule rule, bool free_body, double ya
     d.x = -5, d.vx = speed, d.yaw = yaw;
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
-    *w->tow = (bt_tow){.mode = free_body ? BT_TOW_NONE : BT_TOW_SPEED, .ux = 1, .speed = speed, .dt = w->par.dt, .travel_x = -5};
+    *w->tow = (bt_tow){
+        .mode = free_body ? BT_TOW_NONE : BT_TOW_SPEED, .ux = 1, .speed = speed, .dt = w->par.dt, .travel_x = -5};
     if (rule.least_speed == 0) rule.least_speed = 0.01;
     bt_impacts *m = w->impacts = bt_alloc(1, sizeof *m);
     *m = (bt_impacts){.rule = rule, .dt = w->par.dt, .tolerance = w->par.tolerance, .sheet = 910, .body_height = 3};
@@ -56,8 +57,8 @@ static int run(bt_world *w, int steps, bt_impact *out)
     return n;
 }
 
-/// Flush and central, heavy body: one collision with λ = (1+e) m V and m_e = m, whatever part of the gap its first step closes.
-/// Half-sine: mean λ/T_c, peak π/2 of it.
+/// Flush and central, heavy body: one collision with λ = (1+e) m V and m_e = m, whatever part of the gap its first step
+/// closes. Half-sine: mean λ/T_c, peak π/2 of it.
 static void central_impact(void **state)
 {
     (void)state;
@@ -88,8 +89,8 @@ static void central_impact(void **state)
         }
 }
 
-/// A corner of a turned floe is hit: 1/m_e = 1/m + (r×n)²/I, λ = (1+e) V m_e; with a free body 1/M + (R×n)²/J comes on top, and
-/// friction, which here sticks, changes λ but not that all of it is collision.
+/// A corner of a turned floe is hit: 1/m_e = 1/m + (r×n)²/I, λ = (1+e) V m_e; with a free body 1/M + (R×n)²/J comes on
+/// top, and friction, which here sticks, changes λ but not that all of it is collision.
 static void eccentric_impact(void **state)
 {
     (void)state;
@@ -102,7 +103,8 @@ static void eccentric_impact(void **state)
         // The corner farthest to −x is at 135° + yaw from the centroid, or 225° + yaw.
         const double cx = -0.5 * cos(yaw) - 0.5 * sin(yaw), cy = -0.5 * sin(yaw) + 0.5 * cos(yaw);
         add_square(w, -cx + 1e-5, 3 - cy, yaw, e, mu);
-        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 2e6, .corner_angle = 1}, free_body, 0);
+        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 2e6, .corner_angle = 1}, free_body,
+                 0);
         set_contact(w, e, mu);
         bt_impact hit[10];
         assert_int_equal(run(w, 8, hit), 1);
@@ -126,8 +128,9 @@ static void eccentric_impact(void **state)
     }
 }
 
-/// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and in λ, but the collision has
-/// the momentum of the mass alone, and the rest is push. From then on the contact carries k V².
+/// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and
+/// in λ, but the collision has the momentum of the mass alone, and the rest is push. From then on the contact carries k
+/// V².
 static void drag_is_push(void **state)
 {
     (void)state;
@@ -152,7 +155,8 @@ static void drag_is_push(void **state)
     bt_world_free(w);
 }
 
-/// Flush, but only a part of the floe's side meets the hull: the body's corner, 0.2 m from the floe's middle, has all of it.
+/// Flush, but only a part of the floe's side meets the hull: the body's corner, 0.2 m from the floe's middle, has all
+/// of it.
 static void hit_beside_the_middle(void **state)
 {
     (void)state;
@@ -169,15 +173,16 @@ static void hit_beside_the_middle(void **state)
     bt_world_free(w);
 }
 
-/// The body itself, free, runs into a wall with its front, or turned by a quarter with its side: it is now the first of the pair. λ = M V, and
-/// the force is against the motion.
+/// The body itself, free, runs into a wall with its front, or turned by a quarter with its side: it is now the first of
+/// the pair. λ = M V, and the force is against the motion.
 static void body_against_a_wall(void **state)
 {
     (void)state;
     for (int i = 0; i < 2; i++) {
         bt_params p = scene_params(0.1, 1);
         bt_world *w = bt_world_create(&p);
-        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 0.5 * BT_PI}, true, i * 0.5 * BT_PI);
+        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 0.5 * BT_PI},
+                 true, i * 0.5 * BT_PI);
         scene_wall(w, 0.03, -50, 20, 60, 0);
         bt_impact hit[10];
         assert_int_equal(run(w, 1, hit), 0);
@@ -243,7 +248,8 @@ static void pushed_ahead(void **state)
     bt_world_free(w);
 }
 
-/// Two floes in a row, apart: the first is hit, then carries the body's push into the second; and a floe met later is an event of its own.
+/// Two floes in a row, apart: the first is hit, then carries the body's push into the second; and a floe met later is
+/// an event of its own.
 static void events_in_their_order(void **state)
 {
     (void)state;
@@ -264,7 +270,8 @@ static void events_in_their_order(void **state)
     bt_world_free(w);
 }
 
-/// The real corner: 90° of a square that hits with its corner, 60° of a triangle, and the body's own corner in a floe's edge.
+/// The real corner: 90° of a square that hits with its corner, 60° of a triangle, and the body's own corner in a floe's
+/// edge.
 static void corner_in_contact(void **state)
 {
     (void)state;
@@ -283,7 +290,10 @@ static void corner_in_contact(void **state)
         d.x = right - low + 1e-5;
         d.y = i == 2 ? 5 * (sin(yaw) - cos(yaw)) : 1;
         bt_world_add(w, &d);
-        add_body(w, (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 1, .real_corner = true}, false, yaw);
+        add_body(
+            w,
+            (bt_impact_rule){.conversion = BT_IMPACT_CRUSHING, .pressure = 1e6, .corner_angle = 1, .real_corner = true},
+            false, yaw);
         bt_impact hit[10];
         assert_true(run(w, 5, hit) >= 1);
         CHECK_CLOSE(hit[0].corner, i == 1 ? BT_PI / 3 : BT_PI / 2, 1e-6);
@@ -297,8 +307,8 @@ static void corner_in_contact(void **state)
     }
 }
 
-/// A heap of many floes before a turning, free body: at every sample the panels together carry the ice force, panels hold what touches there, and
-/// push and collision make up the resistance.
+/// A heap of many floes before a turning, free body: at every sample the panels together carry the ice force, panels
+/// hold what touches there, and push and collision make up the resistance.
 static void panels_carry_the_ice_force(void **state)
 {
     (void)state;
@@ -354,9 +364,13 @@ static void panels_of_a_square(void **state)
     scene_square(10, v);
     bt_panels p;
     bt_panels_init(&p, 40, 4, v);
-    const struct { double x, y; int panel; } at[] = {{5.1, 0, 0}, {5, 0.49, 0}, {5, -0.49, 0}, {5, 0.51, 1}, {5, -0.51, 39}, {4.9, 4.4, 4},
-                                                     {0.1, 5.2, 10}, {-5, 0, 20}, {-5.3, 0.6, 19}, {0, -5, 30}, {9, 9, 5}};
-    for (size_t i = 0; i < sizeof at / sizeof *at; i++) assert_int_equal(bt_panels_at(&p, at[i].x, at[i].y), at[i].panel);
+    const struct {
+        double x, y;
+        int panel;
+    } at[] = {{5.1, 0, 0},    {5, 0.49, 0}, {5, -0.49, 0},   {5, 0.51, 1}, {5, -0.51, 39}, {4.9, 4.4, 4},
+              {0.1, 5.2, 10}, {-5, 0, 20},  {-5.3, 0.6, 19}, {0, -5, 30},  {9, 9, 5}};
+    for (size_t i = 0; i < sizeof at / sizeof *at; i++)
+        assert_int_equal(bt_panels_at(&p, at[i].x, at[i].y), at[i].panel);
     for (int k = 0; k < 40; k++) {
         double xy[2], n[2];
         bt_panels_point(&p, k + 0.5, xy, n);

@@ -169,7 +169,9 @@ static void projection_adds_no_velocity(void **state)
     for (int s = 0; s < 5; s++) bt_world_step(w);
     assert_true(bt_world_overlap(w) <= 1.2e-6);
     for (int k = 0; k < 2; k++)
-        CHECK_CLOSE(fabs(w->bodies.vel[bt_world_index(w, k)].x) + fabs(w->bodies.vel[bt_world_index(w, k)].y) + fabs(w->bodies.vel[bt_world_index(w, k)].w), 0, 0);
+        CHECK_CLOSE(fabs(w->bodies.vel[bt_world_index(w, k)].x) + fabs(w->bodies.vel[bt_world_index(w, k)].y) +
+                        fabs(w->bodies.vel[bt_world_index(w, k)].w),
+                    0, 0);
     // The lighter one moves three times as far.
     CHECK_CLOSE(-w->bodies.pose[bt_world_index(w, 0)].x, 3 * (w->bodies.pose[bt_world_index(w, 1)].x - 0.95), 1e-6);
     bt_world_free(w);

@@ -43,7 +43,8 @@ static void terminal_velocity(void **state)
         double furthest = 0;
         for (int s = 0; s < 20000; s++) {
             bt_world_step(w);
-            furthest = bt_max(furthest, hypot(w->bodies.vel[bt_world_index(w, 0)].x, w->bodies.vel[bt_world_index(w, 0)].y));
+            furthest =
+                bt_max(furthest, hypot(w->bodies.vel[bt_world_index(w, 0)].x, w->bodies.vel[bt_world_index(w, 0)].y));
         }
         const double width = bt_shape_width(24, w->bodies.vertices, 12.0 / 13, 5.0 / 13);
         const double kw = 4 + 10 * width, ka = 0.02 + 0.1 * width, u = 13 / (1 + sqrt(kw / ka));
@@ -72,12 +73,14 @@ static void inertial_circle(void **state)
             if (s == n / 8) assert_true(sense * w->bodies.vel[bt_world_index(w, 0)].y > 0);
             x_min = bt_min(x_min, w->bodies.pose[bt_world_index(w, 0)].x);
             x_max = bt_max(x_max, w->bodies.pose[bt_world_index(w, 0)].x);
-            if (fabs(w->bodies.pose[bt_world_index(w, 0)].y) > fabs(y_far)) y_far = w->bodies.pose[bt_world_index(w, 0)].y;
+            if (fabs(w->bodies.pose[bt_world_index(w, 0)].y) > fabs(y_far))
+                y_far = w->bodies.pose[bt_world_index(w, 0)].y;
         }
         CHECK_CLOSE(hypot(w->bodies.vel[bt_world_index(w, 0)].x, w->bodies.vel[bt_world_index(w, 0)].y), u, 1e-13);
         CHECK_CLOSE(0.5 * (x_max - x_min), u / f, 2e-3 * u / f);
         CHECK_CLOSE(y_far, sense * 2 * u / f, 2e-3 * u / f);
-        CHECK_CLOSE(hypot(w->bodies.pose[bt_world_index(w, 0)].x, w->bodies.pose[bt_world_index(w, 0)].y), 0, 0.01 * u / f);
+        CHECK_CLOSE(hypot(w->bodies.pose[bt_world_index(w, 0)].x, w->bodies.pose[bt_world_index(w, 0)].y), 0,
+                    0.01 * u / f);
         bt_world_free(w);
     }
 }
@@ -117,7 +120,13 @@ static bt_world *line_world(double dt, double k, double c, double speed, bt_drag
     d.drag = drag;
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
-    *w->tow = (bt_tow){.mode = BT_TOW_LINE, .ux = 1, .speed = speed, .branch[0] = {.length0 = 10, .k = k, .c = c}, .n_branches = 1, .dt = dt, .carriage_x = 10};
+    *w->tow = (bt_tow){.mode = BT_TOW_LINE,
+                       .ux = 1,
+                       .speed = speed,
+                       .branch[0] = {.length0 = 10, .k = k, .c = c},
+                       .n_branches = 1,
+                       .dt = dt,
+                       .carriage_x = 10};
     return w;
 }
 
@@ -148,7 +157,8 @@ static void spring_towed_mass(void **state)
     bt_world_free(w);
 }
 
-/// With drag the tow becomes steady: T = k_d V². Damped line, any stiffness: stable at Δt 0.1 s for EA over ten decades.
+/// With drag the tow becomes steady: T = k_d V². Damped line, any stiffness: stable at Δt 0.1 s for EA over ten
+/// decades.
 static void line_is_stable_and_carries_the_drag(void **state)
 {
     (void)state;

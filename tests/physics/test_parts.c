@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Floes that are not convex: contacts of their parts against distances of the outlines, bays, shores of several parts, balances.
+// Floes that are not convex: contacts of their parts against distances of the outlines, bays, shores of several parts,
+// balances.
 #include "scene.h"
 
 #include "bergtow/outline.h"
@@ -65,14 +66,17 @@ static double distance_of(int np, const double *p, int nq, const double *q, doub
     for (int i = 0; i < np; i++)
         for (int j = 0; j < nq; j++) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % np), *c = q + 2 * j, *d = q + 2 * ((j + 1) % nq);
-            const double s1 = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]), s2 = (b[0] - a[0]) * (d[1] - a[1]) - (b[1] - a[1]) * (d[0] - a[0]);
-            const double s3 = (d[0] - c[0]) * (a[1] - c[1]) - (d[1] - c[1]) * (a[0] - c[0]), s4 = (d[0] - c[0]) * (b[1] - c[1]) - (d[1] - c[1]) * (b[0] - c[0]);
+            const double s1 = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]),
+                         s2 = (b[0] - a[0]) * (d[1] - a[1]) - (b[1] - a[1]) * (d[0] - a[0]);
+            const double s3 = (d[0] - c[0]) * (a[1] - c[1]) - (d[1] - c[1]) * (a[0] - c[0]),
+                         s4 = (d[0] - c[0]) * (b[1] - c[1]) - (d[1] - c[1]) * (b[0] - c[0]);
             if (s1 * s2 < 0 && s3 * s4 < 0) return 0;
         }
     return best;
 }
 
-/// Depth of the deepest vertex of one outline inside the other, with nothing of the contact code: crossing number, and distance to the shore.
+/// Depth of the deepest vertex of one outline inside the other, with nothing of the contact code: crossing number, and
+/// distance to the shore.
 static double depth_of(int np, const double *p, int nq, const double *q)
 {
     double deepest = 0;
@@ -102,7 +106,8 @@ static double deepest_of_all(const bt_world *w)
     for (bt_idx i = 0; i < w->bodies.n; i++)
         for (bt_idx j = i + 1; j < w->bodies.n; j++) {
             const bt_pose *x = &w->bodies.pose[i], *y = &w->bodies.pose[j];
-            if (w->bodies.motion[i] != BT_DYNAMIC && w->bodies.motion[j] != BT_DYNAMIC) continue; // walls meet at their corners
+            // walls meet at their corners
+            if (w->bodies.motion[i] != BT_DYNAMIC && w->bodies.motion[j] != BT_DYNAMIC) continue;
             if (hypot(x->x - y->x, x->y - y->y) > w->bodies.radius[i] + w->bodies.radius[j]) continue;
             const int n = outline_at(w, i, x->x, x->y, p), m = outline_at(w, j, y->x, y->y, q);
             deepest = bt_max(deepest, depth_of(n, p, m, q));
@@ -124,8 +129,9 @@ static double least_gap(const bt_world *w, double margin, double *nx, double *ny
     return least;
 }
 
-/// Two outlines, one of them or both with bays, at a known distance: there is a contact within the margin, its gap is the distance, and none feigns
-/// less. A little into each other along their nearest points: the depth is found, and the way out is short.
+/// Two outlines, one of them or both with bays, at a known distance: there is a contact within the margin, its gap is
+/// the distance, and none feigns less. A little into each other along their nearest points: the depth is found, and the
+/// way out is short.
 static void gaps_are_distances_of_outlines(void **state)
 {
     (void)state;
@@ -178,7 +184,7 @@ static void detect_equals_brute_force_with_parts(void **state)
     for (int scene = 0; scene < 4; scene++) {
         bt_params p = params_of_world(0.1);
         const double box = 16;
-        p.tile = 2;
+        p.cell = 2;
         p.period_x = p.period_y = scene % 2 ? box : 0;
         bt_world *w = bt_world_create(&p);
         double v[2 * BT_MAX_VERTICES];
@@ -186,7 +192,7 @@ static void detect_equals_brute_force_with_parts(void **state)
             const int n = i % 3 ? random_star(&rng, 0.8, v) : scene_random_polygon(&rng, 0.6, v);
             add_outline(w, n, v, box * scene_uniform(&rng), box * scene_uniform(&rng), 7 * scene_uniform(&rng), 0, 0);
         }
-        // A large one, with bays: in the last tile, with floes of any other.
+        // A large one, with bays: in the last cell, with floes of any other.
         int n_large;
         do n_large = random_star(&rng, 3, v);
         while (bt_outline_convex(n_large, v));
@@ -199,18 +205,20 @@ static void detect_equals_brute_force_with_parts(void **state)
         bt_world_add(w, &d);
         for (int step = 0; step < 25; step++) {
             const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 10 < 5 ? 0.05 : 0.12));
-            // Which of two facing edges is the reference depends on the step before, within the tie: without it both must find the same.
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_pairs; j++) w->tiles->tile[k].pairs[j].n_points = 0;
+            // Which of two facing edges is the reference depends on the step before, within the tie: without it both
+            // must find the same.
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_pairs; j++) w->cells->cell[k].pairs[j].n_points = 0;
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, have = 0;
             bt_contacts_brute_force(w, margin, &want, &n);
             bool *taken = bt_alloc((size_t)n, sizeof *taken);
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-                    const bt_unit *u = &w->tiles->tile[k].units[j];
-                    const double *gaps = w->tiles->tile[k].gaps[j].gap, gap = u->n > 1 ? bt_min(gaps[0], gaps[1]) : gaps[0];
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+                    const bt_contact *u = &w->cells->cell[k].contacts[j];
+                    const double *gaps = w->cells->cell[k].gaps[j].gap,
+                                 gap = u->n > 1 ? bt_min(gaps[0], gaps[1]) : gaps[0];
                     bt_idx at = -1;
                     for (bt_idx l = 0; l < n && at < 0; l++) {
                         const bt_manifold *m = &want[l];
@@ -227,14 +235,15 @@ static void detect_equals_brute_force_with_parts(void **state)
             free(want);
             bt_bodies *b = &w->bodies;
             for (bt_idx i = 0; i < b->n; i++) {
-                const double dx = 0.06 * (scene_uniform(&rng) - 0.5), dy = 0.06 * (scene_uniform(&rng) - 0.5), dr = 0.06 * (scene_uniform(&rng) - 0.5);
+                const double dx = 0.06 * (scene_uniform(&rng) - 0.5), dy = 0.06 * (scene_uniform(&rng) - 0.5),
+                             dr = 0.06 * (scene_uniform(&rng) - 0.5);
                 b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
                 bt_bodies_turn(&w->bodies, i);
                 b->path[i] += hypot(dx, dy) + b->radius[i] * fabs(dr);
             }
-            for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->moved[k] += 0.14;
-            w->tiles->moved_any += 0.14;
-            w->tiles->relabel = true;
+            for (bt_idx k = 0; k < w->cells->n; k++) w->cells->moved[k] += 0.14;
+            w->cells->moved_any += 0.14;
+            w->cells->relabel = true;
         }
         bt_world_free(w);
     }
@@ -242,8 +251,8 @@ static void detect_equals_brute_force_with_parts(void **state)
     assert_int_equal(missing, 0);
 }
 
-/// A small floe enters the bay of a C that its hull would close, meets the inner shore after the way that is drawn, and both go on with the common
-/// momentum.
+/// A small floe enters the bay of a C that its hull would close, meets the inner shore after the way that is drawn, and
+/// both go on with the common momentum.
 static void a_bay_is_open(void **state)
 {
     (void)state;
@@ -300,9 +309,9 @@ static void a_cut_does_not_stop_a_slide(void **state)
     }
 }
 
-/// A convex floe cut by hand collides like the whole one: off-centre, so that it turns, and with the cut where it is hit or elsewhere. Where two edges
-/// face each other squarely the parts may take the other one's normal, within the tie of the narrow phase; that is some per cent of the
-/// velocities, and happens in few of these.
+/// A convex floe cut by hand collides like the whole one: off-centre, so that it turns, and with the cut where it is
+/// hit or elsewhere. Where two edges face each other squarely the parts may take the other one's normal, within the tie
+/// of the narrow phase; that is some per cent of the velocities, and happens in few of these.
 static void parts_collide_like_the_whole(void **state)
 {
     (void)state;
@@ -316,9 +325,10 @@ static void parts_collide_like_the_whole(void **state)
                 double hexagon[12], s[8];
                 bt_shape_regular(6, 2, hexagon);
                 bt_body_def d = scene_prism(6, hexagon, 900);
-                const bt_parts parts[3] = {{.n = 2, .count = {4, 4}, .n_vertices = 8, .corner = {0, 1, 2, 3, 0, 3, 4, 5}},
-                                           {.n = 2, .count = {4, 4}, .n_vertices = 8, .corner = {1, 2, 3, 4, 1, 4, 5, 0}},
-                                           {.n = 4, .count = {3, 3, 3, 3}, .n_vertices = 12, .corner = {0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 5}}};
+                const bt_parts parts[3] = {
+                    {.n = 2, .count = {4, 4}, .n_vertices = 8, .corner = {0, 1, 2, 3, 0, 3, 4, 5}},
+                    {.n = 2, .count = {4, 4}, .n_vertices = 8, .corner = {1, 2, 3, 4, 1, 4, 5, 0}},
+                    {.n = 4, .count = {3, 3, 3, 3}, .n_vertices = 12, .corner = {0, 1, 2, 0, 2, 3, 0, 3, 4, 0, 4, 5}}};
                 d.parts = split ? &parts[cut] : NULL;
                 d.friction = 0.2;
                 bt_world_add(w, &d);
@@ -352,7 +362,8 @@ static void heap_of_stars_keeps_its_balances(void **state)
     double v[2 * BT_MAX_VERTICES];
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++) {
-            const bt_gid g = add_outline(w, random_star(&rng, 0.9, v), v, 2.2 * i, 2.2 * j, 7 * scene_uniform(&rng), -0.2 * (i - 2.5), -0.2 * (j - 2.5));
+            const bt_gid g = add_outline(w, random_star(&rng, 0.9, v), v, 2.2 * i, 2.2 * j, 7 * scene_uniform(&rng),
+                                         -0.2 * (i - 2.5), -0.2 * (j - 2.5));
             w->bodies.friction[g] = 0.3;
         }
     double before[4] = {0}, energy = INFINITY, touched = 0, overlap = 0;
@@ -379,8 +390,8 @@ static void heap_of_stars_keeps_its_balances(void **state)
     bt_world_free(w);
 }
 
-/// Stars pressed together by walls that close until they lock: every overlap that a look at the outlines finds stays small, and the program's
-/// own figure of it does not hide any.
+/// Stars pressed together by walls that close until they lock: every overlap that a look at the outlines finds stays
+/// small, and the program's own figure of it does not hide any.
 static void pressed_stars_do_not_pass_through_each_other(void **state)
 {
     (void)state;
@@ -395,9 +406,16 @@ static void pressed_stars_do_not_pass_through_each_other(void **state)
             w->bodies.friction[g] = 0.2;
         }
     for (int k = 0; k < 4; k++) {
-        const double in = 0.05, at[4][4] = {{-3.5, 5, 1, 9}, {13.5, 5, 1, 9}, {5, -3.5, 9, 1}, {5, 13.5, 9, 1}}; // centre and half sides
+        // centre and half sides
+        const double in = 0.05, at[4][4] = {{-3.5, 5, 1, 9}, {13.5, 5, 1, 9}, {5, -3.5, 9, 1}, {5, 13.5, 9, 1}};
         double slab[8] = {-at[k][2], -at[k][3], at[k][2], -at[k][3], at[k][2], at[k][3], -at[k][2], at[k][3]};
-        bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = slab, .x = at[k][0], .y = at[k][1], .friction = 0.1};
+        bt_body_def d = {.motion = BT_KINEMATIC,
+                         .large = true,
+                         .n_vertices = 4,
+                         .vertices = slab,
+                         .x = at[k][0],
+                         .y = at[k][1],
+                         .friction = 0.1};
         if (k < 2) d.vx = k ? -in : in;
         else d.vy = k == 3 ? -in : in;
         bt_world_add(w, &d);
@@ -405,8 +423,9 @@ static void pressed_stars_do_not_pass_through_each_other(void **state)
     double worst = 0, deepest = 0;
     for (int s = 0; s < 1550; s++) {
         bt_world_step(w);
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) pressed = bt_max(pressed, w->tiles->tile[k].units[j].ln[0]);
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++)
+                pressed = bt_max(pressed, w->cells->cell[k].contacts[j].ln[0]);
         if (s % 20 == 0) worst = bt_max(worst, bt_max(deepest_of_all(w) - 2 * w->stats.overlap, 0));
         if (s % 20 == 0) deepest = bt_max(deepest, w->stats.overlap);
     }
@@ -418,9 +437,13 @@ static void pressed_stars_do_not_pass_through_each_other(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(gaps_are_distances_of_outlines), cmocka_unit_test(detect_equals_brute_force_with_parts),
-        cmocka_unit_test(a_bay_is_open), cmocka_unit_test(a_cut_does_not_stop_a_slide), cmocka_unit_test(parts_collide_like_the_whole),
-        cmocka_unit_test(heap_of_stars_keeps_its_balances), cmocka_unit_test(pressed_stars_do_not_pass_through_each_other),
+        cmocka_unit_test(gaps_are_distances_of_outlines),
+        cmocka_unit_test(detect_equals_brute_force_with_parts),
+        cmocka_unit_test(a_bay_is_open),
+        cmocka_unit_test(a_cut_does_not_stop_a_slide),
+        cmocka_unit_test(parts_collide_like_the_whole),
+        cmocka_unit_test(heap_of_stars_keeps_its_balances),
+        cmocka_unit_test(pressed_stars_do_not_pass_through_each_other),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,17 +46,17 @@ static bt_pose *pose(bt_world *w, bt_gid g) { return &w->bodies.pose[bt_world_in
 static void set_speed(bt_world *w, bt_gid g, double x)
 {
     vel(w, g)->x = x;
-    w->bodies.stirred[bt_world_index(w, g)] = 1;
-    w->tiles->relabel = true; // it may lie in a tile that rests
+    w->bodies.disturbed[bt_world_index(w, g)] = 1;
+    w->cells->relabel = true; // it may lie in a cell that rests
 }
 
 /// Sum of the normal impulses on body g over dt, N.
 static double load_on(const bt_world *w, bt_gid g)
 {
     double sum = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-            const bt_unit *u = &w->tiles->tile[k].units[j];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+            const bt_contact *u = &w->cells->cell[k].contacts[j];
             if (w->bodies.gid[u->a] == g || w->bodies.gid[u->b] == g) sum += u->ln[0] + u->ln[1];
         }
     return sum / w->par.dt;
@@ -164,7 +164,7 @@ static void out_behind(void **state)
     }
     assert_true(under && parted);
     bt_idx records = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++) records += w->tiles->tile[k].n_memory;
+    for (bt_idx k = 0; k < w->cells->n; k++) records += w->cells->cell[k].n_memory;
     assert_int_equal(records, 0);
     bt_world_free(w);
 }

@@ -8,7 +8,8 @@ static const double sheet = 36.4; // ρ_i h, kg/m²
 
 static bt_idx add_body(bt_world *w, int n, double *v, double x, double speed)
 {
-    bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = n, .vertices = v, .x = x, .vx = speed, .mass = 1e4};
+    bt_body_def d = {
+        .motion = BT_KINEMATIC, .large = true, .n_vertices = n, .vertices = v, .x = x, .vx = speed, .mass = 1e4};
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
     *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = 1, .speed = speed, .dt = w->par.dt, .travel_x = x};
@@ -69,7 +70,8 @@ static void dilute_field(void **state)
     bt_world *w = bt_world_create(&p);
     uint64_t rng = 9;
     for (int k = 0; k < n; k++) // strata along x, a low-discrepancy sequence across: little scatter, no two overlap
-        add_floe(w, r, 10 + length * (k + 0.5) / n, lane * (fmod(0.618033988749895 * k, 1) - 0.5), 7 * scene_uniform(&rng), 0);
+        add_floe(w, r, 10 + length * (k + 0.5) / n, lane * (fmod(0.618033988749895 * k, 1) - 0.5),
+                 7 * scene_uniform(&rng), 0);
     double o[2 * BT_MAX_VERTICES];
     int m = bt_shape_named("disc", 2 * big, 2 * big, o);
     add_body(w, m, o, 0, v);
@@ -129,9 +131,9 @@ static void plough_in_a_channel(void **state)
             bt_observe(w, v, &sample);
             // A row solved to the residual ρ can do at most λ ρ of positive work.
             double exchanged = 0;
-            for (bt_idx k = 0; k < w->tiles->n; k++)
-                for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++)
-                    exchanged += w->tiles->tile[k].units[j].ln[0] + w->tiles->tile[k].units[j].ln[1];
+            for (bt_idx k = 0; k < w->cells->n; k++)
+                for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++)
+                    exchanged += w->cells->cell[k].contacts[j].ln[0] + w->cells->cell[k].contacts[j].ln[1];
             assert_true(w->stats.contact_work <= 2 * exchanged * p.tolerance);
             if (s % 50 && front0 > 0) {
                 impulse += sample.ice_resistance * p.dt;
@@ -140,7 +142,8 @@ static void plough_in_a_channel(void **state)
             // Front: where the ice that moves on average ends, by the momentum of the swept floes: all floes up
             // to it have been swept, so their number gives it without a threshold on single floes.
             double momentum = 0;
-            for (int k = 0; k < n; k++) momentum += w->bodies.mass[bt_world_index(w, k)] * w->bodies.vel[bt_world_index(w, k)].x;
+            for (int k = 0; k < n; k++)
+                momentum += w->bodies.mass[bt_world_index(w, k)] * w->bodies.vel[bt_world_index(w, k)].x;
             const double front = momentum / (sheet * a * width * v);
             if (front0 == 0 && front > 0.3 * length) front0 = front, t0 = sample.time, impulse = 0;
             else if (front0 > 0) impulse += sample.ice_resistance * p.dt;
@@ -150,10 +153,14 @@ static void plough_in_a_channel(void **state)
         // φ from areas: every floe whose centre lies between piston and front, away from the loose layer at the front.
         const double low = w->bodies.pose[bt_world_index(w, w->towed)].x + 1, high = front1 - 5;
         double inside = 0;
-        for (int k = 0; k < n; k++) inside += w->bodies.pose[bt_world_index(w, k)].x > low && w->bodies.pose[bt_world_index(w, k)].x < high ? area : 0;
+        for (int k = 0; k < n; k++)
+            inside += w->bodies.pose[bt_world_index(w, k)].x > low && w->bodies.pose[bt_world_index(w, k)].x < high
+                          ? area
+                          : 0;
         const double phi = inside / (width * (high - low));
         const double speed = v * phi / (phi - a), force = sheet * width * v * v * a * phi / (phi - a);
-        print_message("A %.3f phi %.4f front %.4f want %.4f force %.4f want %.4f\n", a, phi, (front1 - front0) / (t1 - t0), speed, impulse / (t1 - t0), force);
+        print_message("A %.3f phi %.4f front %.4f want %.4f force %.4f want %.4f\n", a, phi,
+                      (front1 - front0) / (t1 - t0), speed, impulse / (t1 - t0), force);
         assert_true(phi > 0.7 && phi < 0.9);
         CHECK_CLOSE((front1 - front0) / (t1 - t0), speed, 0.05 * speed);
         CHECK_CLOSE(impulse / (t1 - t0), force, 0.05 * force);

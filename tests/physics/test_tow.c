@@ -46,7 +46,8 @@ static bt_world *vessel_world(double dt, double sheet, double vessel_mass, doubl
 }
 
 /// Two masses on a line stretched by s0 and let go oscillate with the reduced mass μ = m M/(m + M):
-/// stretch s0 e^(−ct/2μ) (cos ωt + (c/2μω) sin ωt), ω² = k/μ − (c/2μ)², until the line goes slack; their centre of mass stays.
+/// stretch s0 e^(−ct/2μ) (cos ωt + (c/2μω) sin ωt), ω² = k/μ − (c/2μ)², until the line goes slack; their centre of mass
+/// stays.
 static void free_vessel_and_body_swing_with_the_reduced_mass(void **state)
 {
     (void)state;
@@ -64,7 +65,8 @@ static void free_vessel_and_body_swing_with_the_reduced_mass(void **state)
                 const double t = s * dt, e = exp(-half * t), stretch = s0 * e * (cos(om * t) + half / om * sin(om * t));
                 worst = bt_max(worst, fabs(w->tow->carriage_x - w->tow->travel_x - 10 - stretch));
                 const double tm = t - 0.5 * dt, em = exp(-half * tm);
-                const double tension = s0 * em * (k * cos(om * tm) + (k * half / om - c * (half * half + om * om) / om) * sin(om * tm));
+                const double tension =
+                    s0 * em * (k * cos(om * tm) + (k * half / om - c * (half * half + om * om) / om) * sin(om * tm));
                 worst_t = bt_max(worst_t, fabs(bt_tow_tension(w->tow, 0) - tension));
                 CHECK_CLOSE(m * body_vel(w).x + big * w->tow->vessel.vx, 0, 1e-12 * m);
             }
@@ -74,8 +76,8 @@ static void free_vessel_and_body_swing_with_the_reduced_mass(void **state)
         }
 }
 
-/// Period by zero crossings of the swing about a mean tension: body and vessel pulled apart by drag-free constant thrust would drift, so the end
-/// stands and the wind pulls; ω² = k/m, decrement e^(−cT/2m).
+/// Period by zero crossings of the swing about a mean tension: body and vessel pulled apart by drag-free constant
+/// thrust would drift, so the end stands and the wind pulls; ω² = k/m, decrement e^(−cT/2m).
 static void body_in_the_wind_swings_on_a_fixed_end(void **state)
 {
     (void)state;
@@ -104,7 +106,8 @@ static void body_in_the_wind_swings_on_a_fixed_end(void **state)
     bt_world_free(w);
 }
 
-/// A slack line does not damp: a heavily damped one pays out its metre of slack without a force, and pulls from then on.
+/// A slack line does not damp: a heavily damped one pays out its metre of slack without a force, and pulls from then
+/// on.
 static void a_slack_line_is_no_damper(void **state)
 {
     (void)state;
@@ -123,8 +126,8 @@ static void a_slack_line_is_no_damper(void **state)
     bt_world_free(w);
 }
 
-/// Bridle: two branches at ±0.6 m. Their stiffnesses add along the tow; a body that is turned is turned back. Against drag k_d V² each
-/// carries half, more by the angle between them.
+/// Bridle: two branches at ±0.6 m. Their stiffnesses add along the tow; a body that is turned is turned back. Against
+/// drag k_d V² each carries half, more by the angle between them.
 static void bridle_shares_the_load(void **state)
 {
     (void)state;
@@ -133,7 +136,8 @@ static void bridle_shares_the_load(void **state)
     const double v = 0.5, l = 5;
     t->mode = BT_TOW_LINE;
     t->n_branches = 2;
-    for (int i = 0; i < 2; i++) t->branch[i] = (bt_branch){.length0 = l, .k = 2000, .c = 500, .hull_x = 0.2, .hull_y = i ? -0.6 : 0.6};
+    for (int i = 0; i < 2; i++)
+        t->branch[i] = (bt_branch){.length0 = l, .k = 2000, .c = 500, .hull_x = 0.2, .hull_y = i ? -0.6 : 0.6};
     t->speed = v;
     t->carriage_x = 0.2 + sqrt(l * l - 0.36);
     bt_idx i = bt_world_towed(w);
@@ -150,7 +154,8 @@ static void bridle_shares_the_load(void **state)
     bt_world_free(w);
 }
 
-/// T below and above the breaking load by a thousandth. The load grows slowly: the tension of a ramp a of the end is, for a fixed body, k a t²/2.
+/// T below and above the breaking load by a thousandth. The load grows slowly: the tension of a ramp a of the end is,
+/// for a fixed body, k a t²/2.
 static void a_branch_breaks_at_its_load(void **state)
 {
     (void)state;
@@ -227,12 +232,14 @@ static double vessel_closure(const bt_tow *t)
     }
     const double drag[2] = {t->dt * s->kd * (s->vd2 - s->ud), t->dt * s->kn * (s->vn2 - s->un)};
     const double gain[2] = {s->mass * (s->vd2 - s->vd1), s->mass * (s->vn2 - s->vn1)};
-    const double scale = bt_max(bt_max(fabs(s->thrust), hypot(pull[0], pull[1])), bt_max(hypot(drag[0], drag[1]), s->mass * hypot(s->vd2, s->vn2)));
+    const double scale = bt_max(bt_max(fabs(s->thrust), hypot(pull[0], pull[1])),
+                                bt_max(hypot(drag[0], drag[1]), s->mass * hypot(s->vd2, s->vn2)));
     return scale > 0 ? hypot(s->thrust - drag[0] - gain[0] - pull[0], drag[1] + gain[1] + pull[1]) / scale : 0;
 }
 
-/// Full power: T_b (1 − (v/s_f)²) = k_d v². Governed: v of the programme, thrust R_f (v/s_f)² + k_d v². In a current U along the course both drags
-/// are by the speed through the water, the governor by that over ground. Any step up to 5 s, any line, a vessel a hundredth of the body or heavier.
+/// Full power: T_b (1 − (v/s_f)²) = k_d v². Governed: v of the programme, thrust R_f (v/s_f)² + k_d v². In a current U
+/// along the course both drags are by the speed through the water, the governor by that over ground. Any step up to 5
+/// s, any line, a vessel a hundredth of the body or heavier.
 static void vessel_bollard_equilibrium(void **state)
 {
     (void)state;
@@ -250,7 +257,12 @@ static void vessel_bollard_equilibrium(void **state)
                         t->n_branches = 1;
                         t->branch[0] = (bt_branch){.length0 = 10, .k = stiff[b], .c = 0.2 * sqrt(stiff[b] * mass[c])};
                         t->carriage_x = 10;
-                        t->vessel = (bt_vessel){.mass = mass[c], .bollard_pull = tb, .free_speed = sf, .free_resistance = rf, .lateral = 10, .lookahead = 50};
+                        t->vessel = (bt_vessel){.mass = mass[c],
+                                                .bollard_pull = tb,
+                                                .free_speed = sf,
+                                                .free_resistance = rf,
+                                                .lateral = 10,
+                                                .lookahead = 50};
                         straight_path(t, 10, 0, 1, 0);
                         t->speed = governed ? 1.5 : 50;
                         double fastest = 0;
@@ -261,7 +273,8 @@ static void vessel_bollard_equilibrium(void **state)
                             assert_true(vessel_closure(t) < 1e-12);
                             fastest = bt_max(fastest, t->vessel.vx);
                         }
-                        const double through = governed ? 1.5 - current[e] : sqrt(tb / (kd + tb / sf / sf)), v = through + current[e];
+                        const double through = governed ? 1.5 - current[e] : sqrt(tb / (kd + tb / sf / sf)),
+                                     v = through + current[e];
                         CHECK_CLOSE(t->vessel.vx, v, 1e-6 * v);
                         CHECK_CLOSE(body_vel(w).x, v, 1e-6 * v);
                         CHECK_CLOSE(bt_tow_tension(t, 0), kd * through * through, 1e-5 * kd * through * through);
@@ -277,7 +290,8 @@ static double energy(const bt_world *w)
     const bt_tow *t = w->tow;
     const bt_idx i = bt_world_towed(w);
     const bt_vel v = w->bodies.vel[i];
-    double e = 0.5 * (w->bodies.mass[i] * (v.x * v.x + v.y * v.y) + w->bodies.inertia[i] * v.w * v.w) + 0.5 * t->vessel.mass * (t->vessel.vx * t->vessel.vx + t->vessel.vy * t->vessel.vy);
+    double e = 0.5 * (w->bodies.mass[i] * (v.x * v.x + v.y * v.y) + w->bodies.inertia[i] * v.w * v.w) +
+               0.5 * t->vessel.mass * (t->vessel.vx * t->vessel.vx + t->vessel.vy * t->vessel.vy);
     for (int k = 0; k < t->n_branches; k++) {
         const bt_branch *b = &t->branch[k];
         const double x = t->travel_x + cos(w->bodies.pose[i].yaw) * b->hull_x - sin(w->bodies.pose[i].yaw) * b->hull_y;
@@ -288,8 +302,9 @@ static double energy(const bt_world *w)
     return e;
 }
 
-/// A stretched bridle between free body and vessel, no damping, no drag, Δt 5 s, stiffness over eleven decades and unequal by ten: the energy never grows
-/// beyond what the line held (twice that while the swing is resolved coarsely, h < 2).
+/// A stretched bridle between free body and vessel, no damping, no drag, Δt 5 s, stiffness over eleven decades and
+/// unequal by ten: the energy never grows beyond what the line held (twice that while the swing is resolved coarsely, h
+/// < 2).
 static void a_bridle_is_stable_at_any_stiffness(void **state)
 {
     (void)state;
@@ -298,7 +313,8 @@ static void a_bridle_is_stable_at_any_stiffness(void **state)
             bt_world *w = vessel_world(5, 50, light ? 1 : 100, k, 0, 0.05);
             bt_tow *t = w->tow;
             t->n_branches = 2;
-            for (int i = 0; i < 2; i++) t->branch[i] = (bt_branch){.length0 = 10, .k = i ? 10 * k : k, .hull_y = i ? -0.3 : 0.3};
+            for (int i = 0; i < 2; i++)
+                t->branch[i] = (bt_branch){.length0 = 10, .k = i ? 10 * k : k, .hull_y = i ? -0.3 : 0.3};
             const double e0 = energy(w);
             double most = 0;
             for (int s = 0; s < 6000; s++) {
@@ -326,8 +342,8 @@ static void a_stopped_programme_leaves_the_vessel_to_its_drag(void **state)
     bt_world_free(w);
 }
 
-/// A heavy body pushed into a row of light floes against a wall, on a bridle of a light vessel: contact forces, line and thrust in one
-/// system, solved to the tolerance, and in the end at rest, with thrust = tension = push on the wall.
+/// A heavy body pushed into a row of light floes against a wall, on a bridle of a light vessel: contact forces, line
+/// and thrust in one system, solved to the tolerance, and in the end at rest, with thrust = tension = push on the wall.
 static void rows_and_contacts_are_one_system(void **state)
 {
     (void)state;
@@ -351,8 +367,11 @@ static void rows_and_contacts_are_one_system(void **state)
         w->tow = bt_alloc(1, sizeof *w->tow);
         bt_tow *t = w->tow;
         *t = (bt_tow){.mode = BT_TOW_THRUST, .ux = 1, .dt = 5, .speed = 0.5, .n_branches = 2, .carriage_x = 20.2};
-        for (int k = 0; k < 2; k++) t->branch[k] = (bt_branch){.length0 = 20, .k = stiff[i], .c = 10 * sqrt(stiff[i]), .hull_x = 0.5, .hull_y = k ? -1 : 1};
-        t->vessel = (bt_vessel){.mass = 200, .bollard_pull = 400, .free_speed = 5, .free_resistance = 100, .lateral = 10, .lookahead = 50};
+        for (int k = 0; k < 2; k++)
+            t->branch[k] = (bt_branch){
+                .length0 = 20, .k = stiff[i], .c = 10 * sqrt(stiff[i]), .hull_x = 0.5, .hull_y = k ? -1 : 1};
+        t->vessel = (bt_vessel){
+            .mass = 200, .bollard_pull = 400, .free_speed = 5, .free_resistance = 100, .lateral = 10, .lookahead = 50};
         straight_path(t, 20.2, 0, 1, 0);
         for (int s = 0; s < 400; s++) {
             bt_world_step(w);
@@ -360,9 +379,9 @@ static void rows_and_contacts_are_one_system(void **state)
             assert_true(w->stats.momentum_residual < 1e-9 && vessel_closure(t) < 1e-12);
         }
         double wall = 0; // normal impulse on it
-        for (bt_idx k = 0; k < w->tiles->n; k++)
-            for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-                const bt_unit *u = &w->tiles->tile[k].units[j];
+        for (bt_idx k = 0; k < w->cells->n; k++)
+            for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+                const bt_contact *u = &w->cells->cell[k].contacts[j];
                 if (w->bodies.inv[u->b].m == 0) wall += (u->ln[0] + u->ln[1]) * u->nx - u->lt * u->ny;
             }
         const double pull = bt_tow_tension(t, 0) * t->branch[0].lx + bt_tow_tension(t, 1) * t->branch[1].lx;
@@ -374,7 +393,8 @@ static void rows_and_contacts_are_one_system(void **state)
     }
 }
 
-/// The end of a line, and in mode speed the body, are on the path to rounding at every step, and have gone the integral of the programme.
+/// The end of a line, and in mode speed the body, are on the path to rounding at every step, and have gone the integral
+/// of the programme.
 static void the_end_follows_the_path_exactly(void **state)
 {
     (void)state;
@@ -391,7 +411,8 @@ static void the_end_follows_the_path_exactly(void **state)
             t->n_branches = line;
             t->branch[0] = (bt_branch){.length0 = 10, .k = 100, .c = 50};
             t->carriage_x = x0;
-            if (!line) w->bodies.motion[bt_world_towed(w)] = BT_KINEMATIC, w->bodies.inv[bt_world_towed(w)] = (bt_inv){0};
+            if (!line)
+                w->bodies.motion[bt_world_towed(w)] = BT_KINEMATIC, w->bodies.inv[bt_world_towed(w)] = (bt_inv){0};
             assert_true(bt_path_make(&t->path, x0, 0, 3, points, round ? 12 : 0, why));
             t->programme = bt_alloc(4, 2 * sizeof(double));
             memcpy(t->programme, (double[]){0, 0, 20, 1, 120, 1, 140, 0}, 8 * sizeof(double));
@@ -415,7 +436,9 @@ static void the_end_follows_the_path_exactly(void **state)
                 assert_int_equal(w->events.event[k].kind, BT_EVENT_WAYPOINT);
                 assert_int_equal(w->events.event[k].subject, k + 1);
                 // The programme reaches way s at t = s + 10 while at 1 m/s.
-                if (t->path.mark[k] > 10 && t->path.mark[k] < 110) assert_true(w->events.event[k].time >= t->path.mark[k] + 10 - 1e-9 - 0.26 && w->events.event[k].time < t->path.mark[k] + 10 + 0.51);
+                if (t->path.mark[k] > 10 && t->path.mark[k] < 110)
+                    assert_true(w->events.event[k].time >= t->path.mark[k] + 10 - 1e-9 - 0.26 &&
+                                w->events.event[k].time < t->path.mark[k] + 10 + 0.51);
             }
             bt_world_free(w);
         }
@@ -432,7 +455,8 @@ static void a_vessel_keeps_its_track_and_passes_the_waypoints(void **state)
     t->n_branches = 1;
     t->branch[0] = (bt_branch){.length0 = 10, .k = 100, .c = 100};
     t->carriage_x = 10;
-    t->vessel = (bt_vessel){.mass = 500, .bollard_pull = 300, .free_speed = 6, .free_resistance = 100, .lateral = 20, .lookahead = 20};
+    t->vessel = (bt_vessel){
+        .mass = 500, .bollard_pull = 300, .free_speed = 6, .free_resistance = 100, .lateral = 20, .lookahead = 20};
     assert_true(bt_path_make(&t->path, 10, 0, 2, (double[]){300, 0, 300, 1000}, 0, why));
     t->speed = 1;
     double across = 0, after = 0;

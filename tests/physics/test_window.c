@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Resistance in a moving window: a closed form over several laps, the momentum of what is dropped and enters, and the same force to
-// rounding as in one long domain that holds the same field over and over.
+// Resistance in a moving window: a closed form over several laps, the momentum of what is dropped and enters, and the
+// same force to rounding as in one long domain that holds the same field over and over.
 #include "scene.h"
 
 #include "output/observe.h"
@@ -22,14 +22,17 @@ static void add_floe(bt_world *w, double r, double x, double y, double yaw, doub
 static void add_body(bt_world *w, int n, double *v, double x, double speed)
 {
     bt_shape_centre(n, v);
-    bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = n, .vertices = v, .x = x, .vx = speed, .mass = 1e4};
+    bt_body_def d = {
+        .motion = BT_KINEMATIC, .large = true, .n_vertices = n, .vertices = v, .x = x, .vx = speed, .mass = 1e4};
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
     *w->tow = (bt_tow){.mode = BT_TOW_SPEED, .ux = 1, .speed = speed, .dt = w->par.dt, .travel_x = x};
 }
 
-/// A wedge of half-angle α and beam B meets discs of radius r at |y| >= y0 (0 elsewhere), dilute, at rest, inelastic, without friction, spin or
-/// drag: the normal of a hit is that of the wedge widened by r (its Minkowski sum with the disc), so with c = cos α flanks and shoulders give
+/// A wedge of half-angle α and beam B meets discs of radius r at |y| >= y0 (0 elsewhere), dilute, at rest, inelastic,
+/// without friction, spin or
+/// drag: the normal of a hit is that of the wedge widened by r (its Minkowski sum with the disc), so with c = cos α
+///     flanks and shoulders give
 ///     F = A ρ_i h V² 2 [(B/2 + r c − y0) sin²α + r (2/3 − c + c³/3)].
 /// A wedge, and nothing before its tip: what is hit head on stays ahead for ever where there is no drag.
 static void wedge_in_dilute_ice(void **state)
@@ -67,10 +70,10 @@ static void wedge_in_dilute_ice(void **state)
     way = w->tow->travel_x - way;
     // The floes that stand: without those taken out for the body.
     const double density = floes * BT_PI * r * r / (length * 2 * (half - y0));
-    const double want =
-        density * sheet * speed * 2 * ((0.5 * beam + r * c - y0) * sin(alpha) * sin(alpha) + r * (2.0 / 3 - c + c * c * c / 3));
-    print_message("force %.4f want %.4f; renewed %d kept %d missed %d\n", (impulse[0] - before) / way * speed, want * speed,
-                  (int)w->window->renewed, (int)w->window->kept, (int)w->window->missed);
+    const double want = density * sheet * speed * 2 *
+                        ((0.5 * beam + r * c - y0) * sin(alpha) * sin(alpha) + r * (2.0 / 3 - c + c * c * c / 3));
+    print_message("force %.4f want %.4f; renewed %d kept %d missed %d\n", (impulse[0] - before) / way * speed,
+                  want * speed, (int)w->window->renewed, (int)w->window->kept, (int)w->window->missed);
     CHECK_CLOSE((impulse[0] - before) / way, want, 0.02 * want);
     assert_true(w->window->renewed > 4 * (int64_t)floes && w->window->missed + w->window->kept == 0);
     // Momentum: what the body gave is in the floes, or was dropped with them; they came in at rest.
@@ -89,8 +92,9 @@ static void wedge_in_dilute_ice(void **state)
     bt_world_free(w);
 }
 
-/// A wedge in loose ice with drag: in a window of one field, and through that field six times over. A slender bow, strong drag and no friction keep
-/// rounding from growing as it does in dense ice, where single hits soon differ and only means can be compared (tests/long).
+/// A wedge in loose ice with drag: in a window of one field, and through that field six times over. A slender bow,
+/// strong drag and no friction keep rounding from growing as it does in dense ice, where single hits soon differ and
+/// only means can be compared (tests/long).
 static void as_in_one_long_domain(void **state)
 {
     (void)state;
@@ -102,7 +106,8 @@ static void as_in_one_long_domain(void **state)
     while (n < (int)(0.12 * length * width / (BT_PI * r * r))) { // random sequential addition, around the period
         const double x = length * scene_uniform(&rng), y = (width - 2 * r) * (scene_uniform(&rng) - 0.5);
         bool clear = hypot(x - (length - ahead), y) > 2.5 * big;
-        for (int j = 0; clear && j < n; j++) clear = hypot(bt_nearest_image(x - xy[j][0], length), y - xy[j][1]) > 2.05 * r;
+        for (int j = 0; clear && j < n; j++)
+            clear = hypot(bt_nearest_image(x - xy[j][0], length), y - xy[j][1]) > 2.05 * r;
         if (!clear) continue;
         xy[n][0] = x, xy[n][1] = y, yaw[n++] = 7 * scene_uniform(&rng);
     }
@@ -130,8 +135,9 @@ static void as_in_one_long_domain(void **state)
         worst = bt_max(worst, fabs(impulse[0] - impulse[1]));
         largest = bt_max(largest, s[1].ice_resistance);
     }
-    print_message("mean force %.6f, in the long domain %.6f N (largest %.3g), worst difference of the impulse %.3g of %.3g N s\n",
-                  impulse[0] / w[0]->tow->time, impulse[1] / w[1]->tow->time, largest, worst, impulse[1]);
+    print_message(
+        "mean force %.6f, in the long domain %.6f N (largest %.3g), worst difference of the impulse %.3g of %.3g N s\n",
+        impulse[0] / w[0]->tow->time, impulse[1] / w[1]->tow->time, largest, worst, impulse[1]);
     assert_true(w[0]->window->renewed > 2 * n && w[0]->window->kept + w[0]->window->missed == 0);
     assert_true(impulse[1] > 0);
     assert_true(worst <= 1e-7 * impulse[1]);

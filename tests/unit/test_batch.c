@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sweeps in batches against the scalar update, unit by unit in the same order: equal bit for bit; and what may stand
-// together in a batch.
+// Sweeps in batches against the scalar update, contact by contact in the same order: equal bit for bit; and what may
+// stand together in a batch.
 #include <stdlib.h>
 #include <string.h>
 
@@ -9,24 +9,24 @@
 #include "solve/batch.h"
 #include "solve/kernel.h"
 
-enum { BODIES = 60, UNITS = 230, LANES = 4 };
+enum { BODIES = 60, CONTACTS = 230, LANES = 4 };
 
-/// A tile whose units join random bodies, some of infinite mass; most units are listed.
+/// A cell whose contacts join random bodies, some of infinite mass; most contacts are listed.
 typedef struct {
-    bt_tile tile;
-    bt_unit units[UNITS];
-    bt_limit limits[UNITS];
-    double before[UNITS][3];
-    bt_idx list[UNITS];
+    bt_cell cell;
+    bt_contact contacts[CONTACTS];
+    bt_limit limits[CONTACTS];
+    double before[CONTACTS][3];
+    bt_idx list[CONTACTS];
     bt_vel v[BODIES];
     bt_inv inv[BODIES];
 } knot_of_floes;
 
 static double any(uint64_t *rng) { return 2 * scene_uniform(rng) - 1; }
 
-static bt_unit random_unit(uint64_t *rng, const bt_inv *inv)
+static bt_contact random_contact(uint64_t *rng, const bt_inv *inv)
 {
-    bt_unit u = {.n = 1 + (scene_uniform(rng) < 0.6), .mu = 0.5 * scene_uniform(rng)};
+    bt_contact u = {.n = 1 + (scene_uniform(rng) < 0.6), .mu = 0.5 * scene_uniform(rng)};
     u.a = (bt_idx)(BODIES * scene_uniform(rng));
     do u.b = (bt_idx)(BODIES * scene_uniform(rng));
     while (u.b == u.a || inv[u.a].m + inv[u.b].m == 0);
@@ -52,36 +52,36 @@ static bt_unit random_unit(uint64_t *rng, const bt_inv *inv)
     return u;
 }
 
-/// Sheets between the bodies of a unit: two components, one step length.
-static void make_sheets(bt_unit *u, const bt_inv *inv, uint64_t *rng)
+/// Sheets between the bodies of a contact: two components, one step length.
+static void make_sheets(bt_contact *u, const bt_inv *inv, uint64_t *rng)
 {
     const bt_inv p = inv[u->a], q = inv[u->b];
-    *u = (bt_unit){.a = u->a,
-                   .b = u->b,
-                   .nx = 1,
-                   .ran = {any(rng)},
-                   .rbn = {any(rng)},
-                   .rat = any(rng),
-                   .rbt = any(rng),
-                   .ln = {any(rng)},
-                   .lt = any(rng)};
+    *u = (bt_contact){.a = u->a,
+                      .b = u->b,
+                      .nx = 1,
+                      .ran = {any(rng)},
+                      .rbn = {any(rng)},
+                      .rat = any(rng),
+                      .rbt = any(rng),
+                      .ln = {any(rng)},
+                      .lt = any(rng)};
     u->w[0] = u->wt =
         p.m + q.m + p.i * (u->ran[0] * u->ran[0] + u->rat * u->rat) + q.i * (u->rbn[0] * u->rbn[0] + u->rbt * u->rbt);
     u->mn[0] = u->mt = 1 / u->wt;
 }
 
-/// Flat bounds for all units; a third of them become sheets.
+/// Flat bounds for all contacts; a third of them become sheets.
 static void bind(knot_of_floes *s, uint64_t *rng)
 {
-    s->tile.limits = s->limits;
-    for (bt_idx i = 0; i < UNITS; i++) {
+    s->cell.limits = s->limits;
+    for (bt_idx i = 0; i < CONTACTS; i++) {
         bt_limit *l = &s->limits[i];
         *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
         if (scene_uniform(rng) < 0.35) {
-            make_sheets(&s->units[i], s->inv, rng);
+            make_sheets(&s->contacts[i], s->inv, rng);
             l->flat[0] = scene_uniform(rng) < 0.1 ? 0 : scene_uniform(rng);
         } else if (scene_uniform(rng) < 0.8) {
-            for (int c = 0; c < s->units[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
+            for (int c = 0; c < s->contacts[i].n; c++) l->flat[c] = l->most[c] = 0.6 * scene_uniform(rng);
         }
     }
 }
@@ -93,34 +93,34 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         if (i % 7) s->inv[i] = (bt_inv){0.1 + scene_uniform(rng), 0.1 + scene_uniform(rng)};
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
-    s->tile = (bt_tile){.units = s->units, .n_units = UNITS, .before = s->before, .list = s->list};
-    for (bt_idx i = 0; i < UNITS; i++) {
-        s->units[i] = random_unit(rng, s->inv);
+    s->cell = (bt_cell){.contacts = s->contacts, .n_contacts = CONTACTS, .before = s->before, .list = s->list};
+    for (bt_idx i = 0; i < CONTACTS; i++) {
+        s->contacts[i] = random_contact(rng, s->inv);
         for (int c = 0; c < 3; c++) s->before[i][c] = any(rng);
-        if (scene_uniform(rng) < listed) s->list[s->tile.n_list++] = i;
+        if (scene_uniform(rng) < listed) s->list[s->cell.n_list++] = i;
     }
 }
 
 /// The same visit with the scalar update; returns what it turned against its move.
 static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep *o, int times, double *most)
 {
-    static double y[UNITS][3];
-    for (bt_idx j = 0; o->moves && j < s->tile.n_list; j++) {
-        bt_unit *u = &s->units[order[j]];
+    static double y[CONTACTS][3];
+    for (bt_idx j = 0; o->moves && j < s->cell.n_list; j++) {
+        bt_contact *u = &s->contacts[order[j]];
         bt_rounds_move(o, u->ln, s->before[order[j]], y[j], 2);
         bt_rounds_move(o, &u->lt, s->before[order[j]] + 2, y[j] + 2, 1);
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
-        for (bt_idx j = 0; j < s->tile.n_list; j++) {
-            const bt_limit *l = s->tile.limits ? &s->limits[order[j]] : NULL;
-            largest = bt_max(largest, bt_update_unit(&s->units[order[j]], l, s->v, s->inv));
+        for (bt_idx j = 0; j < s->cell.n_list; j++) {
+            const bt_limit *l = s->cell.limits ? &s->limits[order[j]] : NULL;
+            largest = bt_max(largest, bt_update_contact(&s->contacts[order[j]], l, s->v, s->inv));
         }
         if (n == 0) *most = largest;
     }
     double against = 0;
-    for (bt_idx j = 0; o->moves && j < s->tile.n_list; j++) {
-        const bt_unit *u = &s->units[order[j]];
+    for (bt_idx j = 0; o->moves && j < s->cell.n_list; j++) {
+        const bt_contact *u = &s->contacts[order[j]];
         const double *x = s->before[order[j]];
         against += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
                    bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
@@ -132,7 +132,7 @@ static void batches_do_what_single_updates_do(void **state)
 {
     (void)state;
     static knot_of_floes four, one;
-    bt_idx order[UNITS];
+    bt_idx order[CONTACTS];
     uint64_t rng = 5;
     for (int k = 0; k < 300; k++) {
         fill(&four, &rng, k % 3 ? 0.8 : 0.03);
@@ -142,57 +142,57 @@ static void batches_do_what_single_updates_do(void **state)
         const int times = 1 + k % 3;
         int64_t done = 0;
         double most = 0, most_of_one = 0;
-        const double against = bt_batch_sweep(&four.tile, four.v, four.inv, &o, times, 0, &done, &most);
-        assert_true(four.tile.packed);
-        assert_int_equal(done, times * four.tile.n_list);
-        bt_batch_order(&four.tile, order);
+        const double against = bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, 0, &done, &most);
+        assert_true(four.cell.packed);
+        assert_int_equal(done, times * four.cell.n_list);
+        bt_batch_order(&four.cell, order);
         CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-12 * (1 + fabs(against)));
-        bt_batch_unpack(&four.tile);
-        assert_false(four.tile.packed);
+        bt_batch_unpack(&four.cell);
+        assert_false(four.cell.packed);
         CHECK_CLOSE(most, most_of_one, 0);
         for (int i = 0; i < BODIES; i++) {
             assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
             if (i % 7 == 0) assert_memory_equal(&four.v[i], &one.v[i], sizeof *four.v);
         }
-        for (bt_idx i = 0; i < UNITS; i++) {
-            const bt_unit *p = &four.units[i], *q = &one.units[i];
+        for (bt_idx i = 0; i < CONTACTS; i++) {
+            const bt_contact *p = &four.contacts[i], *q = &one.contacts[i];
             assert_true(p->ln[0] == q->ln[0] && p->ln[1] == q->ln[1] && p->lt == q->lt);
             assert_memory_equal(four.before[i], one.before[i], sizeof *four.before);
         }
-        free(four.tile.batch);
+        free(four.cell.batch);
     }
 }
 
-/// Every listed unit is swept once, and not much is left empty where there is a choice.
-static void each_listed_unit_is_in_one_batch(void **state)
+/// Every listed contact is swept once, and not much is left empty where there is a choice.
+static void each_listed_contact_is_in_one_batch(void **state)
 {
     (void)state;
     static knot_of_floes s;
     uint64_t rng = 8;
     fill(&s, &rng, 1);
-    bt_idx order[UNITS];
-    bool seen[UNITS] = {false};
+    bt_idx order[CONTACTS];
+    bool seen[CONTACTS] = {false};
     int64_t done = 0;
     double most = 0;
-    bt_batch_sweep(&s.tile, s.v, s.inv, &(bt_sweep){0}, 1, 0, &done, &most);
-    bt_batch_order(&s.tile, order);
-    for (bt_idx j = 0; j < s.tile.n_list; j++) {
+    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 1, 0, &done, &most);
+    bt_batch_order(&s.cell, order);
+    for (bt_idx j = 0; j < s.cell.n_list; j++) {
         assert_false(seen[order[j]]);
         seen[order[j]] = true;
     }
-    assert_true(LANES * s.tile.n_batches < 1.15 * s.tile.n_list);
+    assert_true(LANES * s.cell.n_batches < 1.15 * s.cell.n_list);
     // A visit ends when a pass has changed nothing that matters.
     done = 0;
-    bt_batch_sweep(&s.tile, s.v, s.inv, &(bt_sweep){0}, 5, INFINITY, &done, &most);
-    assert_int_equal(done, s.tile.n_list);
-    free(s.tile.batch);
+    bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 5, INFINITY, &done, &most);
+    assert_int_equal(done, s.cell.n_list);
+    free(s.cell.batch);
 }
 
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_do_what_single_updates_do),
-        cmocka_unit_test(each_listed_unit_is_in_one_batch),
+        cmocka_unit_test(each_listed_contact_is_in_one_batch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Checkpoints: a run that is taken up after any step goes on to the same bits; what is read is refused unless it is what was written.
+// Checkpoints: a run that is taken up after any step goes on to the same bits; what is read is refused unless it is
+// what was written.
 //
-// Each case runs once and keeps its state and its sample after every step. Then a new world is made from the state after each step n, does
-// LATER steps, and must have the same state (all of it, not only poses) and the same sample after each of them. What turns this red (tried): a member that
-// the tables leave out: labels of the floes, whether they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow
-// line's impulse, what is broken, the vessel's way, home.copy, open collisions.
+// Each case runs once and keeps its state and its sample after every step. Then a new world is made from the state
+// after each step n, does LATER steps, and must have the same state (all of it, not only poses) and the same sample
+// after each of them. What turns this red (tried): a member that the tables leave out: labels of the floes, whether
+// they are due to be renewed, the largest margin, impulses, friction and features of contacts, the tow line's impulse,
+// what is broken, the vessel's way, home.copy, open collisions.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -20,10 +22,10 @@
 #include "loads/impact.h"
 #include "output/observe.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "tow/tow.h"
 #include "step/window.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 #include "output/state.h"
 
@@ -49,7 +51,19 @@ static void write_file(const char *name, const char *text)
 enum { LATER = 3 };
 
 // What each case must show in its steps, or it tests nothing.
-enum { LINE_PULLS = 1, BREAKS = 2, RENEWS = 4, CRUSHES = 8, COLLIDES = 16, PARTS = 32, WRAPS = 64, RELABELS = 128, RESTS = 256, WAYPOINT = 512, RAFTS = 1024 };
+enum {
+    LINE_PULLS = 1,
+    BREAKS = 2,
+    RENEWS = 4,
+    CRUSHES = 8,
+    COLLIDES = 16,
+    PARTS = 32,
+    WRAPS = 64,
+    RELABELS = 128,
+    RESTS = 256,
+    WAYPOINT = 512,
+    RAFTS = 1024
+};
 
 static const struct scenario {
     const char *name, *text;
@@ -78,7 +92,8 @@ static const struct scenario {
      "domain: {frame: geographic, length: 44, width: 14, ends: open, sides: open}\n"
      "ice: {concentration: 0.7, size: 1, thickness: 0.04, drag: {water_form: 0.85}}\n"
      "body: {length: 2, draft: 0.5, x: -14}\n"
-     "tow: {mode: thrust, programme: [[0, 0], [2, 0.9], [20, 0.9], [28, 0.3]], waypoints: [[-9, 0], [0, 4], [60, 4]], turn_radius: 2, line_length: 3,\n"
+     "tow: {mode: thrust, programme: [[0, 0], [2, 0.9], [20, 0.9], [28, 0.3]], waypoints: [[-9, 0], [0, 4], [60, 4]], "
+     "turn_radius: 2, line_length: 3,\n"
      "      line_stiffness: 2000, line: {branches: 2}, branch2: {breaking_load: 90},\n"
      "      vessel: {mass: 800, bollard_pull: 600, free_speed: 3, lookahead: 3}}\n"
      "water: {latitude: 75, tilt: dynamic, tide: {major: 0.05, minor: 0.02, period: 60}}\n"
@@ -107,7 +122,8 @@ static const struct scenario {
     {"rafting and crushing in a moving window",
      "run: {dt: 0.1, duration: 20}\n"
      "domain: {length: 16, width: 8, ends: moving}\n"
-     "ice: {concentration: 0.75, size: 0.8, friction: 0.35, restitution: 0.1, thickness: 0.04, thickness_law: lognormal, crushing: {pressure: 100 Pa}, rafting: {kappa: 6}}\n"
+     "ice: {concentration: 0.75, size: 0.8, friction: 0.35, restitution: 0.1, thickness: 0.04, thickness_law: "
+     "lognormal, crushing: {pressure: 100 Pa}, rafting: {kappa: 6}}\n"
      "body: {length: 2}\n"
      "tow: {mode: line, speed: 0.8, ramp: 1, line_length: 2}\n"
      "solver: {tile: 2.5, max_sweeps: 60}\n",
@@ -124,7 +140,8 @@ static const struct scenario {
      "run: {dt: 0.2, duration: 20}\n"
      "domain: {length: 20, width: 10, ends: open, sides: open}\n"
      "ice: {outlines: bays.geojson, outlines_crs: plane, nonconvex: split, thickness: 0.25, x_min: 0, x_max: 20}\n"
-     "floes: [{shape: square, length: 1, x: 18, y: 3, vx: -0.6, thickness: 0.3}, {shape: square, length: 1, x: 9, y: 4.2, thickness: 0.3, fixed: true}]\n"
+     "floes: [{shape: square, length: 1, x: 18, y: 3, vx: -0.6, thickness: 0.3}, {shape: square, length: 1, x: 9, y: "
+     "4.2, thickness: 0.3, fixed: true}]\n"
      "body: {length: 2, x: 2}\n"
      "tow: {mode: speed, speed: 0.8, ramp: 1}\n"
      "solver: {tile: 2.5}\n",
@@ -143,7 +160,10 @@ static void write_outlines(void)
     fprintf(f, "{\"type\": \"FeatureCollection\", \"features\": [");
     for (int k = 0; k < 15; k++) {
         const double x = 4 + 2.6 * (k % 5), y = -3.8 + 2.4 * (k / 5);
-        fprintf(f, "%s{\"type\": \"Feature\", \"properties\": {}, \"geometry\": {\"type\": \"Polygon\", \"coordinates\": [[", k ? ", " : "");
+        fprintf(
+            f,
+            "%s{\"type\": \"Feature\", \"properties\": {}, \"geometry\": {\"type\": \"Polygon\", \"coordinates\": [[",
+            k ? ", " : "");
         for (int v = 0; v <= 8; v++) fprintf(f, "%s[%g, %g]", v ? ", " : "", c[v % 8][0] + x, c[v % 8][1] + y);
         fprintf(f, "]]}}");
     }
@@ -211,25 +231,27 @@ static int seen_in(const bt_world *w)
     int seen = 0;
     const bt_tow *t = w->tow;
     if (bt_tow_has_line(t) && t->branch[0].lambda > 0) seen |= LINE_PULLS;
-    for (int64_t k = 0; k < w->events.n; k++) seen |= w->events.event[k].kind == BT_EVENT_LINE_BROKEN ? BREAKS : WAYPOINT;
+    for (int64_t k = 0; k < w->events.n; k++)
+        seen |= w->events.event[k].kind == BT_EVENT_LINE_BROKEN ? BREAKS : WAYPOINT;
     if (w->window && w->window->renewed > 0) seen |= RENEWS;
     if (w->stats.n_crushing > 0) seen |= CRUSHES;
     if (w->stats.n_rafting > 0 && w->stats.raft_friction_work > 0) seen |= RAFTS;
     if (w->impacts && w->impacts->n_closed + w->impacts->n_open > 0) seen |= COLLIDES;
-    if (w->tiles->relabel) seen |= RELABELS;
+    if (w->cells->relabel) seen |= RELABELS;
     for (bt_idx i = 0; i < w->bodies.n; i++) {
         if (bt_part_first(&w->bodies, i) > 0) seen |= PARTS;
         if (w->bodies.home[i].lap != 0) seen |= WRAPS;
     }
-    for (bt_idx k = 0; k + 1 < w->tiles->n; k++)
-        if (w->tiles->rest[k] && w->tiles->tile[k].end > w->tiles->tile[k].first) seen |= RESTS;
+    for (bt_idx k = 0; k + 1 < w->cells->n; k++)
+        if (w->cells->asleep[k] && w->cells->cell[k].end > w->cells->cell[k].first) seen |= RESTS;
     return seen;
 }
 
 static void check_same(const struct scenario *s, int from, int at, const bt_snapshot *wanted, const bt_snapshot *found)
 {
     char text[400];
-    if (bt_snapshot_differ(wanted, found, text)) fail_msg("%s: taken up after step %d, step %d: %s", s->name, from, at, text);
+    if (bt_snapshot_differ(wanted, found, text))
+        fail_msg("%s: taken up after step %d, step %d: %s", s->name, from, at, text);
 }
 
 static void goes_on_from_every_step(const struct scenario *s)
@@ -237,7 +259,7 @@ static void goes_on_from_every_step(const struct scenario *s)
     setting t = {.speed = 0};
     set_up(s, &t);
     bt_world *w = new_world(&t, &t.f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     bt_snapshot *state = calloc((size_t)s->steps + 1, sizeof *state);
     bt_sample *sample = calloc((size_t)s->steps + 1, sizeof *sample);
     int seen = 0;
@@ -265,7 +287,8 @@ static void goes_on_from_every_step(const struct scenario *s)
             bt_observe(again, t.speed, &o);
             save(&t, again, &now);
             check_same(s, s->from + n, s->from + k, &state[k], &now);
-            if (memcmp(&o, &sample[k], sizeof o)) fail_msg("%s: taken up after step %d, another sample at step %d", s->name, s->from + n, s->from + k);
+            if (memcmp(&o, &sample[k], sizeof o))
+                fail_msg("%s: taken up after step %d, another sample at step %d", s->name, s->from + n, s->from + k);
             bt_snapshot_free(&now);
         }
         bt_world_free(again);
@@ -370,12 +393,13 @@ static void refused(const char *path, size_t at)
     bt_snapshot s;
     const bt_status status = bt_snapshot_read(&s, path, &err);
     if (status != BT_ERR_CASE || err.n != 1 || !strstr(err.text[0], path) || s.n != 0)
-        fail_msg("byte %zu: status %d, %zu arrays: %s", at, (int)status, (size_t)s.n, err.n ? err.text[0] : "no message");
+        fail_msg("byte %zu: status %d, %zu arrays: %s", at, (int)status, (size_t)s.n,
+                 err.n ? err.text[0] : "no message");
     bt_errors_free(&err);
 }
 
-/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the comparison with the seal (tried) the first
-/// flip passes.
+/// A thousand flipped bits and a hundred cuts of a real checkpoint: each is refused with one message. Without the
+/// comparison with the checksum (tried) the first flip passes.
 static void damage_is_refused(void **state)
 {
     (void)state;
@@ -383,7 +407,7 @@ static void damage_is_refused(void **state)
     setting t = {.speed = 0};
     set_up(&scenarios[1], &t);
     bt_world *w = new_world(&t, &t.f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     for (int n = 0; n < 20; n++) bt_world_step(w);
     bt_snapshot s = {0};
     save(&t, w, &s);
@@ -394,7 +418,7 @@ static void damage_is_refused(void **state)
     uint64_t x = 88172645463325252u; // xorshift64
     for (int k = 0; k < 1100; k++) {
         x ^= x << 13, x ^= x >> 7, x ^= x << 17;
-        // A fifth of them in the seal and the first metadata, which are few bytes.
+        // A fifth of them in the checksum and the first metadata, which are few bytes.
         const size_t at = k % 5 ? x % n : x % 1024;
         const char bit = (char)(1 << (x >> 40) % 8);
         bytes[at] ^= bit;
@@ -408,10 +432,12 @@ static void damage_is_refused(void **state)
     refused(path, n);
     // Whole, of another version of the program.
     spill(path, bytes, n);
-    must(bt_seal_write(path, "checkpoint 1", &err), &err);
+    must(bt_checksum_write(path, "checkpoint 1", &err), &err);
     bt_snapshot old;
     assert_int_equal(bt_snapshot_read(&old, path, &err), BT_ERR_CASE);
-    assert_non_null(strstr(err.text[0], "has the format \"checkpoint 1\", this program reads \"checkpoint 2\"; use the program that wrote it"));
+    assert_non_null(
+        strstr(err.text[0],
+               "has the format \"checkpoint 1\", this program reads \"checkpoint 2\"; use the program that wrote it"));
     bt_errors_free(&err);
     // Two files of one length, the front of one on the back of the other.
     bt_world_step(w);

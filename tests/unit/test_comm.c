@@ -25,7 +25,8 @@ static const char *self = "test_comm";
         }                                                                                    \
     } while (0)
 
-// Terms that a plain sum of doubles adds to different values in different orders; negative ones carry between the words.
+// Terms that a plain sum of doubles adds to different values in different orders; negative ones carry between the
+// words.
 static double term(int i) { return (i % 3 == 0 ? -1 : 1) * 1e15 / (7.0 + i) + 1e-9 * i - (i % 7 == 0 ? 3e14 : 0); }
 
 static void reduce(const bt_comm *c)
@@ -39,7 +40,8 @@ static void reduce(const bt_comm *c)
             if ((i * 7 + k) % c->size == c->rank) bt_sum_add(&mine[k], term(i + k));
         }
     }
-    double top[4] = {-5.0 - c->rank, c->rank == c->size - 1 ? (double)NAN : 1.0, c->rank == 0 ? 0.0 : -0.0, c->rank ? 1.0 : (double)NAN};
+    double top[4] = {-5.0 - c->rank, c->rank == c->size - 1 ? (double)NAN : 1.0, c->rank == 0 ? 0.0 : -0.0,
+                     c->rank ? 1.0 : (double)NAN};
     uint64_t bits[2] = {(uint64_t)1 << c->rank, (uint64_t)1 << 63};
     bt_comm_reduce(c, mine, MANY, top, 4, bits, 2);
     for (int k = 0; k < MANY; k++) CHECK(mine[k].v == all[k].v && !mine[k].bad);
@@ -86,8 +88,8 @@ static void agreement(const bt_comm *c)
     bt_errors_free(&err);
 }
 
-// Ids are dealt out by a hash; `change`: 0 = as it should be, 1 = nobody gives id 5, 2 = all ranks do, 3 = an id too large,
-// 4 = id 6 goes as another id 5, so that the number of rows is right.
+// Ids are dealt out by a hash; `change`: 0 = as it should be, 1 = nobody gives id 5, 2 = all ranks do, 3 = an id too
+// large, 4 = id 6 goes as another id 5, so that the number of rows is right.
 static bt_status exchange(const bt_comm *c, int64_t n, int change, bt_errors *err)
 {
     enum { MOST = 1000, WIDTH = 3 };
@@ -115,7 +117,8 @@ static void rows(const bt_comm *c)
 {
     bt_errors err = {0};
     const int64_t sizes[] = {0, 1, 2, 3, 5, 100, 997}; // with empty blocks
-    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) CHECK(exchange(c, sizes[k], 0, &err) == BT_OK && err.n == 0);
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++)
+        CHECK(exchange(c, sizes[k], 0, &err) == BT_OK && err.n == 0);
     const char *const said[] = {NULL, "no rank: id 5;", "several ranks: id 5;", "id 107", "several ranks: id 5;"};
     for (int change = 1; change <= 4; change++) {
         if (c->size == 1 && change == 2) continue;
@@ -128,7 +131,8 @@ static void rows(const bt_comm *c)
         }
         bt_errors_free(&err);
     }
-    for (int k = 0; k < c->size; k++) CHECK(bt_comm_first(c, k, INT64_C(1) << 61) <= bt_comm_first(c, k + 1, INT64_C(1) << 61));
+    for (int k = 0; k < c->size; k++)
+        CHECK(bt_comm_first(c, k, INT64_C(1) << 61) <= bt_comm_first(c, k + 1, INT64_C(1) << 61));
 }
 
 static int all_checks(void)

@@ -39,7 +39,7 @@ static int world_polygon(const bt_world *w, bt_idx i, double shift_x, double shi
 static bt_world *random_scene(uint64_t *rng, int n, bool periodic, double box)
 {
     bt_params p = scene_params(0.1, 1);
-    p.tile = 2; // small, so that floes change their tiles
+    p.cell = 2; // small, so that floes change their cells
     p.period_x = periodic ? box : 0;
     p.period_y = periodic ? box : 0;
     bt_world *w = bt_world_create(&p);
@@ -64,7 +64,8 @@ static void move_all(bt_world *w, uint64_t *rng, double step)
     bt_bodies *b = &w->bodies;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->motion[i] == BT_STATIC) continue;
-        double dx = step * (scene_uniform(rng) - 0.5), dy = step * (scene_uniform(rng) - 0.5), dr = step * (scene_uniform(rng) - 0.5);
+        double dx = step * (scene_uniform(rng) - 0.5), dy = step * (scene_uniform(rng) - 0.5),
+               dr = step * (scene_uniform(rng) - 0.5);
         b->pose[i].x += dx, b->pose[i].y += dy, b->pose[i].yaw += dr;
         if (w->par.period_x > 0) b->pose[i].x -= w->par.period_x * floor(b->pose[i].x / w->par.period_x);
         if (w->par.period_y > 0) b->pose[i].y -= w->par.period_y * floor(b->pose[i].y / w->par.period_y);
@@ -73,13 +74,13 @@ static void move_all(bt_world *w, uint64_t *rng, double step)
     }
 }
 
-/// What the tiles must know of moves that were not made by a step.
+/// What the cells must know of moves that were not made by a step.
 static void note_moves(bt_world *w, double most)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     for (bt_idx k = 0; k < t->n; k++) t->moved[k] += most;
     t->moved_any += most;
-    for (bt_idx i = 0; i < t->n_tiled; i++) t->relabel = t->relabel || bt_tiles_outside(w, i) > t->allowance;
+    for (bt_idx i = 0; i < t->n_in_cells; i++) t->relabel = t->relabel || bt_cells_outside(w, i) > t->allowance;
 }
 
 typedef struct {
@@ -96,21 +97,22 @@ static int by_gids(const void *p, const void *q)
     return a->b < b->b ? -1 : a->b > b->b;
 }
 
-/// Units of all tiles in the order of their gids; the caller frees.
+/// Contacts of all cells in the order of their gids; the caller frees.
 static contact *contacts_of(const bt_world *w, bt_idx *n)
 {
-    contact *c = bt_alloc((size_t)w->tiles->n_units, sizeof *c);
+    contact *c = bt_alloc((size_t)w->cells->n_contacts, sizeof *c);
     *n = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++) {
-        const bt_tile *t = &w->tiles->tile[k];
-        for (bt_idx j = 0; j < t->n_units; j++) {
-            const bt_unit *u = &t->units[j];
-            assert_int_equal(bt_tiles_of_pair(w, u->a, u->b), k);
-            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n, u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
+    for (bt_idx k = 0; k < w->cells->n; k++) {
+        const bt_cell *t = &w->cells->cell[k];
+        for (bt_idx j = 0; j < t->n_contacts; j++) {
+            const bt_contact *u = &t->contacts[j];
+            assert_int_equal(bt_cells_of_pair(w, u->a, u->b), k);
+            c[(*n)++] = (contact){w->bodies.gid[u->a], w->bodies.gid[u->b], u->n,
+                                  u->n > 1 ? bt_min(t->gaps[j].gap[0], t->gaps[j].gap[1]) : t->gaps[j].gap[0],
                                   t->pairs[t->gaps[j].pair].feature[0]};
         }
     }
-    assert_int_equal(*n, w->tiles->n_units);
+    assert_int_equal(*n, w->cells->n_contacts);
     if (*n) qsort(c, (size_t)*n, sizeof *c, by_gids);
     return c;
 }
@@ -125,7 +127,8 @@ static void detect_equals_brute_force(void **state)
         const double box = scene % 2 ? 12 : 25;
         bt_world *w = random_scene(&rng, scene % 4 == 0 ? 30 : 250, periodic, box);
         for (int step = 0; step < 60; step++) {
-            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12)); // it comes and goes
+            // it comes and goes
+            const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12));
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, m;
@@ -142,8 +145,9 @@ static void detect_equals_brute_force(void **state)
             move_all(w, &rng, 0.08);
             note_moves(w, 0.09);
         }
-        labellings += w->tiles->n_labellings;
-        assert_true(w->tiles->n_labellings < 30 && w->tiles->n_listings < 50 * w->tiles->n); // labels and lists are in fact kept
+        labellings += w->cells->n_labellings;
+        // labels and lists are in fact kept
+        assert_true(w->cells->n_labellings < 30 && w->cells->n_listings < 50 * w->cells->n);
         bt_world_free(w);
     }
     assert_true(total > 10000 && labellings > 14); // and renewed
@@ -247,11 +251,11 @@ static void edge_contact_keeps_its_features(void **state)
     uint32_t features[2] = {0, 0};
     for (int s = 0; s < 50; s++) {
         bt_contacts_detect_all(w, 0.05);
-        assert_int_equal(w->tiles->n_units, 1);
-        const bt_idx k = bt_tiles_of_pair(w, 0, 1);
-        bt_unit *u = &w->tiles->tile[k].units[0];
-        const bt_gaps *g = &w->tiles->tile[k].gaps[0];
-        bt_pair *pair = &w->tiles->tile[k].pairs[g->pair];
+        assert_int_equal(w->cells->n_contacts, 1);
+        const bt_idx k = bt_cells_of_pair(w, 0, 1);
+        bt_contact *u = &w->cells->cell[k].contacts[0];
+        const bt_gaps *g = &w->cells->cell[k].gaps[0];
+        bt_pair *pair = &w->cells->cell[k].pairs[g->pair];
         assert_int_equal(u->n, 2);
         CHECK_CLOSE(u->nx, 1, 0.02);
         if (s == 0) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The cut of a tile graph: balance, edge cut against straight cuts, groups, odd weights, stable labels, signals.
+// The cut of a cell graph: balance, edge cut against straight cuts, groups, odd weights, stable labels, signals.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -16,7 +16,7 @@
 #include "partition/cut.h"
 #include "partition/cut_method.h"
 
-// A grid of nx × ny tiles, neighbours right, up and right-up as in the sweep's 2 × 2 blocks.
+// A grid of nx × ny cells, neighbours right, up and right-up as in the sweep's 2 × 2 blocks.
 typedef struct grid {
     bt_graph g;
     int nx, ny, *start, *to, *group;
@@ -119,7 +119,9 @@ static void test_measure(void **state)
 static void test_grid(void **state)
 {
     (void)state;
-    static const struct { int nx, ny, kx, ky; } c[] = {{64, 64, 2, 1}, {64, 64, 2, 2}, {60, 40, 3, 2}, {96, 96, 8, 8}, {16, 64, 4, 16}};
+    static const struct {
+        int nx, ny, kx, ky;
+    } c[] = {{64, 64, 2, 1}, {64, 64, 2, 2}, {60, 40, 3, 2}, {96, 96, 8, 8}, {16, 64, 4, 16}};
     for (size_t i = 0; i < sizeof c / sizeof *c; i++) {
         grid t;
         grid_init(&t, c[i].nx, c[i].ny, 1000, 16);
@@ -133,8 +135,8 @@ static void test_grid(void **state)
     }
 }
 
-// A few uneven tiles a part: METIS alone is 5 and 11 % out of balance at 150 and 200 parts.
-static void test_few_tiles_a_part(void **state)
+// A few uneven cells a part: METIS alone is 5 and 11 % out of balance at 150 and 200 parts.
+static void test_few_cells_a_part(void **state)
 {
     (void)state;
     grid t;
@@ -155,7 +157,7 @@ static void test_groups(void **state)
     grid t;
     grid_init(&t, 20, 20, 100, 10);
     for (int y = 8; y < 13; y++)
-        for (int x = 7; x < 12; x++) t.group[y * 20 + x] = 4; // 25 of 400 tiles
+        for (int x = 7; x < 12; x++) t.group[y * 20 + x] = 4; // 25 of 400 cells
     t.group[0] = t.group[399] = 7; // not neighbours
     for (int n_parts = 2; n_parts <= 40; n_parts += n_parts == 2 ? 6 : 32) {
         bt_cut_quality q;
@@ -173,8 +175,8 @@ static void test_groups(void **state)
     grid_free(&t);
 }
 
-// A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves that
-// cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
+// A group's edges count together: 0 1 2 are one, with 2 each to vertex 3, which has 5 to 4, and that 1 to 5. The halves
+// that cut 5 and 6 + 1 weigh the same; taken singly the edges of the group would make the second 2 + 1.
 static void test_group_edges(void **state)
 {
     (void)state;
@@ -224,7 +226,7 @@ static void test_one_heavy(void **state)
 static void test_weights(void **state)
 {
     (void)state;
-    // all the same cut, whatever the unit: sum above 2³¹, above 2⁵³, near 2⁶³; and no weight at all
+    // all the same cut, whatever the contact: sum above 2³¹, above 2⁵³, near 2⁶³; and no weight at all
     static const int64_t weight[] = {1, 3000000, INT64_C(1) << 44, INT64_MAX / 1024 - 1, 0};
     grid t;
     grid_init(&t, 32, 32, 1, 1);
@@ -235,20 +237,21 @@ static void test_weights(void **state)
         int count[16] = {0}, *part = cut(&t, 16, 0.03, &q);
         for (int v = 0; v < t.g.n; v++) count[part[v]]++;
         for (int p = 0; p < 16; p++)
-            if (count[p] < 60 || count[p] > 66) fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
+            if (count[p] < 60 || count[p] > 66)
+                fail_msg("weight %ld: part %d has %d tiles", (long)weight[i], p, count[p]);
         if (weight[i]) { // METIS itself, which bisection would stand in for
             assert_true(bt_cut_by_metis(&t.g, 16, 0.03, part));
             assert_true(bt_cut_measure(&t.g, 16, part, NULL).imbalance <= 0.04);
         }
         free(part);
     }
-    // half of the tiles empty: the others are balanced
+    // half of the cells empty: the others are balanced
     for (int v = 0; v < t.g.n; v++) t.weight[v] = v % 32 < 16 ? 0 : 50, t.edge[v] = 1;
     for (int e = 0; e < t.start[t.g.n]; e++) t.edge[e] = 1;
     bt_cut_quality q;
     free(cut(&t, 16, 0.03, &q));
     assert_true(q.imbalance <= 0.07);
-    // weight in one tile only
+    // weight in one cell only
     for (int v = 0; v < t.g.n; v++) t.weight[v] = v == 5;
     int *part = cut(&t, 16, 0.03, &q), count[16] = {0};
     for (int v = 0; v < t.g.n; v++) count[part[v]]++;
@@ -278,7 +281,7 @@ static void test_disconnected(void **state)
         free(cut(&t, 9, 0.03, &q));
         assert_true(q.imbalance <= 0.0301);
         free(cut(&t, 7, 0.03, &q));
-        assert_true(q.imbalance <= 0.04); // 900 / 7 tiles: within one tile of 3 %
+        assert_true(q.imbalance <= 0.04); // 900 / 7 cells: within one cell of 3 %
     }
     grid_free(&t);
 }
@@ -349,7 +352,7 @@ static void test_bisection(void **state)
     free(part);
     grid_free(&t);
 
-    // as the fallback: 3 tiles for 2 parts is where METIS 5.1 leaves one empty
+    // as the fallback: 3 cells for 2 parts is where METIS 5.1 leaves one empty
     int n_used = 0;
     for (int n = 3; n <= 24; n++)
         for (int n_parts = 2; n_parts < n; n_parts++) {
@@ -380,7 +383,7 @@ static void test_labels_stay(void **state)
     assert_int_equal(q.moved, 0);
     assert_int_equal(q.method, BT_CUT_KEPT);
 
-    // another numbering of a bad cut with one tile unlabelled, so that it is cut anew: labels follow the overlap
+    // another numbering of a bad cut with one cell unlabelled, so that it is cut anew: labels follow the overlap
     for (int i = 0; i < t.g.n; i++) part[i] = 23 - (i * 24 / t.g.n);
     bt_cut(&t.g, 24, 0.03, part, &q); // stripes of two rows are balanced, with three times the cut
     assert_int_equal(q.method, BT_CUT_METIS);
@@ -410,7 +413,7 @@ static void test_labels_stay(void **state)
     grid_free(&t);
 }
 
-// A berg of 3 × 3 tiles with a heavy wake moves on by a tile a time.
+// A berg of 3 × 3 cells with a heavy wake moves on by a cell a time.
 static void test_moving_spot(void **state)
 {
     (void)state;
@@ -499,7 +502,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_measure),
         cmocka_unit_test(test_grid),
-        cmocka_unit_test(test_few_tiles_a_part),
+        cmocka_unit_test(test_few_cells_a_part),
         cmocka_unit_test(test_group_edges),
         cmocka_unit_test(test_groups),
         cmocka_unit_test(test_one_heavy),

@@ -15,14 +15,29 @@
 // 80 m across, 0.5 m/s, ice of 1 m: rho_i h W V² = 910 · 1 · 80 · 0.25 = 18 200 N.
 static bt_estimate_input berg(double a)
 {
-    return (bt_estimate_input){.concentration = a, .thickness = 1, .floe_radius = 15, .width = 80, .speed = 0.5, .along = 0.5, .ice_density = 910,
-                               .water_density = 1027, .drag = 4000, .p_star = 20e3, .p_s = 13e3, .c_si = 1, .kappa = 11, .kappa_low = 5,
-                               .kappa_high = 17, .phi_j = 0.9, .length_scale = 1};
+    return (bt_estimate_input){.concentration = a,
+                               .thickness = 1,
+                               .floe_radius = 15,
+                               .width = 80,
+                               .speed = 0.5,
+                               .along = 0.5,
+                               .ice_density = 910,
+                               .water_density = 1027,
+                               .drag = 4000,
+                               .p_star = 20e3,
+                               .p_s = 13e3,
+                               .c_si = 1,
+                               .kappa = 11,
+                               .kappa_low = 5,
+                               .kappa_high = 17,
+                               .phi_j = 0.9,
+                               .length_scale = 1};
 }
 
 static void check(bt_estimate e, double want, bool valid, int line)
 {
-    if (!(fabs(e.force - want) <= 1e-9 * fabs(want))) fail_msg("line %d: %.10g N, by hand %.10g N", line, e.force, want);
+    if (!(fabs(e.force - want) <= 1e-9 * fabs(want)))
+        fail_msg("line %d: %.10g N, by hand %.10g N", line, e.force, want);
     if (e.valid != valid) fail_msg("line %d: valid is %d: %s", line, e.valid, e.note);
     if (!e.note || !*e.note) fail_msg("line %d: no note", line);
 }
@@ -162,7 +177,8 @@ static void conditions_follow_from_the_case(void **state)
     bt_case c;
     bt_estimate_input in;
     // Towed along y with the long side along x, a current of (0.3, 0.1): ΔV = (−0.3, 0.4), 0.5 m/s, 0.4 m/s along.
-    read_case(&c, "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 2 km}\nice: {size: 30 m, size_spread: 0, thickness: 0.7 m, concentration: 0.6}\n"
+    read_case(&c, "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 2 km}\nice: {size: 30 m, size_spread: 0, "
+                  "thickness: 0.7 m, concentration: 0.6}\n"
                   "body: {shape: rectangle, length: 80 m, width: 20 m, draft: 10 m, x: 1 km, restitution: 0.25}\n"
                   "tow: {speed: 0.5, direction: 90 deg}\nwater: {current_x: 0.3, current_y: 0.1, density: 1000}\n"
                   "estimate: {length_scale: 10}\n");
@@ -180,14 +196,16 @@ static void conditions_follow_from_the_case(void **state)
     bt_case_free(&c);
 }
 
-// Power law a = 2 on [10, 40]: <d³>/<d²> = 30 / ln 4. Lognormal with s = 0.5: 20 · 1.25². A field's own mean is compared to that.
+// Power law a = 2 on [10, 40]: <d³>/<d²> = 30 / ln 4. Lognormal with s = 0.5: 20 · 1.25². A field's own mean is
+// compared to that.
 static void floe_size_is_weighted_with_area(void **state)
 {
     (void)state;
     bt_case c;
     bt_estimate_input in;
-    read_case(&c, "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 1 km}\nbody: {length: 80}\n"
-                  "ice: {size_law: power, size_min: 10, size_max: 40, size_exponent: 2, concentration: 0.4, shake: 0}\n");
+    read_case(&c,
+              "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 1 km}\nbody: {length: 80}\n"
+              "ice: {size_law: power, size_min: 10, size_max: 40, size_exponent: 2, concentration: 0.4, shake: 0}\n");
     bt_estimate_conditions(&c, &in);
     assert_true(fabs(in.floe_radius - 15 / log(4)) < 1e-9);
     bt_field f;
@@ -200,7 +218,8 @@ static void floe_size_is_weighted_with_area(void **state)
     if (fabs(r / in.floe_radius - 1) > 0.03) fail_msg("field %g, law %g", r, in.floe_radius);
     bt_field_free(&f);
     bt_case_free(&c);
-    read_case(&c, "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 1 km}\nice: {size_law: lognormal, size: 20, size_spread: 0.5}\n");
+    read_case(&c, "run: {dt: 1, duration: 100}\ndomain: {length: 2 km, width: 1 km}\nice: {size_law: lognormal, size: "
+                  "20, size_spread: 0.5}\n");
     bt_estimate_conditions(&c, &in);
     assert_true(fabs(in.floe_radius - 10 * 1.5625) < 1e-9);
     bt_case_free(&c);
@@ -230,9 +249,11 @@ static void model_and_full_scale_agree(void **state)
     for (int k = 0; k < 2; k++) {
         bt_case c;
         char text[400];
-        snprintf(text, sizeof text, "run: {dt: 5, duration: 1000}\ndomain: {length: 5 km, width: 2 km, frame: geographic}\n"
-                                    "ice: {size: 30 m, thickness: %s m, concentration: 0.95}\nbody: {length: 80 m, draft: 60 m}\n"
-                                    "tow: {speed: 0.5}\nwater: {current_x: -0.1}\n", k ? "2" : "1"); // captured, or not
+        snprintf(text, sizeof text,
+                 "run: {dt: 5, duration: 1000}\ndomain: {length: 5 km, width: 2 km, frame: geographic}\n"
+                 "ice: {size: 30 m, thickness: %s m, concentration: 0.95}\nbody: {length: 80 m, draft: 60 m}\n"
+                 "tow: {speed: 0.5}\nwater: {current_x: -0.1}\n",
+                 k ? "2" : "1"); // captured, or not
         read_case(&c, text);
         bt_estimate_input full, model;
         bt_estimate_conditions(&c, &full);
@@ -242,10 +263,12 @@ static void model_and_full_scale_agree(void **state)
         bt_estimate_conditions(&c, &model);
         assert_non_null(strstr(bt_estimate_at(BT_EST_LICHEY_HELLMER, &full).note, k ? "captured" : "drag"));
         for (int i = 0; i < BT_N_ESTIMATES; i++) {
-            const bt_estimate a = bt_estimate_at((bt_estimate_kind)i, &full), b = bt_estimate_at((bt_estimate_kind)i, &model);
+            const bt_estimate a = bt_estimate_at((bt_estimate_kind)i, &full),
+                              b = bt_estimate_at((bt_estimate_kind)i, &model);
             assert_ptr_equal(a.note, b.note);
             if (i == BT_EST_MOMENTUM) assert_true(isnan(a.force) && isnan(b.force));
-            else if (fabs(27000 * b.force / a.force - 1) > 1e-12) fail_msg("%s: %g N, scaled %g N", bt_estimate_kinds[i].name, a.force, 27000 * b.force);
+            else if (fabs(27000 * b.force / a.force - 1) > 1e-12)
+                fail_msg("%s: %g N, scaled %g N", bt_estimate_kinds[i].name, a.force, 27000 * b.force);
         }
         bt_case_free(&c);
     }

@@ -66,7 +66,8 @@ static double separation(const polygon *a, const polygon *b, double dx, double d
     for (int i = 0; i < a->n; i++) {
         const double *p = a->v + 2 * i, *q = a->v + 2 * ((i + 1) % a->n);
         double l = hypot(q[0] - p[0], q[1] - p[1]), nx = (q[1] - p[1]) / l, ny = (p[0] - q[0]) / l, low = INFINITY;
-        for (int k = 0; k < b->n; k++) low = fmin(low, nx * (b->v[2 * k] + dx - p[0]) + ny * (b->v[2 * k + 1] + dy - p[1]));
+        for (int k = 0; k < b->n; k++)
+            low = fmin(low, nx * (b->v[2 * k] + dx - p[0]) + ny * (b->v[2 * k + 1] + dy - p[1]));
         best = fmax(best, low);
     }
     return best;
@@ -96,7 +97,8 @@ static double least_gap(const bt_case *c, const bt_field *f, double *nearest)
             for (int kx = -ix; kx <= ix; kx++)
                 for (int ky = -iy; ky <= iy; ky++) {
                     double dx = kx * c->domain.length, dy = ky * c->domain.width;
-                    double d = hypot(f->pose[3 * j] + dx - f->pose[3 * i], f->pose[3 * j + 1] + dy - f->pose[3 * i + 1]);
+                    double d =
+                        hypot(f->pose[3 * j] + dx - f->pose[3 * i], f->pose[3 * j + 1] + dy - f->pose[3 * i + 1]);
                     if (d > 4 * far) continue;
                     double g = gap(&p[i], &p[j], dx, dy);
                     least = fmin(least, g);
@@ -133,13 +135,17 @@ static void assert_sound(const bt_case *c, const bt_field *f, const char *what)
         assert_true(fabs(m.area - f->area[i]) < 1e-9 * m.area);
         assert_true(hypot(m.cx - f->pose[3 * i], m.cy - f->pose[3 * i + 1]) < 1e-9 * c->domain.length);
         for (int k = 0; k < p.n; k++) {
-            bool in_x = c->domain.ends == BT_BOUND_PERIODIC || (p.v[2 * k] >= c->ice.x_min - round_off && p.v[2 * k] <= c->ice.x_max + round_off);
-            bool in_y = c->domain.sides == BT_BOUND_PERIODIC || (p.v[2 * k + 1] >= c->ice.y_min - round_off && p.v[2 * k + 1] <= c->ice.y_max + round_off);
-            if (!in_x || !in_y) fail_msg("%s: floe %d sticks out at (%.17g, %.17g)", what, i, p.v[2 * k], p.v[2 * k + 1]);
+            bool in_x = c->domain.ends == BT_BOUND_PERIODIC ||
+                        (p.v[2 * k] >= c->ice.x_min - round_off && p.v[2 * k] <= c->ice.x_max + round_off);
+            bool in_y = c->domain.sides == BT_BOUND_PERIODIC ||
+                        (p.v[2 * k + 1] >= c->ice.y_min - round_off && p.v[2 * k + 1] <= c->ice.y_max + round_off);
+            if (!in_x || !in_y)
+                fail_msg("%s: floe %d sticks out at (%.17g, %.17g)", what, i, p.v[2 * k], p.v[2 * k + 1]);
         }
         for (int kx = -1; body.n && kx <= 1; kx++)
             for (int ky = -1; ky <= 1; ky++) {
-                if ((kx && c->domain.ends != BT_BOUND_PERIODIC) || (ky && c->domain.sides != BT_BOUND_PERIODIC)) continue;
+                if ((kx && c->domain.ends != BT_BOUND_PERIODIC) || (ky && c->domain.sides != BT_BOUND_PERIODIC))
+                    continue;
                 double g = gap(&p, &body, kx * c->domain.length, ky * c->domain.width);
                 if (g < 0) fail_msg("%s: floe %d is %g m inside the body", what, i, -g);
             }
@@ -243,7 +249,8 @@ static void test_surroundings(void **state)
     assert_makes(c, BT_ICE_RECTANGLES, 0.7, "power law rectangles");
     // a floe given by hand keeps its place
     c = basin();
-    bt_floe_def hand = {.shape = BT_BODY_RECTANGLE, .length = 4, .width = 2, .x = 20, .y = 1, .yaw = 0.4, .thickness = 0.1};
+    bt_floe_def hand = {
+        .shape = BT_BODY_RECTANGLE, .length = 4, .width = 2, .x = 20, .y = 1, .yaw = 0.4, .thickness = 0.1};
     c.floes = &hand, c.n_floes = 1;
     f = made(&c);
     assert_sound(&c, &f, "hand-given floe");
@@ -311,7 +318,8 @@ static void assert_law(const bt_case *c, double mean, double sd)
         sum2 += d * d / N;
     }
     if (fabs(sum - mean) > 0.01 * mean) fail_msg("mean %g, want %g", sum, mean);
-    if (sd >= 0 && fabs(sqrt(fmax(0, sum2 - sum * sum)) - sd) > 0.03 * mean) fail_msg("sd %g, want %g", sqrt(sum2 - sum * sum), sd);
+    if (sd >= 0 && fabs(sqrt(fmax(0, sum2 - sum * sum)) - sd) > 0.03 * mean)
+        fail_msg("sd %g, want %g", sqrt(sum2 - sum * sum), sd);
     assert_true(fabs(bt_sizes_mean(&s) - mean) < 0.001 * mean);
     assert_true(fabs(bt_sizes_mean_area(&s) - BT_PI / 4 * sum2) < 0.03 * sum2);
 }
@@ -364,7 +372,8 @@ static void test_sizes_of_fields(void **state)
         if (fabs(a - 1.8) > 0.15) fail_msg("exponent %g of %d floes", a, f.n);
         bt_field_free(&f);
 
-        c.ice.size_law = BT_SIZE_SINGLE, c.ice.size = 20, c.ice.size_spread = 0.25, c.ice.concentration = 0.95, c.ice.size_min = c.ice.size_max = 0;
+        c.ice.size_law = BT_SIZE_SINGLE, c.ice.size = 20, c.ice.size_spread = 0.25, c.ice.concentration = 0.95,
+        c.ice.size_min = c.ice.size_max = 0;
         f = made(&c);
         double sum = 0, sum2 = 0;
         for (bt_idx i = 0; i < f.n; i++) {
@@ -417,7 +426,8 @@ static double variation_of_gaps(const bt_case *c)
 static void test_relaxed(void **state)
 {
     (void)state;
-    // Gap to the nearest neighbour: nearly the same everywhere in a shrunken tessellation, close to exponential in a gas.
+    // Gap to the nearest neighbour: nearly the same everywhere in a shrunken tessellation, close to exponential in a
+    // gas.
     const double all[] = {0.3, 0.5, 0.8};
     for (int k = 0; k < 3; k++) {
         bt_case c = basin();
@@ -426,7 +436,8 @@ static void test_relaxed(void **state)
         double lattice = variation_of_gaps(&c);
         c.ice.shake = 15;
         double shaken = variation_of_gaps(&c);
-        if (!(shaken > 0.6 && shaken > 2.5 * lattice)) fail_msg("at %g: variation of gaps %g, before the shake %g", all[k], shaken, lattice);
+        if (!(shaken > 0.6 && shaken > 2.5 * lattice))
+            fail_msg("at %g: variation of gaps %g, before the shake %g", all[k], shaken, lattice);
     }
 }
 
@@ -452,7 +463,8 @@ static void test_orientation(void **state)
         // of n random directions each of these is normal with standard deviation 1/√(2n)
         double limit = 4 / sqrt(2.0 * f.n), worst = 0;
         for (int k = 0; k < 4; k++) worst = fmax(worst, fabs(sum[k]));
-        if (shaken ? worst > limit : worst < 0.9) fail_msg("order parameters %g %g %g %g of %d floes", sum[0], sum[1], sum[2], sum[3], f.n);
+        if (shaken ? worst > limit : worst < 0.9)
+            fail_msg("order parameters %g %g %g %g of %d floes", sum[0], sum[1], sum[2], sum[3], f.n);
         bt_field_free(&f);
     }
 }
@@ -464,7 +476,8 @@ static void test_space_order(void **state)
     bt_case c = basin();
     bt_field f = made(&c);
     double sum = 0;
-    for (bt_idx i = 1; i < f.n; i++) sum += hypot(f.pose[3 * i] - f.pose[3 * i - 3], f.pose[3 * i + 1] - f.pose[3 * i - 2]) / (f.n - 1);
+    for (bt_idx i = 1; i < f.n; i++)
+        sum += hypot(f.pose[3 * i] - f.pose[3 * i - 3], f.pose[3 * i + 1] - f.pose[3 * i - 2]) / (f.n - 1);
     assert_true(sum < 2.5);
     bt_field_free(&f);
 }
@@ -524,7 +537,8 @@ static void test_overlap(void **state)
         bt_field_add(&f, 4, square, second[k].x, second[k].y, second[k].yaw, 1);
         double got = bt_field_overlap(&c, &f);
         // the body is a polygon of 64 corners of the disc's area: its flats lie within 0.2 % of the radius
-        if (fabs(got - second[k].want) > (second[k].x == 5 ? 0.003 : 1e-12)) fail_msg("case %zu: overlap %g, want %g", k, got, second[k].want);
+        if (fabs(got - second[k].want) > (second[k].x == 5 ? 0.003 : 1e-12))
+            fail_msg("case %zu: overlap %g, want %g", k, got, second[k].want);
         bt_field_free(&f);
     }
     c.domain.ends = c.domain.sides = BT_BOUND_PERIODIC; // across the edges, walls gone
@@ -566,10 +580,10 @@ int main(void)
 {
     omp_set_num_threads(1); // small fields: threads that wait for one another only cost
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_add),         cmocka_unit_test(test_overlap),         cmocka_unit_test(test_voronoi),
-        cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),        cmocka_unit_test(test_surroundings),
-        cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws),       cmocka_unit_test(test_sizes_of_fields),
-        cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),         cmocka_unit_test(test_orientation),
+        cmocka_unit_test(test_add),         cmocka_unit_test(test_overlap),   cmocka_unit_test(test_voronoi),
+        cmocka_unit_test(test_rectangles),  cmocka_unit_test(test_polygons),  cmocka_unit_test(test_surroundings),
+        cmocka_unit_test(test_seed),        cmocka_unit_test(test_size_laws), cmocka_unit_test(test_sizes_of_fields),
+        cmocka_unit_test(test_thickness),   cmocka_unit_test(test_relaxed),   cmocka_unit_test(test_orientation),
         cmocka_unit_test(test_space_order), cmocka_unit_test(test_refusals),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -83,7 +83,8 @@ static void assert_refused(bt_status want, const char *part)
     bt_status got = read_quietly(&f, &err);
     if (got != want) fail_msg("status %d, want %d (%s): %s", got, want, part, err.n ? err.text[0] : "no message");
     assert_true(err.n >= 1 && err.n <= 11);
-    if (!strstr(err.text[0], part) || !strstr(err.text[0], path)) fail_msg("said \"%s\", expected \"%s: ...%s...\"", err.text[0], path, part);
+    if (!strstr(err.text[0], part) || !strstr(err.text[0], path))
+        fail_msg("said \"%s\", expected \"%s: ...%s...\"", err.text[0], path, part);
     assert_int_equal(f.n, 0);
     bt_errors_free(&err);
     bt_field_free(&f);
@@ -148,7 +149,7 @@ static char *read_bytes(size_t *n)
     return bytes;
 }
 
-/// The good file without its seal, as another program would write it.
+/// The good file without its checksum, as another program would write it.
 static void write_bare(void)
 {
     size_t n;
@@ -205,7 +206,7 @@ static uint64_t next_random(void)
     return x;
 }
 
-/// Of a sealed file every flip is refused, wherever it is: seal, metadata, numbers.
+/// Of a protected by a checksum file every flip is refused, wherever it is: checksum, metadata, numbers.
 static void test_flipped_bits_of_a_sealed_file(void **state)
 {
     (void)state;
@@ -214,7 +215,7 @@ static void test_flipped_bits_of_a_sealed_file(void **state)
     char *bytes = read_bytes(&n);
     for (int k = 0; k < 1000; k++) {
         const uint64_t x = next_random();
-        // A fifth of them in the seal and the first metadata, which are few bytes.
+        // A fifth of them in the checksum and the first metadata, which are few bytes.
         const size_t at = k % 5 ? x % n : x % 1024;
         bytes[at] ^= (char)(1 << (x >> 40) % 8);
         write_bytes(bytes, n);
@@ -222,7 +223,8 @@ static void test_flipped_bits_of_a_sealed_file(void **state)
         bt_field f;
         bt_errors err = {0};
         const bt_status status = read_quietly(&f, &err);
-        if (status != BT_ERR_CASE || err.n != 1 || f.n != 0) fail_msg("byte %zu flipped: status %d, %s", at, status, err.n ? err.text[0] : "no message");
+        if (status != BT_ERR_CASE || err.n != 1 || f.n != 0)
+            fail_msg("byte %zu flipped: status %d, %s", at, status, err.n ? err.text[0] : "no message");
         bt_errors_free(&err);
         bt_field_free(&f);
     }
@@ -251,7 +253,8 @@ static void test_flipped_bits_of_a_bare_file(void **state)
         assert_true(status == BT_OK || ((status == BT_ERR_CASE || status == BT_ERR_IO) && err.n >= 1));
         for (bt_idx i = 0; status == BT_OK && i < f.n; i++) { // what gets in is sound
             assert_null(bt_shape_fault((int)(f.offsets[i + 1] - f.offsets[i]), f.vertices + 2 * f.offsets[i]));
-            assert_true(isfinite(f.pose[3 * i]) && isfinite(f.pose[3 * i + 1]) && isfinite(f.pose[3 * i + 2]) && f.thickness[i] > 0);
+            assert_true(isfinite(f.pose[3 * i]) && isfinite(f.pose[3 * i + 1]) && isfinite(f.pose[3 * i + 2]) &&
+                        f.thickness[i] > 0);
         }
         accepted += status == BT_OK;
         bt_errors_free(&err);
@@ -265,7 +268,8 @@ static void test_flipped_bits_of_a_bare_file(void **state)
 static void spoil(const char *dataset, hsize_t at, double value)
 {
     write_bare();
-    hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), d = H5Dopen2(file, dataset, H5P_DEFAULT), space = H5Dget_space(d);
+    hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT), d = H5Dopen2(file, dataset, H5P_DEFAULT),
+          space = H5Dget_space(d);
     hssize_t n = H5Sget_simple_extent_npoints(space);
     double *data = malloc((size_t)n * sizeof *data);
     H5Dread(d, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
@@ -284,7 +288,8 @@ static void replace(const char *dataset, hid_t type, int rank, const hsize_t *di
     hid_t file = H5Fopen(path, H5F_ACC_RDWR, H5P_DEFAULT);
     assert_true(H5Ldelete(file, dataset, H5P_DEFAULT) >= 0);
     if (type) {
-        hid_t space = H5Screate_simple(rank, dims, NULL), d = H5Dcreate2(file, dataset, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+        hid_t space = H5Screate_simple(rank, dims, NULL),
+              d = H5Dcreate2(file, dataset, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
         if (data) H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data);
         H5Dclose(d);
         H5Sclose(space);
@@ -375,8 +380,13 @@ static void test_spoiled_layout(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_round_trip),   cmocka_unit_test(test_write_failure),  cmocka_unit_test(test_not_a_field),
-        cmocka_unit_test(test_truncated),    cmocka_unit_test(test_flipped_bits_of_a_sealed_file), cmocka_unit_test(test_flipped_bits_of_a_bare_file),   cmocka_unit_test(test_spoiled_values),
+        cmocka_unit_test(test_round_trip),
+        cmocka_unit_test(test_write_failure),
+        cmocka_unit_test(test_not_a_field),
+        cmocka_unit_test(test_truncated),
+        cmocka_unit_test(test_flipped_bits_of_a_sealed_file),
+        cmocka_unit_test(test_flipped_bits_of_a_bare_file),
+        cmocka_unit_test(test_spoiled_values),
         cmocka_unit_test(test_spoiled_layout),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Guards: each fires at its limit and not below, at every step and at the end, names the step, and can be switched off; every number is looked at; the scale of
-// the energy bounds what wind, current, tide and slope can do.
+// Guards: each fires at its limit and not below, at every step and at the end, names the step, and can be switched off;
+// every number is looked at; the scale of the energy bounds what wind, current, tide and slope can do.
 #include "scene.h"
 
 #include <stdio.h>
@@ -9,7 +9,7 @@
 #include "loads/impact.h"
 #include "output/observe.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "step/window.h"
 #include "run/guard.h"
 
@@ -23,7 +23,7 @@ static bt_world *two_floes(void)
         d.x = 3 * k + 1, d.y = 2;
         bt_world_add(w, &d);
     }
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     w->step = 50;
     return w;
 }
@@ -46,8 +46,9 @@ static bt_sample sound_sample(const bt_world *w)
     bt_sample s;
     memset(&s, 0, sizeof s);
     const unsigned has = bt_observe_applies(w);
-    for (int k = 0; k < bt_n_series_fields; k++)
-        if (!(has & 1u << bt_series_fields[k].applies)) *(double *)(void *)((char *)&s + bt_series_fields[k].offset) = NAN;
+    for (int k = 0; k < bt_n_series(); k++)
+        if (!(has & 1u << bt_series_fields[k].applies))
+            *(double *)(void *)((char *)&s + bt_series_fields[k].offset) = NAN;
     return s;
 }
 
@@ -67,7 +68,10 @@ static void expect_of(bt_guard *g, const bt_world *w, const bt_sample *s, bool e
     bt_errors_free(&err);
 }
 
-static void expect(bt_guard *g, const bt_world *w, const bt_sample *s, const char *part) { expect_of(g, w, s, false, part); }
+static void expect(bt_guard *g, const bt_world *w, const bt_sample *s, const char *part)
+{
+    expect_of(g, w, s, false, part);
+}
 
 static void guards_fire_at_their_limits(void **state)
 {
@@ -139,14 +143,14 @@ static void a_floe_beyond_a_wall_is_seen_at_every_step_and_at_the_end(void **sta
 
     // Where nothing has moved a step does not look; the end does.
     *y = 4.01;
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_KNOWN, w->tiles->awake[k] = 0;
-    w->tiles->still = true;
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_ASLEEP, w->cells->awake[k] = 0;
+    w->cells->still = true;
     expect(&g, w, &s, NULL);
     expect_of(&g, w, &s, true, "floe 1 is beyond a wall");
-    w->tiles->still = false; // all drifts
+    w->cells->still = false; // all drifts
     expect(&g, w, &s, "floe 1 is beyond a wall");
-    for (bt_idx k = 0; k < w->tiles->n; k++) w->tiles->rest[k] = BT_REST_NEW; // come to rest in this step
-    w->tiles->still = true;
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_ASLEEP_NEW; // come to rest in this step
+    w->cells->still = true;
     expect(&g, w, &s, "floe 1 is beyond a wall");
 
     // A wall that closes is where it is now: 0.2 m/s for 5 s.
@@ -197,7 +201,8 @@ static void numbers_that_are_none_are_found_in_bodies(void **state)
     const bt_sample s = sound_sample(w);
     bt_guard_begin(&g, &c, w, 2, 0.8);
     const bt_idx i = bt_world_index(w, 1);
-    double *const number[] = {&w->bodies.pose[i].x, &w->bodies.pose[i].y, &w->bodies.pose[i].yaw, &w->bodies.vel[i].x, &w->bodies.vel[i].y, &w->bodies.vel[i].w};
+    double *const number[] = {&w->bodies.pose[i].x, &w->bodies.pose[i].y, &w->bodies.pose[i].yaw,
+                              &w->bodies.vel[i].x,  &w->bodies.vel[i].y,  &w->bodies.vel[i].w};
     for (int k = 0; k < 6; k++) {
         const double before = *number[k];
         *number[k] = k % 2 ? NAN : -INFINITY;
@@ -226,7 +231,7 @@ static bt_world *whole_scene(bt_case *c, bt_roster *r)
     bt_world *w = NULL;
     if (bt_case_finish(c, &err) != BT_OK || bt_setup_world(c, &f, &w, r, &err) != BT_OK) fail_msg("%s", err.text[0]);
     bt_field_free(&f);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     while (w->step < 50) bt_world_step(w);
     return w;
 }
@@ -243,10 +248,18 @@ static void numbers_that_are_none_are_found_in_tow_window_and_collisions(void **
     bt_guard_begin(&g, &c, w, r.n_floes, r.mean_size);
     expect(&g, w, &s, NULL);
     expect_of(&g, w, &s, true, NULL);
-    const struct { double *number; const char *name; } all[] = {
-        {&w->tow->carriage_x, "tow/carriage_x"}, {&w->tow->way, "tow/way"}, {&w->tow->branch[1].lambda, "tow/impulse_2"}, {&w->tow->vessel.vy, "tow/vessel_vy"},
-        {&w->window->rear, "window/rear"}, {&w->window->vel.y, "window/vel"}, {&w->window->brought[2], "window/brought"}, {&w->drift_y, "world/drift_y"},
-        {&w->par.air_u, "step/air_u"}, {&w->impacts->panels.panel[3].fx, "impacts/panels"},
+    const struct { double *number; const char *name;
+    } all[] = {
+        {&w->tow->carriage_x, "tow/carriage_x"},
+        {&w->tow->way, "tow/way"},
+        {&w->tow->branch[1].lambda, "tow/impulse_2"},
+        {&w->tow->vessel.vy, "tow/vessel_vy"},
+        {&w->window->rear, "window/rear"},
+        {&w->window->vel.y, "window/vel"},
+        {&w->window->brought[2], "window/brought"},
+        {&w->drift_y, "world/drift_y"},
+        {&w->par.air_u, "step/air_u"},
+        {&w->impacts->panels.panel[3].fx, "impacts/panels"},
     };
     for (size_t k = 0; k < sizeof all / sizeof *all; k++) {
         const double before = *all[k].number;
@@ -282,7 +295,7 @@ static void numbers_that_are_none_are_found_in_samples(void **state)
     bt_observe(w, 0.13, &s);
     assert_int_equal(bt_observe_applies(w), (1u << BT_APPLIES_KINDS) - 1);
     assert_int_equal(bt_observe_applies(bare), 1u << BT_APPLIES_ALWAYS);
-    for (int k = 0; k < bt_n_series_fields; k++) {
+    for (int k = 0; k < bt_n_series(); k++) {
         const bt_series_field *f = &bt_series_fields[k];
         double *x = (double *)(void *)((char *)&s + f->offset), *y = (double *)(void *)((char *)&without + f->offset);
         const double before = *x, before_without = *y, none[] = {NAN, INFINITY, -INFINITY, 1e100, -2e100};
@@ -298,7 +311,8 @@ static void numbers_that_are_none_are_found_in_samples(void **state)
         bt_guard_begin(&g, &walls, bare, 2, 0.8);
         g.overlap = 0, g.unconverged = 0;
         *y = f->applies == BT_APPLIES_ALWAYS ? NAN : 0;
-        expect(&g, bare, &without, f->applies == BT_APPLIES_ALWAYS ? part : "a number where there is nothing to measure");
+        expect(&g, bare, &without,
+               f->applies == BT_APPLIES_ALWAYS ? part : "a number where there is nothing to measure");
         *y = before_without;
     }
     bt_world_free(w);
@@ -309,9 +323,13 @@ static void numbers_that_are_none_are_found_in_samples(void **state)
 
 // --- the scale of the energy -----------------------------------------------------------------------------------------
 
-static double draw(uint64_t *state, double low, double high) { return low * exp(scene_uniform(state) * log(high / low)); }
+static double draw(uint64_t *state, double low, double high)
+{
+    return low * exp(scene_uniform(state) * log(high / low));
+}
 
-/// A floe alone under wind, current, tide and slope, from rest or not: with guard.energy 1 the limit is what the derivation says, and every step stays below.
+/// A floe alone under wind, current, tide and slope, from rest or not: with guard.energy 1 the limit is what the
+/// derivation says, and every step stays below.
 static void no_floe_is_driven_beyond_the_scale(void **state)
 {
     (void)state;
@@ -320,7 +338,8 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
     for (int scene = 0; scene < 400; scene++) {
         bt_case c;
         bt_case_defaults(&c);
-        const double size = draw(&seed, 0.1, 100), wind = scene % 4 ? draw(&seed, 0.1, 50) : 0, angle = 2 * BT_PI * scene_uniform(&seed);
+        const double size = draw(&seed, 0.1, 100), wind = scene % 4 ? draw(&seed, 0.1, 50) : 0,
+                     angle = 2 * BT_PI * scene_uniform(&seed);
         c.run.dt = draw(&seed, 0.01, 100), c.run.duration = 300 * c.run.dt;
         c.domain.ends = c.domain.sides = BT_BOUND_OPEN;
         c.domain.length = c.domain.width = 1e6, c.domain.x0 = c.domain.y0 = -5e5;
@@ -332,7 +351,9 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
         if (scene % 5 == 0) c.ice.drag.water_form = 0;
         if (scene % 7 == 0) c.ice.drag.water_skin = 0;
         c.air.wind_x = wind * cos(angle), c.air.wind_y = wind * sin(angle);
-        if (scene % 3) c.water.current_x = draw(&seed, 0.01, 2), c.water.tide.major = draw(&seed, 0.01, 2), c.water.tide.minor = -0.5 * c.water.tide.major, c.water.tide.period = draw(&seed, 3, 300) * c.run.dt;
+        if (scene % 3)
+            c.water.current_x = draw(&seed, 0.01, 2), c.water.tide.major = draw(&seed, 0.01, 2),
+            c.water.tide.minor = -0.5 * c.water.tide.major, c.water.tide.period = draw(&seed, 3, 300) * c.run.dt;
         if (scene % 6 == 1) c.water.tilt = BT_TILT_SLOPE, c.water.slope_x = draw(&seed, 1e-6, 1e-2);
         if (scene % 2) c.water.latitude = 80 * BT_PI / 180;
         if (scene % 6 == 3) c.water.tilt = BT_TILT_DYNAMIC;
@@ -343,7 +364,8 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
             c.water.current_x = 1, c.water.tide.major = c.water.tide.minor = 0;
             c.water.latitude = 80 * BT_PI / 180, c.water.tilt = BT_TILT_GEOSTROPHIC, c.water.slope_x = 0;
         }
-        bt_floe_def floe = {.shape = BT_BODY_RECTANGLE, .length = size, .width = 0.4 * size, .thickness = c.ice.thickness};
+        bt_floe_def floe = {
+            .shape = BT_BODY_RECTANGLE, .length = size, .width = 0.4 * size, .thickness = c.ice.thickness};
         if (scene % 8 == 7) floe.vx = 3, floe.yaw_rate = 0.5;
         c.floes = &floe, c.n_floes = 1;
         bt_errors err = {0};
@@ -351,14 +373,16 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
         bt_field_init(&f);
         bt_world *w = NULL;
         bt_roster r;
-        if (bt_case_finish(&c, &err) != BT_OK || bt_setup_world(&c, &f, &w, &r, &err) != BT_OK) fail_msg("scene %d: %s", scene, err.text[0]);
+        if (bt_case_finish(&c, &err) != BT_OK || bt_setup_world(&c, &f, &w, &r, &err) != BT_OK)
+            fail_msg("scene %d: %s", scene, err.text[0]);
         c.guard.energy = 1;
         bt_guard g = {0};
         bt_guard_begin(&g, &c, w, 1, size);
         for (int k = 0; k < 300; k++) {
             bt_world_step(w);
             if (!(w->stats.kinetic_energy <= g.energy * (1 + 1e-9)))
-                fail_msg("scene %d step %d: %g J, limit %g J (wind %g, dt %g, size %g)", scene, k, w->stats.kinetic_energy, g.energy, wind, c.run.dt, size);
+                fail_msg("scene %d step %d: %g J, limit %g J (wind %g, dt %g, size %g)", scene, k,
+                         w->stats.kinetic_energy, g.energy, wind, c.run.dt, size);
             if (g.energy > 0) closest = bt_max(closest, w->stats.kinetic_energy / g.energy);
         }
         bt_world_free(w);
@@ -387,7 +411,8 @@ static void overlap_of_the_last_state_is_that_of_the_next_step(void **state)
         for (int k = 0; k < 36; k++) {
             scene_square(1, v);
             bt_body_def d = scene_prism(4, v, 100);
-            d.x = 1.5 * (k % 6) + 0.3 * scene_uniform(&seed), d.y = 1.5 * (k / 6), d.yaw = scene_uniform(&seed), d.thickness = 0.1;
+            d.x = 1.5 * (k % 6) + 0.3 * scene_uniform(&seed), d.y = 1.5 * (k / 6), d.yaw = scene_uniform(&seed),
+            d.thickness = 0.1;
             d.vx = 2 * (4 - d.x), d.vy = 2 * (4 - d.y);
             bt_world_add(w, &d);
         }
@@ -395,9 +420,12 @@ static void overlap_of_the_last_state_is_that_of_the_next_step(void **state)
             bt_world_step(w);
             const uint64_t hash = bt_world_hash(w);
             const double overlap = bt_contacts_overlap(w);
-            if (!crush) assert_true(bt_world_hash(w) == hash); // with it, what has come apart is forgotten, as the next step would
+            // with it, what has come apart is forgotten, as the next step would
+            if (!crush) assert_true(bt_world_hash(w) == hash);
             bt_world_step(w);
-            if (w->stats.overlap != overlap) fail_msg("step %d: %.17g m in the last look, %.17g m in the step after it", 2 * k, overlap, w->stats.overlap);
+            if (w->stats.overlap != overlap)
+                fail_msg("step %d: %.17g m in the last look, %.17g m in the step after it", 2 * k, overlap,
+                         w->stats.overlap);
             deepest = bt_max(deepest, overlap);
         }
         if (!(deepest > 1e-3)) fail_msg("crush %d: nothing overlaps: %g", crush, deepest);

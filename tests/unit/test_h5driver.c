@@ -17,7 +17,8 @@
 #include "base/h5util.h"
 #include "scene.h"
 
-enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 }; // 160 chunks: an index of three nodes, two of which have been divided
+// 160 chunks: an index of three nodes, two of which have been divided
+enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 };
 
 static long writes_left = -1; // until the writer dies; −1: it lives
 
@@ -31,7 +32,8 @@ ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
 
 static double entry(int series, hsize_t row) { return 1 + (double)row + 0.01 * series; }
 
-/// Series and packed tables that grow, flushed after every ROWS rows. Returns the number of writes after the first flush.
+/// Series and packed tables that grow, flushed after every ROWS rows. Returns the number of writes after the first
+/// flush.
 static long write_file(const char *path, long die_after)
 {
     bt_errors err = {0};
@@ -44,7 +46,8 @@ static long write_file(const char *path, long die_after)
         series[k] = bt_h5_growing(&h, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){CHUNK, 1}, false);
         bt_h5_attr_text(&h, name, "description", "grows");
     }
-    const hid_t table = bt_h5_growing(&h, "/table", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){WIDTH}, (hsize_t[]){1, WIDTH}, true);
+    const hid_t table =
+        bt_h5_growing(&h, "/table", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){WIDTH}, (hsize_t[]){1, WIDTH}, true);
     long used = 0;
     for (int n = 0; n < FLUSHES; n++) {
         for (int k = 0; k < SERIES; k++) {
@@ -80,7 +83,8 @@ static hsize_t whole_rows(hid_t file, const char *name, int series, int width)
     for (hsize_t i = 0; i < n[0]; i++)
         for (int c = 0; c < width; c++)
             if (x[i * (hsize_t)width + (hsize_t)c] != entry(series + c, i))
-                fail_msg("%s, row %d of %d: %g, not %g", name, (int)i, (int)n[0], x[i * (hsize_t)width + (hsize_t)c], entry(series + c, i));
+                fail_msg("%s, row %d of %d: %g, not %g", name, (int)i, (int)n[0], x[i * (hsize_t)width + (hsize_t)c],
+                         entry(series + c, i));
     free(x);
     H5Sclose(space);
     H5Dclose(d);
@@ -101,7 +105,8 @@ static int note_of(hid_t file)
     return n;
 }
 
-// Red: metadata that are written as HDF5 hands them over, or lowest address first: rows announced before their index is there.
+// Red: metadata that are written as HDF5 hands them over, or lowest address first: rows announced before their index is
+// there.
 static void killed_at_any_write_it_holds_whole_rows(void **state)
 {
     (void)state;
@@ -134,7 +139,8 @@ static void killed_at_any_write_it_holds_whole_rows(void **state)
         const hsize_t tables = whole_rows(file, "/table", SERIES, WIDTH);
         H5Fclose(file);
         // Of one flush, or of that one and the next.
-        assert_true(least % ROWS == 0 && least >= ROWS && most <= least + ROWS && tables * ROWS >= least && tables * ROWS <= least + ROWS);
+        assert_true(least % ROWS == 0 && least >= ROWS && most <= least + ROWS && tables * ROWS >= least &&
+                    tables * ROWS <= least + ROWS);
         assert_true(least >= last);
         last = least;
     }
@@ -157,14 +163,16 @@ static void check_series(hid_t file, const char *name, int k, hsize_t n)
     H5Dclose(d);
 }
 
-/// Datasets made, extended, read and deleted by turns, with a small cache of metadata, from a seed; flushed now and then.
+/// Datasets made, extended, read and deleted by turns, with a small cache of metadata, from a seed; flushed now and
+/// then.
 static void shuffle(hid_t access, const char *path, uint64_t seed_given, hsize_t length[NAMES])
 {
     uint64_t seed = seed_given;
     H5AC_cache_config_t cache = {.version = H5AC__CURR_CACHE_CONFIG_VERSION};
     H5Pget_mdc_config(access, &cache);
     cache.set_initial_size = true;
-    cache.initial_size = cache.min_size = cache.max_size = 4096; // so that metadata leave it before they are flushed, and are read again
+    // so that metadata leave it before they are flushed, and are read again
+    cache.initial_size = cache.min_size = cache.max_size = 4096;
     cache.incr_mode = H5C_incr__off, cache.flash_incr_mode = H5C_flash_incr__off, cache.decr_mode = H5C_decr__off;
     assert_true(H5Pset_mdc_config(access, &cache) >= 0);
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, H5P_DEFAULT, access), quiet = H5Pcreate(H5P_DATASET_CREATE);
@@ -197,7 +205,8 @@ static void shuffle(hid_t access, const char *path, uint64_t seed_given, hsize_t
         free(x);
         H5Dclose(d);
     }
-    for (int k = 0; k < NAMES && seed_given % 2 == 0; k++) { // the file becomes short: much of what waits lies beyond its end
+    // the file becomes short: much of what waits lies beyond its end
+    for (int k = 0; k < NAMES && seed_given % 2 == 0; k++) {
         char name[20];
         snprintf(name, sizeof name, "/d%d", k);
         if (length[k] > 0) H5Ldelete(file, name, H5P_DEFAULT);
@@ -243,6 +252,7 @@ static void a_file_of_many_changes_is_whole(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows), cmocka_unit_test(a_file_of_many_changes_is_whole)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows),
+                                       cmocka_unit_test(a_file_of_many_changes_is_whole)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

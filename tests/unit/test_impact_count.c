@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What is counted of collisions and panel loads over a window that is known only at the end, against sums of the test's own.
+// What is counted of collisions and panel loads over a window that is known only at the end, against sums of the test's
+// own.
 //
-// What turns these tests red (tried): a collision in the very step in which the window begins left out; counted from the end of the ramp; only the
-// first piece of the file read back; blocks that are not merged, not restored, or taken from one too early; the collision that is open at the end
-// dropped; rows of a file not checked when it is taken up.
+// What turns these tests red (tried): a collision in the very step in which the window begins left out; counted from
+// the end of the ramp; only the first piece of the file read back; blocks that are not merged, not restored, or taken
+// from one too early; the collision that is open at the end dropped; rows of a file not checked when it is taken up.
 #include "made_up_run.h"
 
 #include "output/impact_count.h"
@@ -48,15 +49,17 @@ static bt_panel_loads sum_of(int64_t first, int64_t end, int k)
 
 static bool alike(const bt_panel_loads *a, const bt_panel_loads *b)
 {
-    return fabs(a->fx - b->fx) < 1e-7 && fabs(a->fy - b->fy) < 1e-7 && fabs(a->normal - b->normal) < 1e-7 && a->most == b->most;
+    return fabs(a->fx - b->fx) < 1e-7 && fabs(a->fy - b->fy) < 1e-7 && fabs(a->normal - b->normal) < 1e-7 &&
+           a->most == b->most;
 }
 
-/// Runs before and after the first and the second time that two blocks become one, and such that end within a block: from any start that the
-/// window may have, and from a state that was kept on the way.
+/// Runs before and after the first and the second time that two blocks become one, and such that end within a block:
+/// from any start that the window may have, and from a state that was kept on the way.
 static void panel_loads_from_any_start(void **state)
 {
     (void)state;
-    const int64_t full = 5 * BT_STATS_STARTS, early = 17, late[] = {0, 1, 4, 5, 23, full, full + 1, full + 13, 2 * full, 2 * full + 1, 3 * full + 7};
+    const int64_t full = 5 * BT_STATS_STARTS, early = 17,
+                  late[] = {0, 1, 4, 5, 23, full, full + 1, full + 13, 2 * full, 2 * full + 1, 3 * full + 7};
     const int64_t lengths[] = {5, 5, 5, 5, 5, 5, 10, 10, 10, 20, 20};
     for (size_t i = 0; i < sizeof late / sizeof *late; i++) {
         bt_panel_blocks b;
@@ -99,11 +102,17 @@ static void collisions_by_their_time(void **state)
     h.column[BT_COL_COLLISION] = share;
     bt_steady w = {.start = 0.1 * 4, .first = 4, .n = 6};
     w.series[BT_REPORTED_ICE].mean.mean = 13.5;
-    const bt_impacts m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .panels = {.n = PANELS}};
-    const struct { double time, peak, panel; } hits[] = {{0.1 * 1, 900, 0}, {0.1 * 3, 20, 1}, {0.1 * 4, 5, 1}, {0.1 * 6, 80, 2}, {0.1 * 2, 70, 2}, {0.1 * 8, 60, 2}, {0.1 * 9, 5, 1}};
+    const bt_impacts m = {
+        .rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .panels = {.n = PANELS}};
+    const struct {
+        double time, peak, panel;
+    } hits[] = {{0.1 * 1, 900, 0}, {0.1 * 3, 20, 1}, {0.1 * 4, 5, 1}, {0.1 * 6, 80, 2},
+                {0.1 * 2, 70, 2},  {0.1 * 8, 60, 2}, {0.1 * 9, 5, 1}};
     bt_impact_count c;
     bt_impact_count_init(&c, &m, &h, &w);
-    for (size_t k = 0; k < sizeof hits / sizeof *hits; k++) bt_impact_count_add(&c, &(bt_impact){.time = hits[k].time, .peak = hits[k].peak, .panel = hits[k].panel, .gid = (double)k});
+    for (size_t k = 0; k < sizeof hits / sizeof *hits; k++)
+        bt_impact_count_add(
+            &c, &(bt_impact){.time = hits[k].time, .peak = hits[k].peak, .panel = hits[k].panel, .gid = (double)k});
     assert_int_equal(c.n_all, 7);
     assert_int_equal(c.n, 4);
     assert_true(c.hours == 6 * 0.1 / 3600 && c.start == 0.1 * 4);
@@ -116,14 +125,17 @@ static void collisions_by_their_time(void **state)
     bt_impact_count_peaks(&c, peaks);
     assert_true(peaks[0] == 80 && peaks[1] == 60 && peaks[2] == 5 && peaks[3] == 5);
     const bt_panel_hits wanted[PANELS] = {{0, 0, 900}, {2, 5, 20}, {2, 80, 70}};
-    for (int k = 0; k < PANELS; k++) assert_true(c.panel[k].n == wanted[k].n && c.panel[k].peak == wanted[k].peak && c.panel[k].start_peak == wanted[k].start_peak);
+    for (int k = 0; k < PANELS; k++)
+        assert_true(c.panel[k].n == wanted[k].n && c.panel[k].peak == wanted[k].peak &&
+                    c.panel[k].start_peak == wanted[k].start_peak);
     bt_impact_count_free(&c);
     // Without a window all of it is the start's.
     w = (bt_steady){.start = NAN, .first = N};
     w.series[BT_REPORTED_ICE].mean.mean = NAN;
     bt_impact_count_init(&c, &m, &h, &w);
     bt_impact_count_add(&c, &(bt_impact){.time = 5, .peak = 3});
-    assert_true(c.n_all == 1 && c.n == 0 && c.start_peak == 3 && c.hours == 0 && isnan(c.start) && isnan(c.largest_push) && c.start_push == 30);
+    assert_true(c.n_all == 1 && c.n == 0 && c.start_peak == 3 && c.hours == 0 && isnan(c.start) &&
+                isnan(c.largest_push) && c.start_push == 30);
     assert_true(isnan(c.collision_resistance) && isnan(c.push_resistance));
     bt_impact_count_free(&c);
 }
@@ -140,7 +152,9 @@ static void the_largest_peaks_are_kept(void **state)
     bt_impact_count c;
     bt_impact_count_init(&c, &m, &h, &w);
     const int64_t n = 3 * BT_IMPACT_PEAKS;
-    for (int64_t i = 0; i < n; i++) bt_impact_count_add(&c, &(bt_impact){.time = 1, .peak = (double)(i * 7919 % n + 1)}); // 1 .. n in another order
+    // 1 .. n in another order
+    for (int64_t i = 0; i < n; i++)
+        bt_impact_count_add(&c, &(bt_impact){.time = 1, .peak = (double)(i * 7919 % n + 1)});
     assert_int_equal(c.n, n);
     assert_int_equal(c.n_peaks, BT_IMPACT_PEAKS);
     double *peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *peaks);
@@ -163,7 +177,8 @@ typedef struct scene {
 static void begin(scene *k)
 {
     double square[8] = {1, -1, 1, 1, -1, 1, -1, -1};
-    *k = (scene){.c = made_up_case(), .m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .tolerance = 1e-6}};
+    *k = (scene){.c = made_up_case(),
+                 .m = {.rule = {.conversion = BT_IMPACT_DURATION, .duration = 0.04}, .dt = 0.1, .tolerance = 1e-6}};
     k->c.output.window_start = 5;
     bt_panels_init(&k->m.panels, PANELS, 4, square);
     k->m.closed = k->closed;
@@ -173,7 +188,8 @@ static void go_on(scene *k, bt_record *r, int first, int end, bt_errors *err)
 {
     for (int i = first; i < end; i++) {
         const bt_sample s = sample(i);
-        for (int n = 0; n < EACH; n++) k->closed[n] = (bt_impact){.time = s.time, .peak = i * EACH + n + 1, .panel = n % PANELS};
+        for (int n = 0; n < EACH; n++)
+            k->closed[n] = (bt_impact){.time = s.time, .peak = i * EACH + n + 1, .panel = n % PANELS};
         for (int n = 0; n < PANELS; n++) k->m.panels.panel[n] = load_at(i, n);
         k->m.n_closed = EACH;
         bt_record_sample(r, &s, err);
@@ -192,8 +208,10 @@ static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
     char *json = slurp(path);
     const int before = 49, all = STEPS * EACH + 1; // 49 steps end before 5 s
     snprintf(wanted, sizeof wanted, "\"collisions_whole_run\": %d,\n    \"collisions\": %d,", all, all - before * EACH);
-    if (!strstr(json, "\"from_s\": 5,") || !strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
-    snprintf(wanted, sizeof wanted, "\"start_largest_peak_n\": %d,\n    \"largest\": {\n      \"peak_n\": 1000000,", before * EACH);
+    if (!strstr(json, "\"from_s\": 5,") || !strstr(json, wanted))
+        fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
+    snprintf(wanted, sizeof wanted, "\"start_largest_peak_n\": %d,\n    \"largest\": {\n      \"peak_n\": 1000000,",
+             before * EACH);
     if (!strstr(json, wanted)) fail_msg("no %s in %.900s", wanted, strstr(json, "\"impacts\""));
     free(json);
     snprintf(path, sizeof path, "%s/result.h5", dir);
@@ -209,7 +227,8 @@ static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
     H5Fclose(file);
 }
 
-/// More collisions than are read back at once, and one that is open until the record ends: all of result.h5 is counted, once.
+/// More collisions than are read back at once, and one that is open until the record ends: all of result.h5 is counted,
+/// once.
 static void every_row_of_the_file_is_counted(void **state)
 {
     (void)state;
@@ -229,9 +248,13 @@ static void every_row_of_the_file_is_counted(void **state)
 static void a_record_that_goes_on_counts_the_same(void **state)
 {
     (void)state;
-    const struct { int at; const char *dir, *name; double panel, time, load; } all[] = {
-        {31, "early", NULL, 1, 1, 1}, {120, "late", NULL, 1, 1, 1}, {120, "panel", "/impacts", PANELS, 1, 1}, {120, "negative", "/impacts", -1, 1, 1},
-        {120, "time", "/impacts", 1, NAN, 1}, {120, "load", "collisions/panel_blocks", 1, 1, NAN}};
+    const struct { int at; const char *dir, *name; double panel, time, load;
+    } all[] = {{31, "early", NULL, 1, 1, 1},
+               {120, "late", NULL, 1, 1, 1},
+               {120, "panel", "/impacts", PANELS, 1, 1},
+               {120, "negative", "/impacts", -1, 1, 1},
+               {120, "time", "/impacts", 1, NAN, 1},
+               {120, "load", "collisions/panel_blocks", 1, 1, NAN}};
     for (size_t i = 0; i < sizeof all / sizeof *all; i++) {
         scene k;
         begin(&k);
@@ -245,7 +268,8 @@ static void a_record_that_goes_on_counts_the_same(void **state)
         assert_int_equal(bt_record_watch_impacts(r, &k.m, &err), BT_OK);
         go_on(&k, r, 0, all[i].at - 1, &err);
         const bt_sample s = sample(all[i].at - 1); // as the others, but for one number
-        for (int n = 0; n < EACH; n++) k.closed[n] = (bt_impact){.time = s.time, .peak = (all[i].at - 1) * EACH + n + 1, .panel = n % PANELS};
+        for (int n = 0; n < EACH; n++)
+            k.closed[n] = (bt_impact){.time = s.time, .peak = (all[i].at - 1) * EACH + n + 1, .panel = n % PANELS};
         k.closed[7].panel = all[i].panel;
         k.closed[7].time *= all[i].time;
         for (int n = 0; n < PANELS; n++) k.m.panels.panel[n] = load_at(all[i].at - 1, n);

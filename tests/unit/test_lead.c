@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The lead in a field: which floes it takes, and what their pieces must be. Overlap with the strip is found here by clipping, not by
-// the separating axes that the program uses.
+// The lead in a field: which floes it takes, and what their pieces must be. Overlap with the strip is found here by
+// clipping, not by the separating axes that the program uses.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -56,13 +56,15 @@ static double clipped(int n, const double *v, double ux, double uy, double low, 
     return n >= 3 ? bt_shape_moments(n, b).area : 0;
 }
 
-/// Area of floe i (an image of it) within the legs of the strip, plus 1 if a joint's centre is nearer than half the width.
+/// Area of floe i (an image of it) within the legs of the strip, plus 1 if a joint's centre is nearer than half the
+/// width.
 static double within(const bt_lead *l, const bt_field *f, bt_idx i, double dx, double dy)
 {
     double v[2 * BT_MAX_VERTICES], a[2 * (BT_MAX_VERTICES + 2)], b[2 * (BT_MAX_VERTICES + 2)], most = 0;
     const int n = placed(f, i, dx, dy, v);
     for (int k = 0; k + 1 < l->n; k++) {
-        const double *p = l->path + 2 * k, *q = p + 2, length = hypot(q[0] - p[0], q[1] - p[1]), ux = (q[0] - p[0]) / length, uy = (q[1] - p[1]) / length;
+        const double *p = l->path + 2 * k, *q = p + 2, length = hypot(q[0] - p[0], q[1] - p[1]),
+                     ux = (q[0] - p[0]) / length, uy = (q[1] - p[1]) / length;
         const double along = ux * p[0] + uy * p[1], across = -uy * p[0] + ux * p[1];
         int m = bt_shape_clip(n, v, ux, uy, along + length, a);
         m = bt_shape_clip(m, a, -ux, -uy, -along, b);
@@ -70,7 +72,8 @@ static double within(const bt_lead *l, const bt_field *f, bt_idx i, double dx, d
         for (int e = 0; k > 0 && e < n; e++) { // distance of the joint from an edge
             const double *s = v + 2 * e, *t = v + 2 * ((e + 1) % n), ex = t[0] - s[0], ey = t[1] - s[1];
             const double at = bt_max(0, bt_min(1, ((p[0] - s[0]) * ex + (p[1] - s[1]) * ey) / (ex * ex + ey * ey)));
-            if (hypot(s[0] + at * ex - p[0], s[1] + at * ey - p[1]) < 0.5 * l->width * 0.99) most = bt_max(most, 1); // the round has 32 sides
+            // the round has 32 sides
+            if (hypot(s[0] + at * ex - p[0], s[1] + at * ey - p[1]) < 0.5 * l->width * 0.99) most = bt_max(most, 1);
         }
     }
     return most;
@@ -120,7 +123,8 @@ static void channel_takes_what_it_overlaps(void **state)
     assert_int_equal(s.pieces, 0);
     assert_true(fabs(s.area_taken - area) < 1e-9 * area);
     assert_true(fabs(s.length - (hypot(15, 6) + hypot(4, 8) + hypot(14, 1))) < 1e-12);
-    assert_true(fabs(s.concentration_before - before.concentration) < 1e-15 && fabs(f.concentration - (before.concentration - area / f.ice_area)) < 1e-12);
+    assert_true(fabs(s.concentration_before - before.concentration) < 1e-15 &&
+                fabs(f.concentration - (before.concentration - area / f.ice_area)) < 1e-12);
     assert_true(s.concentration_after == f.concentration);
     bt_field_free(&f);
     bt_field_free(&before);
@@ -131,7 +135,8 @@ static double worst_overlap(const bt_field *f)
 {
     double worst = 0;
     for (bt_idx i = 0; i < f->n; i++) {
-        double v[2 * BT_MAX_VERTICES], w[2 * BT_MAX_VERTICES], a[2 * (2 * BT_MAX_VERTICES + 2)], b[2 * (2 * BT_MAX_VERTICES + 2)];
+        double v[2 * BT_MAX_VERTICES], w[2 * BT_MAX_VERTICES], a[2 * (2 * BT_MAX_VERTICES + 2)],
+            b[2 * (2 * BT_MAX_VERTICES + 2)];
         const int n = placed(f, i, 0, 0, v);
         for (bt_idx j = i + 1; j < f->n; j++) {
             if (hypot(f->pose[3 * i] - f->pose[3 * j], f->pose[3 * i + 1] - f->pose[3 * j + 1]) > 8) continue;
@@ -187,7 +192,8 @@ static void managed_pieces_are_small_and_keep_the_mass(void **state)
     }
     assert_int_equal(j, f.n);
     assert_true(cut > 20 && pieces > 4 * cut && large_outside > 5);
-    assert_true(s.taken >= cut && s.pieces >= pieces && s.pieces - pieces == s.taken - cut); // small floes in the strip are a piece each
+    // small floes in the strip are a piece each
+    assert_true(s.taken >= cut && s.pieces >= pieces && s.pieces - pieces == s.taken - cut);
     assert_true(s.mean_piece > 0.5 && s.mean_piece < 1);
     assert_true(worst_overlap(&f) == 0);
     // Cut already: nothing is left to cut.
@@ -205,7 +211,14 @@ static void a_lead_goes_over_the_seam(void **state)
     (void)state;
     const double path[] = {30, 0, 30 + 60, 0}; // to x = 10 of the next period but one: the whole width of the domain
     for (int managed = 0; managed < 2; managed++) {
-        const bt_lead l = {.mode = managed ? BT_LEAD_MANAGED : BT_LEAD_CHANNEL, .width = 2, .floe_size = 0.7, .n = 2, .path = path, .period_x = 40, .round_x = 40, .y0 = -10};
+        const bt_lead l = {.mode = managed ? BT_LEAD_MANAGED : BT_LEAD_CHANNEL,
+                           .width = 2,
+                           .floe_size = 0.7,
+                           .n = 2,
+                           .path = path,
+                           .period_x = 40,
+                           .round_x = 40,
+                           .y0 = -10};
         bt_field f;
         make_field(&f, BT_BOUND_PERIODIC);
         bt_lead_stats s;

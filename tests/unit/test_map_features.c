@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// GeoJSON feature by feature: against the tree of the whole text, for sound files, and for each of them damaged in many places.
+// GeoJSON feature by feature: against the tree of the whole text, for sound files, and for each of them damaged in many
+// places.
 #include "scene.h"
 
 #include <stdio.h>
@@ -10,19 +11,31 @@
 
 static const char *const texts[] = {
     "{\"type\": \"FeatureCollection\", \"crs\": {\"features\": [1, 2]}, \"features\": [\n"
-    " {\"type\": \"Feature\", \"id\": 7, \"properties\": {\"thickness\": 1.2}, \"geometry\": {\"type\": \"Polygon\", \"coordinates\": [[[0, 0], [1.5e1, 0], [1, -2.25]]]}},\n"
-    " {\"type\": \"Feature\", \"properties\": null, \"geometry\": {\"coordinates\": [ [ [0.1 , 0.2,3] ,[ 1E-3,-0 ],[-0.0,1] ] ] , \"type\": \"Polygon\"}},\n"
-    " {\"geometry\": {\"type\": \"MultiPolygon\", \"coordinates\": [[[[1, 2], [3, 4], [5, 6]]]]}}\n], \"bergtow\": {\"origin\": [1, 2]}}\n",
-    "{\"features\":[{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[0,0],[1,0],[1,1]],[[0,0],[1,0],[1,1]]]}},5,null,\"a,]}[{\\\"\\\\\",[],{},[[[1,2]]],"
-    "{\"geometry\":{\"type\":\"MultiPolygon\",\"coordinates\":[[[1,2],[3,4]]]}},{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":null}},"
-    "{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[1,2],[3]]]}},{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[123456789012345678,2],[3,4]]]}},"
+    " {\"type\": \"Feature\", \"id\": 7, \"properties\": {\"thickness\": 1.2}, \"geometry\": {\"type\": \"Polygon\", "
+    "\"coordinates\": [[[0, 0], [1.5e1, 0], [1, -2.25]]]}},\n"
+    " {\"type\": \"Feature\", \"properties\": null, \"geometry\": {\"coordinates\": [ [ [0.1 , 0.2,3] ,[ 1E-3,-0 "
+    "],[-0.0,1] ] ] , \"type\": \"Polygon\"}},\n"
+    " {\"geometry\": {\"type\": \"MultiPolygon\", \"coordinates\": [[[[1, 2], [3, 4], [5, 6]]]]}}\n], \"bergtow\": "
+    "{\"origin\": [1, 2]}}\n",
+    "{\"features\":[{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[0,0],[1,0],[1,1]],[[0,0],[1,0],[1,1]]]}},5,"
+    "null,\"a,]}[{\\\"\\\\\",[],{},[[[1,2]]],"
+    "{\"geometry\":{\"type\":\"MultiPolygon\",\"coordinates\":[[[1,2],[3,4]]]}},{\"geometry\":{\"type\":\"Polygon\","
+    "\"coordinates\":null}},"
+    "{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[1,2],[3]]]}},{\"geometry\":{\"type\":\"Polygon\","
+    "\"coordinates\":[[[123456789012345678,2],[3,4]]]}},"
     "{\"geometry\":null,\"properties\":{\"geometry\":{\"type\":\"Polygon\",\"coordinates\":[[[1,2]]]}}}]}",
     "{\"\\u0066eatures\": [{\"geometry\": {\"type\": \"Polygon\", \"coordinates\": [[[1, 2], [3, 4]]]}}]}",
-    "{\"features\": []}", "{\"features\": {\"a\": [1]}}", "{}", "[1, 2]",
+    "{\"features\": []}",
+    "{\"features\": {\"a\": [1]}}",
+    "{}",
+    "[1, 2]",
 };
 enum { N_TEXTS = sizeof texts / sizeof *texts };
 
-static json_t *coordinates_of(const json_t *feature) { return json_object_get(json_object_get(feature, "geometry"), "coordinates"); }
+static json_t *coordinates_of(const json_t *feature)
+{
+    return json_object_get(json_object_get(feature, "geometry"), "coordinates");
+}
 
 /// The same values; a ring that was read apart stands in the tree as null.
 static void check_feature(bt_features *f, size_t i, const json_t *whole)
@@ -41,7 +54,8 @@ static void check_feature(bt_features *f, size_t i, const json_t *whole)
     json_object_set_new(json_object_get(copy, "geometry"), "coordinates", json_null());
     assert_true(json_equal((json_t *)found, copy));
     json_decref(copy);
-    const bool multi = !strcmp(json_string_value(json_object_get(json_object_get(whole, "geometry"), "type")), "MultiPolygon");
+    const bool multi =
+        !strcmp(json_string_value(json_object_get(json_object_get(whole, "geometry"), "type")), "MultiPolygon");
     assert_int_equal(json_array_size(polygon), 1);
     const json_t *list = json_array_get(polygon, 0);
     if (multi) {
@@ -122,14 +136,28 @@ static void as_the_tree_of_the_whole(void **state)
     unlink(path);
 }
 
-// Red: the rest of the quotient left out (numbers just beyond the middle of two doubles go the wrong way), or its least number of bits.
+// Red: the rest of the quotient left out (numbers just beyond the middle of two doubles go the wrong way), or its least
+// number of bits.
 static void numbers_are_rounded_as_strtod_does(void **state)
 {
     (void)state;
     char path[] = "/tmp/bergtow_features_XXXXXX";
     close(mkstemp(path));
-    static const char *const hard[] = {"9007199254740993.0", "9007199254740992.9999", "4503599627370497.5", "0.1", "0.30000000000000004", "1e308", "4.9e-324", "123456789.000000000000000000000000000001",
-                                       "1234567890123456789.0", "12345678901234567890.5", "999999999999999", "0.0000000000000000000000000012", "0.000123", "0.00000000000000001", "5.0000000000000002220446049250313080847263336181640625"};
+    static const char *const hard[] = {"9007199254740993.0",
+                                       "9007199254740992.9999",
+                                       "4503599627370497.5",
+                                       "0.1",
+                                       "0.30000000000000004",
+                                       "1e308",
+                                       "4.9e-324",
+                                       "123456789.000000000000000000000000000001",
+                                       "1234567890123456789.0",
+                                       "12345678901234567890.5",
+                                       "999999999999999",
+                                       "0.0000000000000000000000000012",
+                                       "0.000123",
+                                       "0.00000000000000001",
+                                       "5.0000000000000002220446049250313080847263336181640625"};
     uint64_t rng = 3;
     enum { N = 19000 };
     char *text = bt_alloc(64 * N + 4096, 1), *p = text;
@@ -137,7 +165,8 @@ static void numbers_are_rounded_as_strtod_does(void **state)
     const char *first = p;
     for (size_t k = 0; k < sizeof hard / sizeof *hard; k++) p += sprintf(p, "[%s,-%s],", hard[k], hard[k]);
     for (int k = 0; k < N / 4; k++) { // as programs write them; and the middle of two doubles, which 19 digits hold
-        const double x = (scene_uniform(&rng) - 0.5) * pow(10, 8 * scene_uniform(&rng)), odd = floor(0x1p52 * (1 + scene_uniform(&rng)));
+        const double x = (scene_uniform(&rng) - 0.5) * pow(10, 8 * scene_uniform(&rng)),
+                     odd = floor(0x1p52 * (1 + scene_uniform(&rng)));
         p += sprintf(p, "[%.17g,%.9f],[%.1f,%.0f.5]%s", x, x, odd, odd, k + 1 < N / 4 ? "," : "");
     }
     assert_true(p - first < 64 * N);
@@ -166,6 +195,7 @@ static void numbers_are_rounded_as_strtod_does(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(as_the_tree_of_the_whole), cmocka_unit_test(numbers_are_rounded_as_strtod_does)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(as_the_tree_of_the_whole),
+                                       cmocka_unit_test(numbers_are_rounded_as_strtod_does)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

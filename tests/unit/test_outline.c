@@ -32,7 +32,8 @@ static bool inside(int n, const double *v, double x, double y)
 static void cleaning_keeps_the_corners(void **state)
 {
     (void)state;
-    // A square with double corners, points in the middle of sides, two in a row, and one that begins in the middle of a side.
+    // A square with double corners, points in the middle of sides, two in a row, and one that begins in the middle of a
+    // side.
     double v[] = {0.5, 0, 1, 0, 1, 0, 1, 0.2, 1, 0.2, 1, 0.9, 1, 1, 0, 1, 0, 1, 0, 0.3, 0, 0};
     assert_int_equal(bt_outline_clean(11, v), 4);
     CHECK_CLOSE(bt_outline_area2(4, v), 2, 1e-15);
@@ -82,13 +83,15 @@ static void moments_of_what_is_not_convex(void **state)
     CHECK_CLOSE(m.cy, 5.0 / 6, 1e-14);
     double polar = 0, cubic = 0;
     const double at[3][2] = {{0.5, 0.5}, {1.5, 0.5}, {0.5, 1.5}};
-    for (int k = 0; k < 3; k++) polar += 1.0 / 6 + (at[k][0] - 5.0 / 6) * (at[k][0] - 5.0 / 6) + (at[k][1] - 5.0 / 6) * (at[k][1] - 5.0 / 6);
+    for (int k = 0; k < 3; k++)
+        polar += 1.0 / 6 + (at[k][0] - 5.0 / 6) * (at[k][0] - 5.0 / 6) + (at[k][1] - 5.0 / 6) * (at[k][1] - 5.0 / 6);
     CHECK_CLOSE(m.polar, polar, 1e-14);
     enum { N = 400 }; // ∫ r³ by the midpoint rule
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < N; i++)
             for (int j = 0; j < N; j++) {
-                const double r = hypot(at[k][0] - 0.5 + (i + 0.5) / N - 5.0 / 6, at[k][1] - 0.5 + (j + 0.5) / N - 5.0 / 6);
+                const double r =
+                    hypot(at[k][0] - 0.5 + (i + 0.5) / N - 5.0 / 6, at[k][1] - 0.5 + (j + 0.5) / N - 5.0 / 6);
                 cubic += r * r * r / N / N;
             }
     CHECK_CLOSE(m.cubic, cubic, 1e-5);
@@ -168,11 +171,13 @@ static void projection_of_known_lengths(void **state)
     CHECK_CLOSE(east, 38187, 5);
 }
 
-/// There and back, at every latitude, across 180° and at the poles themselves; the way out is checked against geodesics elsewhere.
+/// There and back, at every latitude, across 180° and at the poles themselves; the way out is checked against geodesics
+/// elsewhere.
 static void the_inverse_of_the_projection(void **state)
 {
     (void)state;
-    const double d = BT_PI / 180, latitude[] = {-90, -89.99, -60, 0, 45, 76.5, 89.9, 90}, longitude[] = {-180, -90, 0, 20, 179.99}, far[] = {0, 1e-3, 30, 5e3, 100e3};
+    const double d = BT_PI / 180, latitude[] = {-90, -89.99, -60, 0, 45, 76.5, 89.9, 90},
+                 longitude[] = {-180, -90, 0, 20, 179.99}, far[] = {0, 1e-3, 30, 5e3, 100e3};
     for (int i = 0; i < 8; i++)
         for (int j = 0; j < 5; j++)
             for (int k = 0; k < 5; k++)
@@ -182,7 +187,9 @@ static void the_inverse_of_the_projection(void **state)
                     bt_outline_unproject(n, e, longitude[j] * d, latitude[i] * d, &lon, &lat);
                     bt_outline_project(lon, lat, longitude[j] * d, latitude[i] * d, &north, &east);
                     assert_true(fabs(lon) <= BT_PI && fabs(lat) <= BT_PI / 2);
-                    if (!(hypot(north - n, east - e) <= 3e-9 + 2e-14 * far[k])) fail_msg("%g, %g from %g, %g: back to %g, %g", n, e, longitude[j], latitude[i], north - n, east - e);
+                    if (!(hypot(north - n, east - e) <= 3e-9 + 2e-14 * far[k]))
+                        fail_msg("%g, %g from %g, %g: back to %g, %g", n, e, longitude[j], latitude[i], north - n,
+                                 east - e);
                 }
 }
 
@@ -190,8 +197,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_inverse_of_the_projection),
-        cmocka_unit_test(cleaning_keeps_the_corners), cmocka_unit_test(faults), cmocka_unit_test(moments_of_what_is_not_convex),
-        cmocka_unit_test(parts_fill_the_outline_once), cmocka_unit_test(projection_of_known_lengths),
+        cmocka_unit_test(cleaning_keeps_the_corners),
+        cmocka_unit_test(faults),
+        cmocka_unit_test(moments_of_what_is_not_convex),
+        cmocka_unit_test(parts_fill_the_outline_once),
+        cmocka_unit_test(projection_of_known_lengths),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// When the packed ice reaches the wall ahead: the balance of area by hand, every way the tow can go, and where nothing is said.
+// When the packed ice reaches the wall ahead: the balance of area by hand, every way the tow can go, and where nothing
+// is said.
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

@@ -17,7 +17,8 @@ static double length_of(const bt_path *p, double way, double step)
     return sum;
 }
 
-/// Legs, arcs and marks of a right turn, a left turn and a straight end; the tangent is continuous where corners are round.
+/// Legs, arcs and marks of a right turn, a left turn and a straight end; the tangent is continuous where corners are
+/// round.
 static void paths_have_the_lengths_of_their_legs_and_arcs(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A pass over the tiles: what each body meets, that tiles done at once share no body, and who does what.
+// A pass over the cells: what each body meets, that cells done at once share no body, and who does what.
 #include <omp.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -9,15 +9,15 @@
 
 /// What a pass has done so far.
 typedef struct {
-    atomic_int *holder; ///< [n bodies] 1 + tile that works on it, 0 = none
+    atomic_int *holder; ///< [n bodies] 1 + cell that works on it, 0 = none
     int *stamp;         ///< [n bodies] the latest phase that it met
-    atomic_int *visits; ///< [n tiles]
+    atomic_int *visits; ///< [n cells]
     atomic_int shared, early;
 } log_of_pass;
 
 typedef struct {
     log_of_pass *log;
-    int held_up; ///< this thread takes long over each tile; −1 = none, −2 = any over some tiles
+    int held_up; ///< this thread takes long over each cell; −1 = none, −2 = any over some cells
 } visitor;
 
 static void take_long(double seconds)
@@ -32,13 +32,13 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const visitor *v = context;
     log_of_pass *log = v->log;
-    const bt_tile *tile = &w->tiles->tile[k];
-    const int now = tile->phase;
+    const bt_cell *cell = &w->cells->cell[k];
+    const int now = cell->phase;
     atomic_fetch_add(&log->visits[k], 1);
     if (v->held_up == omp_get_thread_num()) take_long(20e-6);
     if (v->held_up == -2 && k * 7 % 101 == 0) take_long(200e-6);
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        const bt_idx ends[2] = {tile->units[j].a, tile->units[j].b};
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        const bt_idx ends[2] = {cell->contacts[j].a, cell->contacts[j].b};
         for (int e = 0; e < 2; e++) {
             if (!movable(w, ends[e])) continue;
             const int before = atomic_exchange(&log->holder[ends[e]], k + 1);
@@ -47,26 +47,28 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
             log->stamp[ends[e]] = now;
         }
     }
-    for (bt_idx j = 0; j < tile->n_units; j++) {
-        atomic_store(&log->holder[tile->units[j].a], 0);
-        atomic_store(&log->holder[tile->units[j].b], 0);
+    for (bt_idx j = 0; j < cell->n_contacts; j++) {
+        atomic_store(&log->holder[cell->contacts[j].a], 0);
+        atomic_store(&log->holder[cell->contacts[j].b], 0);
     }
-    bt_sum_add(&t->sum[0], tile->n_units);
+    bt_sum_add(&t->sum[0], cell->n_contacts);
     t->most = bt_max(t->most, 1);
 }
 
 /// One pass; a thread may be held up (visitor).
 static void assert_sound(bt_world *w, int held_up)
 {
-    const size_t bodies = (size_t)w->bodies.n, tiles = (size_t)w->tiles->n;
-    log_of_pass log = {.holder = bt_alloc(bodies, sizeof *log.holder), .stamp = bt_alloc(bodies, sizeof *log.stamp), .visits = bt_alloc(tiles, sizeof *log.visits)};
+    const size_t bodies = (size_t)w->bodies.n, cells = (size_t)w->cells->n;
+    log_of_pass log = {.holder = bt_alloc(bodies, sizeof *log.holder),
+                       .stamp = bt_alloc(bodies, sizeof *log.stamp),
+                       .visits = bt_alloc(cells, sizeof *log.visits)};
     bt_totals t = {.n_sums = 1};
     bt_phases_run(w, visit, &(visitor){&log, held_up}, NULL, &t);
     assert_int_equal(log.shared, 0);
     assert_int_equal(log.early, 0);
-    CHECK_CLOSE(bt_sum_value(&t.sum[0]), w->tiles->n_units, 0);
+    CHECK_CLOSE(bt_sum_value(&t.sum[0]), w->cells->n_contacts, 0);
     CHECK_CLOSE(t.most, 1, 0);
-    for (size_t k = 0; k < tiles; k++) assert_int_equal(log.visits[k], w->tiles->tile[k].n_units > 0);
+    for (size_t k = 0; k < cells; k++) assert_int_equal(log.visits[k], w->cells->cell[k].n_contacts > 0);
     free(log.holder);
     free(log.stamp);
     free(log.visits);
@@ -78,11 +80,11 @@ typedef struct {
     double at_x, at_y; ///< of a large movable body, as shares; negative = none
 } scene;
 
-/// 6,000 floes or more thrown into some thousand tiles, over each other: only the order is asked for.
+/// 6,000 floes or more thrown into some thousand cells, over each other: only the order is asked for.
 static bt_world *fill(const scene *s, uint64_t *rng)
 {
     bt_params p = scene_params(0.1, 1);
-    p.tile = 2;
+    p.cell = 2;
     p.period_x = s->round_x ? s->length : 0;
     p.period_y = s->round_y ? s->width : 0;
     bt_world *w = bt_world_create(&p);
@@ -104,12 +106,13 @@ static bt_world *fill(const scene *s, uint64_t *rng)
 }
 
 static const scene scenes[] = {
-    {90, 90, false, false, -1, 0}, {300, 30, false, false, -1, 0}, {90, 90, true, true, -1, 0},    {30, 480, false, true, -1, 0},
-    {90, 90, false, false, 0.4, 0.6}, {30, 480, false, true, 0.5, 0.999}, {480, 30, true, false, 0.001, 0.5}, {12, 1200, false, true, 0.5, 0.26},
+    {90, 90, false, false, -1, 0},      {300, 30, false, false, -1, 0},     {90, 90, true, true, -1, 0},
+    {30, 480, false, true, -1, 0},      {90, 90, false, false, 0.4, 0.6},   {30, 480, false, true, 0.5, 0.999},
+    {480, 30, true, false, 0.001, 0.5}, {12, 1200, false, true, 0.5, 0.26},
 };
 enum { N_SCENES = sizeof scenes / sizeof *scenes };
 
-static void every_body_meets_its_tiles_in_order(void **state)
+static void every_body_meets_its_cells_in_order(void **state)
 {
     (void)state;
     uint64_t rng = 11;
@@ -117,9 +120,9 @@ static void every_body_meets_its_tiles_in_order(void **state)
         for (int threads = 1; threads <= 4; threads++) {
             omp_set_num_threads(threads);
             bt_world *w = fill(&scenes[f], &rng);
-            const bt_tiles *t = w->tiles;
+            const bt_cells *t = w->cells;
             assert_int_equal(t->n_shares, threads);
-            assert_int_equal(scenes[f].at_x >= 0, t->tile[t->n - 1].n_units > 0);
+            assert_int_equal(scenes[f].at_x >= 0, t->cell[t->n - 1].n_contacts > 0);
             assert_sound(w, -1);
             assert_sound(w, -2);
             assert_sound(w, f % threads);
@@ -127,7 +130,7 @@ static void every_body_meets_its_tiles_in_order(void **state)
         }
 }
 
-/// Lists of all lengths: the shares are of listed units, and hold every tile once.
+/// Lists of all lengths: the shares are of listed contacts, and hold every cell once.
 static void shares_follow_the_lists(void **state)
 {
     (void)state;
@@ -135,8 +138,9 @@ static void shares_follow_the_lists(void **state)
     for (int threads = 1; threads <= 3; threads++) {
         omp_set_num_threads(threads);
         bt_world *w = fill(&(scene){90, 90, false, false, -1, 0}, &rng);
-        bt_tiles *t = w->tiles;
-        for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].n_list = i % 7 == 0 ? 0 : t->tile[t->order[i]].n_units;
+        bt_cells *t = w->cells;
+        for (bt_idx i = 0; i < t->n_order; i++)
+            t->cell[t->order[i]].n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
         bt_phases_deal(w);
         assert_int_equal(t->n_shares, threads);
         for (int p = 0; p < BT_COLOURS; p++) {
@@ -146,18 +150,18 @@ static void shares_follow_the_lists(void **state)
                 const bt_share *share = &t->share[(2 * p + 1) * threads + s];
                 assert_int_equal(share->begin, at);
                 at = share->end;
-                int64_t units = 0;
+                int64_t contacts = 0;
                 for (bt_idx i = share->begin; i < share->end; i++) {
-                    units += t->tile[t->order[i]].n_list;
-                    largest = t->tile[t->order[i]].n_list > largest ? t->tile[t->order[i]].n_list : largest;
+                    contacts += t->cell[t->order[i]].n_list;
+                    largest = t->cell[t->order[i]].n_list > largest ? t->cell[t->order[i]].n_list : largest;
                 }
-                least = units < least ? units : least, most = units > most ? units : most;
+                least = contacts < least ? contacts : least, most = contacts > most ? contacts : most;
             }
             assert_int_equal(at, t->start[p + 1]);
             assert_true((double)(most - least) <= 2 * (double)largest + 0.05 * (double)most);
         }
         assert_sound(w, -1);
-        for (bt_idx i = 0; i < t->n_order; i++) t->tile[t->order[i]].n_list = 0;
+        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].n_list = 0;
         bt_phases_deal(w);
         assert_sound(w, -1);
         bt_world_free(w);
@@ -171,7 +175,7 @@ static void a_small_team_does_all(void **state)
     uint64_t rng = 8;
     omp_set_num_threads(4);
     bt_world *w = fill(&(scene){30, 480, false, true, 0.5, 0.3}, &rng);
-    assert_int_equal(w->tiles->n_shares, 4);
+    assert_int_equal(w->cells->n_shares, 4);
     omp_set_max_active_levels(1);
 #pragma omp parallel num_threads(2)
 #pragma omp single
@@ -185,7 +189,7 @@ static void a_small_team_does_all(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_body_meets_its_tiles_in_order),
+        cmocka_unit_test(every_body_meets_its_cells_in_order),
         cmocka_unit_test(shares_follow_the_lists),
         cmocka_unit_test(a_small_team_does_all),
     };

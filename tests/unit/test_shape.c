@@ -15,7 +15,8 @@
 static void assert_near(double got, double want, double rel)
 {
     double scale = fabs(want) > 1e-300 ? fabs(want) : 1;
-    if (!(fabs(got - want) <= rel * scale)) fail_msg("got %.17g, want %.17g (relative %g)", got, want, (got - want) / scale);
+    if (!(fabs(got - want) <= rel * scale))
+        fail_msg("got %.17g, want %.17g (relative %g)", got, want, (got - want) / scale);
 }
 
 static void test_rectangle(void **state)

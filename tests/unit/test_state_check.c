@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// What a checkpoint holds under a sound seal, and no run leaves, is refused with one message that names the array; so is a file of another make.
+// What a checkpoint holds under a sound checksum, and no run leaves, is refused with one message that names the array;
+// so is a file of another make.
 //
-// Each row of the table changes one number of a real state. What turns this red (tried): leaving out the check of the tiles' box, of the order of contacts,
-// of the width of a row in result.h5, of the space that a dataset takes in the file.
+// Each row of the table changes one number of a real state. What turns this red (tried): leaving out the check of the
+// cells' box, of the order of contacts, of the width of a row in result.h5, of the space that a dataset takes in the
+// file.
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,11 +23,11 @@
 #include "loads/impact.h"
 #include "bergtow/run.h"
 #include "bergtow/setup.h"
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "step/window.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/seal.h"
+#include "base/checksum.h"
 #include "base/snapshot.h"
 #include "output/state.h"
 
@@ -150,7 +152,7 @@ static int make_states(void **state)
         must(bt_field_load(c, &f, &err), &err);
         must(bt_lead_open(c, &f, &lead, &err), &err);
         must(bt_setup_world(c, &f, &w, &roster, &err), &err);
-        bt_tiles_begin(w);
+        bt_cells_begin(w);
         for (int n = 0; n < 40; n++) bt_world_step(w);
         if (k == 0) bt_events_add(&w->events, 1, BT_EVENT_WAYPOINT, 1, 2); // one to change
         must(bt_state_save(w, &bt_comm_alone, &kept[k].state, &err), &err);
@@ -213,13 +215,15 @@ static void nonsense_is_refused_by_name(void **state)
             must(take_up(&kept[from].c, &s, &err), &err);
         } else {
             const bt_item *i = bt_snapshot_find(&s, change->name);
-            if (!i || i->n * i->width <= change->at) fail_msg("%s: has no number %d to change", change->name, (int)change->at);
+            if (!i || i->n * i->width <= change->at)
+                fail_msg("%s: has no number %d to change", change->name, (int)change->at);
             set_number(i, change->at == LAST ? i->n * i->width - 1 : change->at, change->value);
             char wanted[80];
             snprintf(wanted, sizeof wanted, "/%s", change->told ? change->told : change->name);
             const bt_status status = take_up(&kept[from].c, &s, &err);
             if (status != BT_ERR_CASE || err.n != 1 || !strstr(err.text[0], wanted))
-                fail_msg("%s [%d] = %g: status %d, %zu messages: %s", change->name, (int)change->at, change->value, (int)status, err.n, err.n ? err.text[0] : "");
+                fail_msg("%s [%d] = %g: status %d, %zu messages: %s", change->name, (int)change->at, change->value,
+                         (int)status, err.n, err.n ? err.text[0] : "");
         }
         bt_errors_free(&err);
         bt_snapshot_free(&s);
@@ -235,7 +239,8 @@ static void contacts_out_of_order_are_refused(void **state)
         const bt_item *i = &kept[0].state.item[j];
         bt_snapshot_add(&s, i->name, i->type, i->n, i->width, i->data);
         const size_t row = (size_t)i->width * bt_item_size(i->type);
-        if (!strncmp(i->name, "contacts/", 9)) memcpy((char *)s.item[j].data + row, i->data, row); // the first one twice
+        // the first one twice
+        if (!strncmp(i->name, "contacts/", 9)) memcpy((char *)s.item[j].data + row, i->data, row);
     }
     assert_int_equal(take_up(&kept[0].c, &s, &err), BT_ERR_CASE);
     assert_true(err.n == 1 && strstr(err.text[0], "out of order"));
@@ -253,7 +258,8 @@ static void add_text(hid_t file, const char *name, size_t size, const char *text
     H5Tset_size(type, size);
     if (size != H5T_VARIABLE) H5Tset_strpad(type, H5T_STR_NULLPAD);
     const hid_t d = H5Dcreate2(file, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    assert_true(H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, size == H5T_VARIABLE ? (const void *)&text : text) >= 0);
+    assert_true(H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, size == H5T_VARIABLE ? (const void *)&text : text) >=
+                0);
     H5Dclose(d);
     H5Sclose(space);
     H5Tclose(type);
@@ -261,7 +267,8 @@ static void add_text(hid_t file, const char *name, size_t size, const char *text
 
 static void add_numbers(hid_t file, const char *name, int rank, const hsize_t *size)
 {
-    const hid_t space = H5Screate_simple(rank, size, NULL), d = H5Dcreate2(file, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    const hid_t space = H5Screate_simple(rank, size, NULL),
+                d = H5Dcreate2(file, name, H5T_NATIVE_DOUBLE, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
     assert_true(d >= 0);
     H5Dclose(d); // nothing is written: the file has no room for them
     H5Sclose(space);
@@ -271,7 +278,7 @@ static void write_make(const char *path, int make)
 {
     bt_errors err = {0};
     const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-    H5Pset_userblock(creation, BT_SEAL_BYTES);
+    H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
     const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
     assert_true(file >= 0);
     H5Gclose(H5Gcreate2(file, "/a", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
@@ -285,7 +292,7 @@ static void write_make(const char *path, int make)
     }
     H5Fclose(file);
     H5Pclose(creation);
-    must(bt_seal_write(path, BT_SEAL_CHECKPOINT, &err), &err);
+    must(bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, &err), &err);
 }
 
 static void files_of_another_make_are_refused(void **state)
@@ -316,7 +323,8 @@ static void a_checkpoint_without_a_case_is_refused(void **state)
     const double revision[] = {1e300, 1e300}; // a number where a text is expected
     bt_snapshot_add(&s, "about/revision", BT_ITEM_F64, 2, 1, revision);
     for (int k = 0; k < 2; k++) {
-        const bt_run_options o = {.dir = folder, .from = in_folder("empty/checkpoint.h5"), .threads = 1, .quiet = true, .dump_step = -1};
+        const bt_run_options o = {
+            .dir = folder, .from = in_folder("empty/checkpoint.h5"), .threads = 1, .quiet = true, .dump_step = -1};
         assert_int_equal(bt_run_resume(&bt_comm_alone, &o, &err), BT_ERR_CASE);
         assert_true(err.n == 1 && strstr(err.text[0], "is missing"));
         bt_errors_free(&err);
@@ -330,23 +338,26 @@ static void rows_of_another_width_are_refused(void **state)
 {
     (void)state;
     const char *path = in_folder("rows.h5");
-    static const struct { int64_t first, n, width; bool good; } reads[] = {
-        {1, 2, 20, true}, {0, 3, 20, true}, {0, 3, 12, false}, {0, 1, 60, false}, {0, 1, 1, false}, {0, 1, 0, false}, {2, 2, 20, false}, {-1, 1, 20, false}, {3, INT64_MAX, 20, false}, {0, -1, 20, false},
+    static const struct { int64_t first, n, width; bool good;
+    } reads[] = {
+        {1, 2, 20, true}, {0, 3, 20, true},  {0, 3, 12, false},  {0, 1, 60, false},         {0, 1, 1, false},
+        {0, 1, 0, false}, {2, 2, 20, false}, {-1, 1, 20, false}, {3, INT64_MAX, 20, false}, {0, -1, 20, false},
     };
     double *x = calloc(60, sizeof *x);
     for (size_t k = 0; k < sizeof reads / sizeof *reads; k++) {
         bt_errors err = {0};
         const hid_t creation = H5Pcreate(H5P_FILE_CREATE);
-        H5Pset_userblock(creation, BT_SEAL_BYTES);
+        H5Pset_userblock(creation, BT_CHECKSUM_BYTES);
         const hid_t file = H5Fcreate(path, H5F_ACC_TRUNC, creation, H5P_DEFAULT);
         add_numbers(file, "/x", 3, (hsize_t[]){3, 4, 5});
         H5Fclose(file);
         H5Pclose(creation);
-        must(bt_seal_write(path, BT_SEAL_RESULT, &err), &err);
+        must(bt_checksum_write(path, BT_CHECKSUM_RESULT, &err), &err);
         bt_h5_reader r;
-        must(bt_h5_open(&r, path, BT_SEAL_RESULT, &err), &err);
+        must(bt_h5_open(&r, path, BT_CHECKSUM_RESULT, &err), &err);
         bt_h5_read(&r, "/x", H5T_NATIVE_DOUBLE, reads[k].first, reads[k].n, reads[k].width, x);
-        if ((bt_h5_end(&r) == BT_OK) != reads[k].good || (err.n == 0) != reads[k].good) fail_msg("read %zu is %s", k, reads[k].good ? "refused" : "accepted");
+        if ((bt_h5_end(&r) == BT_OK) != reads[k].good || (err.n == 0) != reads[k].good)
+            fail_msg("read %zu is %s", k, reads[k].good ? "refused" : "accepted");
         bt_errors_free(&err);
     }
     free(x);

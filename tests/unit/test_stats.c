@@ -50,14 +50,17 @@ static void check_coverage(double phi, int n)
         tau_sum += m.tau / SERIES;
         var_sum += m.se * m.se / SERIES;
         sd_sum += m.sd / SERIES;
-        assert_true(fabs(m.high - m.mean - 3.182 * m.se) <= 1e-9 * m.se && fabs(m.mean - m.low - 3.182 * m.se) <= 1e-9 * m.se);
+        assert_true(fabs(m.high - m.mean - 3.182 * m.se) <= 1e-9 * m.se &&
+                    fabs(m.mean - m.low - 3.182 * m.se) <= 1e-9 * m.se);
         assert_true(fabs(m.n_eff - n / (2 * m.tau)) <= 1e-9 * n);
     }
     free(x);
     const double covered = 100.0 * inside / SERIES, true_var = 4 * 2 * tau / n;
-    print_message("phi %.2f n %d: coverage %.1f %%, variance %.3f of the true one, tau %.3f of %.3f\n", phi, n, covered, var_sum / true_var, tau_sum, tau);
+    print_message("phi %.2f n %d: coverage %.1f %%, variance %.3f of the true one, tau %.3f of %.3f\n", phi, n, covered,
+                  var_sum / true_var, tau_sum, tau);
     assert_true(covered >= 93.5 && covered <= 97.5);
-    assert_true(var_sum / true_var > 1 && var_sum / true_var < 1.5); // the larger of two estimates, each right in the mean
+    // the larger of two estimates, each right in the mean
+    assert_true(var_sum / true_var > 1 && var_sum / true_var < 1.5);
     assert_true(fabs(tau_sum / tau - 1) < 0.15); // short series of batches see a little of the correlation as noise
     assert_true(fabs(sd_sum / 2 - 1) < 0.05);
 }
@@ -71,8 +74,8 @@ static void the_interval_of_correlated_series_covers(void **s)
     check_coverage(0.99, 20000);
 }
 
-/// Noise whose slow part is taken back later, as ice that one jam has used up is missing in the next: x_i = e_i − θ e_{i−LAG}. Its mean
-/// has the variance (1 − θ)² / n, while the autocorrelation is zero up to LAG.
+/// Noise whose slow part is taken back later, as ice that one jam has used up is missing in the next: x_i = e_i − θ
+/// e_{i−LAG}. Its mean has the variance (1 − θ)² / n, while the autocorrelation is zero up to LAG.
 static void what_is_taken_back_later_is_seen(void **state)
 {
     (void)state;
@@ -89,14 +92,16 @@ static void what_is_taken_back_later_is_seen(void **state)
         var += m.se * m.se * N / SERIES;
         inside += m.low <= 0 && 0 <= m.high;
     }
-    print_message("variance %.3f, true %.3f, of white noise of the same sd %.3f; coverage %.1f %%\n", var, 0.25, 1.25, 100.0 * inside / SERIES);
+    print_message("variance %.3f, true %.3f, of white noise of the same sd %.3f; coverage %.1f %%\n", var, 0.25, 1.25,
+                  100.0 * inside / SERIES);
     assert_true(var > 0.2 && var < 0.45); // the highest of the waves begins to see the noise
     assert_true(inside >= 0.93 * SERIES);
 }
 
 typedef enum { NOTHING, DRIFT, JUMP, START_UP } change;
 
-/// Share of series with a trend, in per cent. size: in standard errors of the mean, as the run itself would report it in the mean.
+/// Share of series with a trend, in per cent. size: in standard errors of the mean, as the run itself would report it
+/// in the mean.
 static double alarms(int n, double phi, change kind, double size)
 {
     enum { SERIES = 1000 };
@@ -118,23 +123,29 @@ static double alarms(int n, double phi, change kind, double size)
     return 100.0 * found / SERIES;
 }
 
-/// A drift of d parts the means of the halves by d/2, whose standard error is twice that of the mean: three of them are d = 12.
+/// A drift of d parts the means of the halves by d/2, whose standard error is twice that of the mean: three of them are
+/// d = 12.
 static void a_drift_is_told_from_noise(void **state)
 {
     (void)state;
-    static const struct { int n; double phi; } series[] = {{480, 0}, {2600, 0}, {480, 0.5}, {2600, 0.9}, {480, 0.8}, {2600, 0.95}};
+    static const struct {
+        int n;
+        double phi;
+    } series[] = {{480, 0}, {2600, 0}, {480, 0.5}, {2600, 0.9}, {480, 0.8}, {2600, 0.95}};
     double false_sum = 0, drift_sum = 0;
     enum { N = sizeof series / sizeof *series };
     for (int k = 0; k < N; k++) {
         const int n = series[k].n;
-        const double phi = series[k].phi, none = alarms(n, phi, NOTHING, 0), drift = alarms(n, phi, DRIFT, 12), jump = alarms(n, phi, JUMP, 10),
-                     start = alarms(n, phi, START_UP, 60);
-        print_message("n %d phi %.2f (%.0f independent): false %.1f %%, drift %.1f %%, jump %.1f %%, start-up %.1f %%\n", n, phi, n * (1 - phi) / (1 + phi), none,
-                      drift, jump, start);
+        const double phi = series[k].phi, none = alarms(n, phi, NOTHING, 0), drift = alarms(n, phi, DRIFT, 12),
+                     jump = alarms(n, phi, JUMP, 10), start = alarms(n, phi, START_UP, 60);
+        print_message(
+            "n %d phi %.2f (%.0f independent): false %.1f %%, drift %.1f %%, jump %.1f %%, start-up %.1f %%\n", n, phi,
+            n * (1 - phi) / (1 + phi), none, drift, jump, start);
         assert_true(none <= 7); // 5 % and three standard errors of 1,000 trials
         assert_true(drift >= 87.2);
         assert_true(jump >= 90);
-        assert_true(start >= 80); // it bends, and what the line leaves of it counts as noise; a window that is found begins after it
+        // it bends, and what the line leaves of it counts as noise; a window that is found begins after it
+        assert_true(start >= 80);
         false_sum += none / N;
         drift_sum += drift / N;
     }
@@ -238,12 +249,14 @@ static void the_transient_is_cut(void **s)
     assert_int_equal(bt_stats_steady_start(x, N, 1800), 1800);
 }
 
-/// A long series: the starts that are looked at lie apart so far that they are few, and the one that is found is the best of them.
+/// A long series: the starts that are looked at lie apart so far that they are few, and the one that is found is the
+/// best of them.
 static void starts_of_a_long_series_are_few(void **s)
 {
     (void)s;
     enum { MANY = 5 * BT_STATS_STARTS };
-    const int64_t n[] = {1, MANY, MANY + 1, 2 * MANY, 2 * MANY + 1, 1000 * (int64_t)MANY}, step[] = {5, 5, 10, 10, 20, 5120};
+    const int64_t n[] = {1, MANY, MANY + 1, 2 * MANY, 2 * MANY + 1, 1000 * (int64_t)MANY},
+                  step[] = {5, 5, 10, 10, 20, 5120};
     for (int k = 0; k < 6; k++) assert_int_equal(bt_stats_start_step(n[k]), step[k]);
     enum { N = 4 * MANY, FROM = 3 };
     double *x = malloc(N * sizeof *x);

@@ -39,8 +39,11 @@ static bool has(const bt_member *m, const char *set)
 static void grid_holds_every_combination_once(void **state)
 {
     (void)state;
-    bt_study s = read_text("base: a.yml\nset: {run.duration: 60 s}\nparameters:\n  ice.concentration: [0.2, 0.5, 80 %]\n  tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}\n"
-                           "variants:\n  squares: {ice.shape: rectangles, ice.aspect: 1}\n  hexagons: {ice.shape: polygons, ice.sides: 6}\nwith:\n  ice.concentration=0.5: {domain.width: 40 m}\nrepeats: 5\nseed: 7\n");
+    bt_study s =
+        read_text("base: a.yml\nset: {run.duration: 60 s}\nparameters:\n  ice.concentration: [0.2, 0.5, 80 %]\n  "
+                  "tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}\n"
+                  "variants:\n  squares: {ice.shape: rectangles, ice.aspect: 1}\n  hexagons: {ice.shape: polygons, "
+                  "ice.sides: 6}\nwith:\n  ice.concentration=0.5: {domain.width: 40 m}\nrepeats: 5\nseed: 7\n");
     assert_int_equal(s.n_conditions, 18);
     assert_int_equal(bt_study_n_members(&s), 90);
     int64_t *seeds = bt_alloc(90, sizeof *seeds);
@@ -58,11 +61,13 @@ static void grid_holds_every_combination_once(void **state)
         }
         assert_true(has(&m, "run.duration=60 s"));
         assert_true(has(&m, "domain.width=40 m") == has(&m, "ice.concentration=0.5"));
-        assert_true(has(&m, "ice.shape=rectangles") == !strcmp(m.value[2], "squares") && has(&m, "ice.sides=6") == !strcmp(m.value[2], "hexagons"));
+        assert_true(has(&m, "ice.shape=rectangles") == !strcmp(m.value[2], "squares") &&
+                    has(&m, "ice.sides=6") == !strcmp(m.value[2], "hexagons"));
         bt_member_free(&m);
     }
     bt_member m;
-    bt_study_member(&s, 5 * (2 * 6 + 1 * 2 + 1) + 3, &m); // third concentration, second speed, second variant, fourth field
+    // third concentration, second speed, second variant, fourth field
+    bt_study_member(&s, 5 * (2 * 6 + 1 * 2 + 1) + 3, &m);
     assert_string_equal(m.name, "c016-r004");
     assert_true(has(&m, "ice.concentration=80 %") && has(&m, "tow.speed=0.2") && has(&m, "ice.shape=polygons"));
     bt_member_free(&m);
@@ -79,7 +84,8 @@ static void grid_holds_every_combination_once(void **state)
 static void hypercube_has_one_sample_in_each_stratum(void **state)
 {
     (void)state;
-    bt_study s = read_text("base: a.yml\nsampling: latin-hypercube\nsamples: 50\nrepeats: 2\nparameters:\n  ice.thickness: {from: 1 m, to: 3 m}\n"
+    bt_study s = read_text("base: a.yml\nsampling: latin-hypercube\nsamples: 50\nrepeats: 2\nparameters:\n  "
+                           "ice.thickness: {from: 1 m, to: 3 m}\n"
                            "  ice.size: {from: 10 m, to: 1000 m, scale: log}\n  ice.shape: [voronoi, rectangles]\n");
     assert_int_equal(bt_study_n_members(&s), 100);
     int seen[2][50] = {{0}}, shapes[2] = {0};
@@ -133,7 +139,8 @@ static void common_fields_are_the_same_in_every_condition(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once), cmocka_unit_test(common_fields_are_the_same_in_every_condition),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(grid_holds_every_combination_once),
+                                       cmocka_unit_test(common_fields_are_the_same_in_every_condition),
                                        cmocka_unit_test(hypercube_has_one_sample_in_each_stratum)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

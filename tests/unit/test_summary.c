@@ -129,11 +129,16 @@ static void every_doubt_is_told(void **state)
     t.floes_outside = 2;
     t.stall = (bt_stall){.windows = 3, .time = 12};
     json = summary_of(&c, 600, &t, FLOES, everything_wrong);
-    static const char *const told[] = {"stopped early: SIGTERM", "200 of 600 steps met the sweep limit",
-                                       "120 of 600 steps the contacts added energy", "overlap by up to 0.1 m",
-                                       "momentum is conserved only to 0.001", "2 floes left",
-                                       "differs from tow - drag - Coriolis - tilt - inertia", "by the momentum of the ice",
-                                       "crushed to a depth of 0.9 m, 45 % of the mean floe size", "stood still for 12 s of 60 s"};
+    static const char *const told[] = {"stopped early: SIGTERM",
+                                       "200 of 600 steps met the sweep limit",
+                                       "120 of 600 steps the contacts added energy",
+                                       "overlap by up to 0.1 m",
+                                       "momentum is conserved only to 0.001",
+                                       "2 floes left",
+                                       "differs from tow - drag - Coriolis - tilt - inertia",
+                                       "by the momentum of the ice",
+                                       "crushed to a depth of 0.9 m, 45 % of the mean floe size",
+                                       "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++)
         if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
     assert_null(strstr(json, "independent samples of the"));
@@ -186,7 +191,10 @@ static void jerked_tow(bt_sample *s, int i)
     s->line_tension = s->line_tension_1 = 121 + 2000 * exp(-i / 60.0) + 10 * noise(i + 1000);
 }
 
-static void rising_ice(bt_sample *s, int i) { set_forces(s, 100 + 0.05 * i + 10 * noise(i), 121 + 0.05 * i + 10 * noise(i)); }
+static void rising_ice(bt_sample *s, int i)
+{
+    set_forces(s, 100 + 0.05 * i + 10 * noise(i), 121 + 0.05 * i + 10 * noise(i));
+}
 static void one_wild_step(bt_sample *s, int i) { sound_tow(s, i), s->residual = i == 500 ? 0.2 : s->residual; }
 static void few_unconverged(bt_sample *s, int i) { sound_tow(s, i), s->unconverged = i > 300 && i % 50 == 0; }
 
@@ -232,9 +240,13 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
     double programme[] = {0, 1, 40, 1, 50, 0.5};
     bt_event event[] = {{.time = 45, .kind = BT_EVENT_LINE_BROKEN, .subject = 1, .value = 7}};
     const bt_events events = {.event = event, .n = 1};
-    static const char *const told[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s", "a step in the window was left with a residual of 0.2 m/s",
-                                       "1.2 % of the steps in the window did not converge", "the speed programme goes from 1 to 0.5 m/s within the window",
-                                       "a line parted at 45 s", "stood still for 6 s of 60 s", "of the places ahead of the moving window stayed empty"};
+    static const char *const told[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s",
+                                       "a step in the window was left with a residual of 0.2 m/s",
+                                       "1.2 % of the steps in the window did not converge",
+                                       "the speed programme goes from 1 to 0.5 m/s within the window",
+                                       "a line parted at 45 s",
+                                       "stood still for 6 s of 60 s",
+                                       "of the places ahead of the moving window stayed empty"};
     for (size_t k = 0; k < sizeof told / sizeof *told; k++) {
         bt_case d = c;
         bt_run_totals t = totals(600);
@@ -246,7 +258,8 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
         if (k == 6) t.window = &window;
         char *json = summary_of(&d, 600, &t, FLOES, k == 1 ? one_wild_step : k == 2 ? few_unconverged : sound_tow);
         assert_string_equal(json_value(json, "verdict"), "\"not steady\"");
-        if (!strstr(json_value(json, "reason"), told[k])) fail_msg("wanted '%s', told %s", told[k], json_value(json, "reason"));
+        if (!strstr(json_value(json, "reason"), told[k]))
+            fail_msg("wanted '%s', told %s", told[k], json_value(json, "reason"));
         free(json);
     }
 }

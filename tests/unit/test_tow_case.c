@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The tow of a case: named lines, distances of a programme, start of the end, hull points, and the tow that is built from it.
+// The tow of a case: named lines, distances of a programme, start of the end, hull points, and the tow that is built
+// from it.
 #include "scene.h"
 
 #include <stdio.h>
@@ -28,7 +29,8 @@ static void finish(bt_case *c)
 static void named_lines(void **state)
 {
     (void)state;
-    const bt_rope wire = bt_rope_named(BT_ROPE_STEEL, 0.05), pp = bt_rope_named(BT_ROPE_POLYPROPYLENE, 0.1), hmpe = bt_rope_named(BT_ROPE_DYNEEMA, 0.06);
+    const bt_rope wire = bt_rope_named(BT_ROPE_STEEL, 0.05), pp = bt_rope_named(BT_ROPE_POLYPROPYLENE, 0.1),
+                  hmpe = bt_rope_named(BT_ROPE_DYNEEMA, 0.06);
     CHECK_CLOSE(wire.breaking, 1583.4e3, 0.1e3);
     CHECK_CLOSE(wire.stiffness, 101e6, 1);
     CHECK_CLOSE(wire.mass, 9.974, 0.001);
@@ -85,7 +87,8 @@ static void way_of_a_programme(void **state)
     bt_case_free(&c);
 }
 
-/// Bridle on a rectangle that stands askew: branches from its outermost corners, the end dead ahead, one just taut, none stretched.
+/// Bridle on a rectangle that stands askew: branches from its outermost corners, the end dead ahead, one just taut,
+/// none stretched.
 static void a_bridle_starts_taut(void **state)
 {
     (void)state;
@@ -99,17 +102,20 @@ static void a_bridle_starts_taut(void **state)
     c.tow.line.branches = 2;
     c.tow.branch2.length = 5.6;
     finish(&c);
-    // Of the corners (±2, ±1), turned by −0.1 against the tow: (2, 1) is outermost to +y? Largest of −x sin 0.1 + y cos 0.1: (−2, 1).
+    // Of the corners (±2, ±1), turned by −0.1 against the tow: (2, 1) is outermost to +y? Largest of −x sin 0.1 + y cos
+    // 0.1: (−2, 1).
     assert_true(c.tow.hull_x == -2 && c.tow.hull_y == 1 && c.tow.branch2.hull_x == 2 && c.tow.branch2.hull_y == -1);
     bt_tow *t = bt_setup_tow(&c);
     const double length[2] = {5, 5.6};
     double slack[2];
     for (int k = 0; k < 2; k++) {
-        const double x = c.body.x + cos(0.3) * t->branch[k].hull_x - sin(0.3) * t->branch[k].hull_y, y = c.body.y + sin(0.3) * t->branch[k].hull_x + cos(0.3) * t->branch[k].hull_y;
+        const double x = c.body.x + cos(0.3) * t->branch[k].hull_x - sin(0.3) * t->branch[k].hull_y,
+                     y = c.body.y + sin(0.3) * t->branch[k].hull_x + cos(0.3) * t->branch[k].hull_y;
         slack[k] = length[k] - hypot(t->carriage_x - x, t->carriage_y - y);
     }
     CHECK_CLOSE(bt_min(slack[0], slack[1]), 0, 1e-12);
-    const double dx = t->carriage_x - c.body.x, dy = t->carriage_y - c.body.y; // the points lie opposite: their middle is the centroid
+    // the points lie opposite: their middle is the centroid
+    const double dx = t->carriage_x - c.body.x, dy = t->carriage_y - c.body.y;
     CHECK_CLOSE(dx * sin(0.4) - dy * cos(0.4), 0, 1e-12);
     assert_true(dx * cos(0.4) + dy * sin(0.4) > 2);
     bt_tow_free(t);
@@ -139,7 +145,8 @@ static void the_first_waypoint_gives_the_course(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(named_lines), cmocka_unit_test(way_of_a_programme), cmocka_unit_test(a_bridle_starts_taut),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(named_lines), cmocka_unit_test(way_of_a_programme),
+                                       cmocka_unit_test(a_bridle_starts_taut),
                                        cmocka_unit_test(the_first_waypoint_gives_the_course)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

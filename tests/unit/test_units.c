@@ -21,14 +21,38 @@ static void reads_units_of_each_kind(void **state)
         bt_unit kind;
         double value;
     } good[] = {
-        {"30 m", BT_UNIT_LENGTH, 30}, {"30m", BT_UNIT_LENGTH, 30}, {"2.5 km", BT_UNIT_LENGTH, 2500}, {"30 mm", BT_UNIT_LENGTH, 0.03},
-        {"4 cm", BT_UNIT_LENGTH, 0.04}, {"1.5 kn", BT_UNIT_SPEED, 1.5 * 1852 / 3600}, {"36 km/h", BT_UNIT_SPEED, 10},
-        {"10 ms", BT_UNIT_TIME, 0.01}, {"2 h", BT_UNIT_TIME, 7200}, {"3 min", BT_UNIT_TIME, 180}, {"1 d", BT_UNIT_TIME, 86400},
-        {"180 deg", BT_UNIT_ANGLE, BT_PI}, {"180", BT_UNIT_ANGLE, BT_PI}, {"3 rad", BT_UNIT_ANGLE, 3}, {"90°", BT_UNIT_ANGLE, BT_PI / 2},
-        {"180", BT_UNIT_TURN, BT_PI}, {"1 rad/s", BT_UNIT_TURN, 1}, {"50 kN", BT_UNIT_FORCE, 5e4}, {"1 MN", BT_UNIT_FORCE, 1e6},
-        {"15.5 kt", BT_UNIT_MASS, 15.5e6}, {"2 t", BT_UNIT_MASS, 2000}, {"0.91 t/m3", BT_UNIT_DENSITY, 910}, {"910 kg/m^3", BT_UNIT_DENSITY, 910},
-        {"2 kN s/m", BT_UNIT_DAMPING, 2000}, {"20 kPa", BT_UNIT_PRESSURE, 2e4}, {"13 kN/m", BT_UNIT_LINE_LOAD, 13e3}, {"0.8 %", BT_UNIT_RATIO, 0.008}, {"80%", BT_UNIT_RATIO, 0.8},
-        {" 1e-3 ", BT_UNIT_RATIO, 1e-3}, {"+.5", BT_UNIT_NONE, 0.5}, {"5.", BT_UNIT_NONE, 5}, {"-1E2 m", BT_UNIT_LENGTH, -100},
+        {"30 m", BT_UNIT_LENGTH, 30},
+        {"30m", BT_UNIT_LENGTH, 30},
+        {"2.5 km", BT_UNIT_LENGTH, 2500},
+        {"30 mm", BT_UNIT_LENGTH, 0.03},
+        {"4 cm", BT_UNIT_LENGTH, 0.04},
+        {"1.5 kn", BT_UNIT_SPEED, 1.5 * 1852 / 3600},
+        {"36 km/h", BT_UNIT_SPEED, 10},
+        {"10 ms", BT_UNIT_TIME, 0.01},
+        {"2 h", BT_UNIT_TIME, 7200},
+        {"3 min", BT_UNIT_TIME, 180},
+        {"1 d", BT_UNIT_TIME, 86400},
+        {"180 deg", BT_UNIT_ANGLE, BT_PI},
+        {"180", BT_UNIT_ANGLE, BT_PI},
+        {"3 rad", BT_UNIT_ANGLE, 3},
+        {"90°", BT_UNIT_ANGLE, BT_PI / 2},
+        {"180", BT_UNIT_TURN, BT_PI},
+        {"1 rad/s", BT_UNIT_TURN, 1},
+        {"50 kN", BT_UNIT_FORCE, 5e4},
+        {"1 MN", BT_UNIT_FORCE, 1e6},
+        {"15.5 kt", BT_UNIT_MASS, 15.5e6},
+        {"2 t", BT_UNIT_MASS, 2000},
+        {"0.91 t/m3", BT_UNIT_DENSITY, 910},
+        {"910 kg/m^3", BT_UNIT_DENSITY, 910},
+        {"2 kN s/m", BT_UNIT_DAMPING, 2000},
+        {"20 kPa", BT_UNIT_PRESSURE, 2e4},
+        {"13 kN/m", BT_UNIT_LINE_LOAD, 13e3},
+        {"0.8 %", BT_UNIT_RATIO, 0.008},
+        {"80%", BT_UNIT_RATIO, 0.8},
+        {" 1e-3 ", BT_UNIT_RATIO, 1e-3},
+        {"+.5", BT_UNIT_NONE, 0.5},
+        {"5.", BT_UNIT_NONE, 5},
+        {"-1E2 m", BT_UNIT_LENGTH, -100},
         {"1e2m", BT_UNIT_LENGTH, 100},
     };
     for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
@@ -47,21 +71,39 @@ static void refuses_what_is_not_a_number_with_a_unit_of_the_kind(void **state)
         bt_unit kind;
         const char *fragment;
     } bad[] = {
-        {"0.8x", BT_UNIT_RATIO, "\"x\" is not a unit"}, {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force and this is a length"},
-        {"10 ms", BT_UNIT_SPEED, "unit of a time"}, {"1.5 kt", BT_UNIT_SPEED, "unit of a mass"}, {"3 m", BT_UNIT_NONE, "plain number"},
-        {"nan", BT_UNIT_LENGTH, "is not a number"}, {".nan", BT_UNIT_LENGTH, "is not a number"}, {"inf", BT_UNIT_LENGTH, "is not a number"},
-        {"-.inf", BT_UNIT_LENGTH, "is not a number"}, {"0x10", BT_UNIT_LENGTH, "\"x10\""}, {"0x1p3", BT_UNIT_NONE, "\"x1p3\""},
-        {"1e999", BT_UNIT_NONE, "too large"}, {"1e308 km", BT_UNIT_LENGTH, "too large"}, {"", BT_UNIT_LENGTH, "is not a number"},
-        {"m", BT_UNIT_LENGTH, "is not a number"}, {"1,5 m", BT_UNIT_LENGTH, "\",5 m\""}, {"1 000 m", BT_UNIT_LENGTH, "\"000 m\""},
-        {"1 m m", BT_UNIT_LENGTH, "\"m m\""}, {"1e", BT_UNIT_NONE, "\"e\""}, {"1e+", BT_UNIT_NONE, "\"e+\""}, {"--1", BT_UNIT_NONE, "not a number"},
-        {"1.2.3", BT_UNIT_NONE, "\".3\""}, {"1_000", BT_UNIT_NONE, "\"_000\""}, {"5 M", BT_UNIT_LENGTH, "\"M\" is not a unit of length"},
+        {"0.8x", BT_UNIT_RATIO, "\"x\" is not a unit"},
+        {"10 kN", BT_UNIT_LENGTH, "kN is the unit of a force and this is a length"},
+        {"10 ms", BT_UNIT_SPEED, "unit of a time"},
+        {"1.5 kt", BT_UNIT_SPEED, "unit of a mass"},
+        {"3 m", BT_UNIT_NONE, "plain number"},
+        {"nan", BT_UNIT_LENGTH, "is not a number"},
+        {".nan", BT_UNIT_LENGTH, "is not a number"},
+        {"inf", BT_UNIT_LENGTH, "is not a number"},
+        {"-.inf", BT_UNIT_LENGTH, "is not a number"},
+        {"0x10", BT_UNIT_LENGTH, "\"x10\""},
+        {"0x1p3", BT_UNIT_NONE, "\"x1p3\""},
+        {"1e999", BT_UNIT_NONE, "too large"},
+        {"1e308 km", BT_UNIT_LENGTH, "too large"},
+        {"", BT_UNIT_LENGTH, "is not a number"},
+        {"m", BT_UNIT_LENGTH, "is not a number"},
+        {"1,5 m", BT_UNIT_LENGTH, "\",5 m\""},
+        {"1 000 m", BT_UNIT_LENGTH, "\"000 m\""},
+        {"1 m m", BT_UNIT_LENGTH, "\"m m\""},
+        {"1e", BT_UNIT_NONE, "\"e\""},
+        {"1e+", BT_UNIT_NONE, "\"e+\""},
+        {"--1", BT_UNIT_NONE, "not a number"},
+        {"1.2.3", BT_UNIT_NONE, "\".3\""},
+        {"1_000", BT_UNIT_NONE, "\"_000\""},
+        {"5 M", BT_UNIT_LENGTH, "\"M\" is not a unit of length"},
         {"5 %", BT_UNIT_LENGTH, "unit of a ratio"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         double value = 42;
         char why[BT_WHY] = "";
-        if (bt_units_parse(bad[i].text, bad[i].kind, &value, why)) fail_msg("\"%s\" accepted as %g", bad[i].text, value);
-        if (!strstr(why, bad[i].fragment)) fail_msg("\"%s\": the message lacks '%s': %s", bad[i].text, bad[i].fragment, why);
+        if (bt_units_parse(bad[i].text, bad[i].kind, &value, why))
+            fail_msg("\"%s\" accepted as %g", bad[i].text, value);
+        if (!strstr(why, bad[i].fragment))
+            fail_msg("\"%s\": the message lacks '%s': %s", bad[i].text, bad[i].fragment, why);
         if (!strchr(why, ';')) fail_msg("\"%s\": no remedy in: %s", bad[i].text, why);
         assert_true(value == 42);
     }
@@ -93,7 +135,8 @@ static uint64_t random_bits(void)
 static void written_values_read_back_to_the_same_bits(void **state)
 {
     (void)state;
-    static const double edges[] = {0.0, -0.0, DBL_MAX, DBL_MIN, DBL_TRUE_MIN, 0.1, 1.0 / 3, BT_PI / 180, 1e22, 0.30000000000000004};
+    static const double edges[] = {0.0, -0.0,    DBL_MAX,     DBL_MIN, DBL_TRUE_MIN,
+                                   0.1, 1.0 / 3, BT_PI / 180, 1e22,    0.30000000000000004};
     for (int i = 0; i < 20000; i++) {
         double v, back;
         uint64_t bits = random_bits();

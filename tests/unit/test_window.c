@@ -24,7 +24,14 @@ static void add_body_and_window(bt_world *w, double sign, double body_speed)
     double v[8];
     scene_square(1, v);
     const double x = sign > 0 ? LENGTH - AHEAD : AHEAD;
-    bt_body_def d = {.motion = BT_KINEMATIC, .large = true, .n_vertices = 4, .vertices = v, .x = x, .y = 30, .vx = sign * body_speed, .mass = 1e3};
+    bt_body_def d = {.motion = BT_KINEMATIC,
+                     .large = true,
+                     .n_vertices = 4,
+                     .vertices = v,
+                     .x = x,
+                     .y = 30,
+                     .vx = sign * body_speed,
+                     .mass = 1e3};
     const bt_gid n_floes = w->bodies.n_global;
     w->towed = bt_world_add(w, &d);
     w->tow = bt_alloc(1, sizeof *w->tow);
@@ -40,7 +47,10 @@ static bt_world *empty(double dt)
 }
 
 static bt_pose pose(const bt_world *w, bt_gid g) { return w->bodies.pose[bt_world_index(w, g)]; }
-static double unwrapped(const bt_world *w, bt_gid g) { return pose(w, g).x + LENGTH * w->bodies.home[bt_world_index(w, g)].lap; }
+static double unwrapped(const bt_world *w, bt_gid g)
+{
+    return pose(w, g).x + LENGTH * w->bodies.home[bt_world_index(w, g)].lap;
+}
 
 static void move(bt_world *w, bt_gid g, double dx, double dy, double yaw)
 {
@@ -50,8 +60,8 @@ static void move(bt_world *w, bt_gid g, double dx, double dy, double yaw)
     if (p->x < 0) p->x += LENGTH, w->bodies.home[i].lap--;
     if (p->x >= LENGTH) p->x -= LENGTH, w->bodies.home[i].lap++;
     bt_bodies_turn(&w->bodies, i);
-    w->bodies.stirred[i] = 1;
-    w->tiles->labelled = false;
+    w->bodies.disturbed[i] = 1;
+    w->cells->labelled = false;
 }
 
 static bool at(const bt_world *w, bt_gid g, double x, double y) { return pose(w, g).x == x && pose(w, g).y == y; }
@@ -61,7 +71,8 @@ static void run_until_rear(bt_world *w, double rear)
     while (w->window->rear < rear) bt_world_step(w);
 }
 
-/// Twelve floes in three rows; disturbed once, they are back to the bit after a lap, each renewed once a lap, either way along x.
+/// Twelve floes in three rows; disturbed once, they are back to the bit after a lap, each renewed once a lap, either
+/// way along x.
 static void come_back_as_they_were(void **state)
 {
     (void)state;
@@ -93,7 +104,9 @@ static void come_back_as_they_were(void **state)
         assert_int_equal(seen, w->window->renewed);
         // The rear has gone 100 m on, in strides of 2: as many homes as it has passed.
         int64_t homes = 0;
-        for (int k = 0; k < N; k++) homes += (int64_t)floor((w->window->rear - sign * x[k]) / LENGTH) - (int64_t)floor((start - sign * x[k]) / LENGTH);
+        for (int k = 0; k < N; k++)
+            homes += (int64_t)floor((w->window->rear - sign * x[k]) / LENGTH) -
+                     (int64_t)floor((start - sign * x[k]) / LENGTH);
         assert_true(llabs(homes - w->window->renewed) <= 1); // one may lie just where the rear is
         for (int k = 0; k < N; k++) {
             assert_true(at(w, k, x[k], y[k]) && pose(w, k).yaw == 0.2 * k && pose(w, k).c == cos(0.2 * k));
@@ -104,8 +117,8 @@ static void come_back_as_they_were(void **state)
     }
 }
 
-/// Floe 1 lies on the place of floe 0 and leaves it when its own home at `other` is passed; floe 0 waits until then, or beyond the front zone
-/// goes round as it is while its place stays empty.
+/// Floe 1 lies on the place of floe 0 and leaves it when its own home at `other` is passed; floe 0 waits until then, or
+/// beyond the front zone goes round as it is while its place stays empty.
 static void wait_for_a_place(void **state)
 {
     (void)state;
@@ -145,8 +158,8 @@ static void wait_for_a_place(void **state)
     }
 }
 
-/// Three floes in a ring, each on the place of the next, homes passed in one stride: they go at once. With a fourth on the place of one of
-/// them, whose home is not passed, all three wait.
+/// Three floes in a ring, each on the place of the next, homes passed in one stride: they go at once. With a fourth on
+/// the place of one of them, whose home is not passed, all three wait.
 static void rings_go_at_once(void **state)
 {
     (void)state;
@@ -157,7 +170,8 @@ static void rings_go_at_once(void **state)
         add_floe(w, 11, 0, 0);
         add_body_and_window(w, 1, speed);
         bt_world_step(w);
-        // The last of the three lies a little aside from the place it holds, so that the fourth can touch that place, too.
+        // The last of the three lies a little aside from the place it holds, so that the fourth can touch that place,
+        // too.
         for (int k = 0; k < 3; k++) move(w, k, x[(k + 1) % 3] - x[k] - 0.1, y[(k + 1) % 3] - y[k], 0);
         if (blocked) move(w, 3, x[0] - 1.1 - 11 + 0.1, 0.05, 0);
         run_until_rear(w, 8);
@@ -170,7 +184,8 @@ static void rings_go_at_once(void **state)
     }
 }
 
-/// A floe may lie in the bay of another's place, which is then free: shapes that are not convex are held against each other by their parts.
+/// A floe may lie in the bay of another's place, which is then free: shapes that are not convex are held against each
+/// other by their parts.
 static void bays_are_free(void **state)
 {
     (void)state;
@@ -194,8 +209,8 @@ static void bays_are_free(void **state)
     }
 }
 
-/// A floe that the body carries along is never taken away from it; its place is missed once a lap. One that is pushed ahead by 10 m is
-/// renewed all the same, 5 m late.
+/// A floe that the body carries along is never taken away from it; its place is missed once a lap. One that is pushed
+/// ahead by 10 m is renewed all the same, 5 m late.
 static void carried_along(void **state)
 {
     (void)state;
@@ -221,8 +236,8 @@ static void carried_along(void **state)
     bt_world_free(w);
 }
 
-/// Current: the mother field drifts with the water, what enters rests in it to the last bit. Wind: it drifts as its mean floe does, so that
-/// equal floes keep their distances whether renewed or not.
+/// Current: the mother field drifts with the water, what enters rests in it to the last bit. Wind: it drifts as its
+/// mean floe does, so that equal floes keep their distances whether renewed or not.
 static void drifts_as_undisturbed_ice(void **state)
 {
     (void)state;
@@ -240,10 +255,12 @@ static void drifts_as_undisturbed_ice(void **state)
             CHECK_CLOSE(v.x, w->window->vel.x, 1e-12);
             CHECK_CLOSE(v.y, w->window->vel.y, 1e-12);
             if (!wind) assert_true(v.x == 0.1 && v.y == 0);
-            CHECK_CLOSE(unwrapped(w, k), 1 + 5 * k + w->window->drift_x + LENGTH * w->bodies.home[bt_world_index(w, k)].copy, 1e-9);
+            CHECK_CLOSE(unwrapped(w, k),
+                        1 + 5 * k + w->window->drift_x + LENGTH * w->bodies.home[bt_world_index(w, k)].copy, 1e-9);
             CHECK_CLOSE(pose(w, k).y, 2 * (k % 2) + w->window->drift_y, 1e-9);
         }
-        if (wind) assert_true(w->window->drift_y < -0.5 && w->window->drift_x > 1.1 * 0.1 * w->par.dt * (double)w->step);
+        if (wind)
+            assert_true(w->window->drift_y < -0.5 && w->window->drift_x > 1.1 * 0.1 * w->par.dt * (double)w->step);
         else CHECK_CLOSE(w->window->drift_x, 0.1 * w->par.dt * (double)w->step, 1e-9);
         bt_world_free(w);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Seals of files: writing and checking; the format is in seal.h.
-#include "base/seal.h"
+// checksums of files: writing and checking; the format is in checksum.h.
+#include "base/checksum.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -32,10 +32,13 @@ static bool read_at(int fd, void *to, size_t bytes, off_t at)
     return true;
 }
 
-static void print_digest(XXH128_hash_t h, char out[BT_SEAL_DIGEST]) { snprintf(out, BT_SEAL_DIGEST, "%016" PRIx64 "%016" PRIx64, (uint64_t)h.high64, (uint64_t)h.low64); }
+static void print_digest(XXH128_hash_t h, char out[BT_CHECKSUM_DIGEST])
+{
+    snprintf(out, BT_CHECKSUM_DIGEST, "%016" PRIx64 "%016" PRIx64, (uint64_t)h.high64, (uint64_t)h.low64);
+}
 
 /// Digest of the bytes from `at` on.
-static bool digest(int fd, off_t at, off_t size, char out[BT_SEAL_DIGEST])
+static bool digest(int fd, off_t at, off_t size, char out[BT_CHECKSUM_DIGEST])
 {
     enum { PIECE = 1 << 20 };
     XXH3_state_t *state = XXH3_createState();
@@ -51,19 +54,22 @@ static bool digest(int fd, off_t at, off_t size, char out[BT_SEAL_DIGEST])
     return good;
 }
 
-/// The seal that the bytes behind it ask for.
-static bool make(int fd, off_t size, const char *kind, char block[BT_SEAL_BYTES])
+/// The checksum that the bytes behind it ask for.
+static bool make(int fd, off_t size, const char *kind, char block[BT_CHECKSUM_BYTES])
 {
-    char text[BT_SEAL_DIGEST];
-    if (!digest(fd, BT_SEAL_BYTES, size, text)) return false;
-    memset(block, 0, BT_SEAL_BYTES);
-    snprintf(block, BT_SEAL_BYTES, MAGIC "kind: %s\nbytes: %" PRId64 "\nxxh128: %s\n", kind, (int64_t)size, text);
+    char text[BT_CHECKSUM_DIGEST];
+    if (!digest(fd, BT_CHECKSUM_BYTES, size, text)) return false;
+    memset(block, 0, BT_CHECKSUM_BYTES);
+    snprintf(block, BT_CHECKSUM_BYTES, MAGIC "kind: %s\nbytes: %" PRId64 "\nxxh128: %s\n", kind, (int64_t)size, text);
     return true;
 }
 
-void bt_seal_digest_text(const void *bytes, size_t n, char out[BT_SEAL_DIGEST]) { print_digest(XXH3_128bits(bytes, n), out); }
+void bt_checksum_digest_text(const void *bytes, size_t n, char out[BT_CHECKSUM_DIGEST])
+{
+    print_digest(XXH3_128bits(bytes, n), out);
+}
 
-bt_status bt_seal_digest_file(const char *path, char out[BT_SEAL_DIGEST], int64_t *bytes, bt_errors *err)
+bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST], int64_t *bytes, bt_errors *err)
 {
     struct stat st;
     const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a pipe must not keep us waiting
@@ -79,9 +85,9 @@ bt_status bt_seal_digest_file(const char *path, char out[BT_SEAL_DIGEST], int64_
     return reason ? bt_file_fail(path, "read the file", reason, err) : BT_OK;
 }
 
-bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err)
+bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
 {
-    char block[BT_SEAL_BYTES];
+    char block[BT_CHECKSUM_BYTES];
     struct stat st;
     const int fd = open(path, O_RDWR | O_CLOEXEC);
     int reason = fd < 0 || fstat(fd, &st) != 0 || !make(fd, st.st_size, kind, block) ? errno : 0;
@@ -96,32 +102,44 @@ bt_status bt_seal_write(const char *path, const char *kind, bt_errors *err)
 /// Why a block is not the one it should be, in words.
 static bt_status refuse(const char *path, const char *kind, char *block, off_t size, bt_errors *err)
 {
-    block[BT_SEAL_BYTES - 1] = 0;
+    block[BT_CHECKSUM_BYTES - 1] = 0;
     char found[40] = "";
     long long bytes = -1;
-    const bool ours = !memcmp(block, MAGIC, sizeof MAGIC - 1) && sscanf(block + sizeof MAGIC - 1, "kind: %39[^\n]\nbytes: %lld", found, &bytes) >= 1;
+    const bool ours = !memcmp(block, MAGIC, sizeof MAGIC - 1) &&
+                      sscanf(block + sizeof MAGIC - 1, "kind: %39[^\n]\nbytes: %lld", found, &bytes) >= 1;
     const size_t word = strcspn(kind, " ");
-    if (!ours) bt_errors_add(err, "%s: is no %.*s file of this program, or its first bytes are damaged; take another copy of it", path, (int)word, kind);
-    else if (strncmp(found, kind, word + 1)) bt_errors_add(err, "%s: is a %.*s file, and a %.*s file is needed here; give the right one", path, (int)strcspn(found, " "), found, (int)word, kind);
-    else if (strcmp(found, kind)) bt_errors_add(err, "%s: has the format \"%s\", this program reads \"%s\"; use the program that wrote it", path, found, kind);
-    else if (bytes > (long long)size) bt_errors_add(err, "%s: is cut off: %lld of %lld bytes are there; take another copy of it", path, (long long)size, bytes);
+    if (!ours)
+        bt_errors_add(err,
+                      "%s: is no %.*s file of this program, or its first bytes are damaged; take another copy of it",
+                      path, (int)word, kind);
+    else if (strncmp(found, kind, word + 1))
+        bt_errors_add(err, "%s: is a %.*s file, and a %.*s file is needed here; give the right one", path,
+                      (int)strcspn(found, " "), found, (int)word, kind);
+    else if (strcmp(found, kind))
+        bt_errors_add(err, "%s: has the format \"%s\", this program reads \"%s\"; use the program that wrote it", path,
+                      found, kind);
+    else if (bytes > (long long)size)
+        bt_errors_add(err, "%s: is cut off: %lld of %lld bytes are there; take another copy of it", path,
+                      (long long)size, bytes);
     else bt_errors_add(err, "%s: is damaged: its bytes do not fit their digest; take another copy of it", path);
     return BT_ERR_CASE;
 }
 
-/// A file that never had a seal: it begins as HDF5, or it is no HDF5 file with this room in front. What was sealed does not pass by a damaged first line.
+/// A file that never had a checksum: it begins as HDF5, or it is no HDF5 file with this room in front. What was
+/// protected by a checksum does not pass by a damaged first line.
 static bool is_bare(int fd, off_t size, const char *block)
 {
     char behind[sizeof hdf5_magic] = "";
     if (!memcmp(block, hdf5_magic, sizeof hdf5_magic)) return true;
     if (!memcmp(block, MAGIC, sizeof MAGIC - 1)) return false;
-    const bool long_enough = size >= BT_SEAL_BYTES + (off_t)sizeof behind;
-    return !long_enough || (read_at(fd, behind, sizeof behind, BT_SEAL_BYTES) && memcmp(behind, hdf5_magic, sizeof behind) != 0);
+    const bool long_enough = size >= BT_CHECKSUM_BYTES + (off_t)sizeof behind;
+    return !long_enough ||
+           (read_at(fd, behind, sizeof behind, BT_CHECKSUM_BYTES) && memcmp(behind, hdf5_magic, sizeof behind) != 0);
 }
 
-bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_errors *err)
+bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_errors *err)
 {
-    char block[BT_SEAL_BYTES] = "", wanted[BT_SEAL_BYTES];
+    char block[BT_CHECKSUM_BYTES] = "", wanted[BT_CHECKSUM_BYTES];
     struct stat st;
     if (bare) *bare = false;
     char what[48];
@@ -130,11 +148,13 @@ bt_status bt_seal_check(const char *path, const char *kind, bool *bare, bt_error
     if (fd < 0) return BT_ERR_IO;
     bt_status status = BT_OK;
     int reason = fstat(fd, &st) != 0 ? errno : 0;
-    if (!reason && !read_at(fd, block, st.st_size < BT_SEAL_BYTES ? (size_t)st.st_size : sizeof block, 0)) reason = errno;
+    if (!reason && !read_at(fd, block, st.st_size < BT_CHECKSUM_BYTES ? (size_t)st.st_size : sizeof block, 0))
+        reason = errno;
     if (!reason && bare) *bare = is_bare(fd, st.st_size, block);
     if (!reason && !(bare && *bare)) {
-        if (st.st_size < BT_SEAL_BYTES) {
-            bt_errors_add(err, "%s: is cut off, or no file of this program: it has %lld bytes; take another copy of it", path, (long long)st.st_size);
+        if (st.st_size < BT_CHECKSUM_BYTES) {
+            bt_errors_add(err, "%s: is cut off, or no file of this program: it has %lld bytes; take another copy of it",
+                          path, (long long)st.st_size);
             status = BT_ERR_CASE;
         } else if (memcmp(block, MAGIC, sizeof MAGIC - 1)) {
             status = refuse(path, kind, block, st.st_size, err);

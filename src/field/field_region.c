@@ -19,7 +19,7 @@ static void place(int n, double *v, double x, double y, double yaw)
 }
 
 // Area of a polygon within the region.
-static double area_inside(const bt_yard *y, int n, const double *v)
+static double area_inside(const bt_region *y, int n, const double *v)
 {
     double a[2 * (BT_MAX_VERTICES + 4)], b[2 * (BT_MAX_VERTICES + 4)];
     n = bt_shape_clip(n, v, -1, 0, -y->x0, a);
@@ -29,9 +29,10 @@ static double area_inside(const bt_yard *y, int n, const double *v)
     return n >= 3 ? bt_shape_moments(n, b).area : 0;
 }
 
-// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so slender that room for the
-// clearance cannot be made by scaling: it would keep floes away all along its line, and its images would be without number.
-static bool add_obstacle(bt_yard *y, int n, const double *v)
+// Add a body and its periodic images that reach into the region; the ice loses what they cover. False for a body so
+// slender that room for the clearance cannot be made by scaling: it would keep floes away all along its line, and its
+// images would be without number.
+static bool add_obstacle(bt_region *y, int n, const double *v)
 {
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     bt_moments m = bt_shape_moments(n, v);
@@ -41,14 +42,16 @@ static bool add_obstacle(bt_yard *y, int n, const double *v)
     double r = m.radius * grow;
     // A body far outside a periodic domain is brought back first, so that images next to it suffice.
     double wx = m.cx, wy = m.cy;
-    bt_yard_wrap(y, &wx, &wy);
+    bt_region_wrap(y, &wx, &wy);
     int reach_x = y->periodic_x ? 1 + (int)(r / lx) : 0, reach_y = y->periodic_y ? 1 + (int)(r / ly) : 0;
     for (int ix = -reach_x; ix <= reach_x; ix++)
         for (int iy = -reach_y; iy <= reach_y; iy++) {
             double cx = wx + ix * lx, cy = wy + iy * ly;
             // Floes at home reach over a periodic edge by less than half a period.
             double over_x = y->periodic_x ? lx / 2 : 0, over_y = y->periodic_y ? ly / 2 : 0;
-            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y || cy - r > y->y1 + over_y) continue;
+            if (cx + r < y->x0 - over_x || cx - r > y->x1 + over_x || cy + r < y->y0 - over_y ||
+                cy - r > y->y1 + over_y)
+                continue;
             y->obstacles = bt_realloc(y->obstacles, (size_t)y->n_obstacles + 1, sizeof *y->obstacles);
             bt_obstacle *o = &y->obstacles[y->n_obstacles++];
             *o = (bt_obstacle){.n = n, .x = cx, .y = cy, .radius = r};
@@ -70,10 +73,11 @@ static bool spans(double a0, double a1, double d0, double length)
     return fabs(a0 - d0) <= 1e-9 * length && fabs(a1 - d0 - length) <= 1e-9 * length;
 }
 
-static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
+static bool add_body(bt_region *y, const bt_case *c, int n, const double *own, double x, double z, double yaw)
 {
     // A region that is part of a periodic domain is not periodic itself, but a body can reach into it over the edge.
-    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x, over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
+    int over_x = bt_bound_wraps(c->domain.ends) && !y->periodic_x,
+        over_y = c->domain.sides == BT_BOUND_PERIODIC && !y->periodic_y;
     for (int ix = -over_x; ix <= over_x; ix++)
         for (int iy = -over_y; iy <= over_y; iy++) {
             double v[2 * BT_MAX_VERTICES];
@@ -84,12 +88,15 @@ static bool add_body(bt_yard *y, const bt_case *c, int n, const double *own, dou
     return true;
 }
 
-bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors *err)
+bt_status bt_region_init(bt_region *y, const bt_case *c, double clearance, bt_errors *err)
 {
-    *y = (bt_yard){.x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
+    *y = (bt_region){
+        .x0 = c->ice.x_min, .x1 = c->ice.x_max, .y0 = c->ice.y_min, .y1 = c->ice.y_max, .clearance = clearance};
     if (!(y->x1 > y->x0 && y->y1 > y->y0)) {
-        bt_errors_add(err, "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
-                      c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
+        bt_errors_add(
+            err,
+            "%s: ice region: x %g..%g m, y %g..%g m is empty; give ice.x_min < ice.x_max and ice.y_min < ice.y_max",
+            c->path ? c->path : "case", y->x0, y->x1, y->y0, y->y1);
         return BT_ERR_CASE;
     }
     y->periodic_x = bt_bound_wraps(c->domain.ends) && spans(y->x0, y->x1, c->domain.x0, c->domain.length);
@@ -105,22 +112,25 @@ bt_status bt_yard_init(bt_yard *y, const bt_case *c, double clearance, bt_errors
         wide = nv < 3 || add_body(y, c, nv, v, d->x, d->y, d->yaw);
     }
     if (!wide) {
-        bt_errors_add(err, "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m between it and the ice; take a wider one, or smaller floes (ice.size)",
+        bt_errors_add(err,
+                      "%s: body.width, floes: the towed body or a floe given by hand is too slender for gaps of %g m "
+                      "between it and the ice; take a wider one, or smaller floes (ice.size)",
                       c->path ? c->path : "case", clearance);
         return BT_ERR_CASE;
     }
     if (!(y->ice_area > 0)) {
-        bt_errors_add(err, "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
+        bt_errors_add(err,
+                      "%s: ice region: the towed body and the floes given by hand cover all of it; enlarge the region",
                       c->path ? c->path : "case");
         return BT_ERR_CASE;
     }
     return BT_OK;
 }
 
-void bt_yard_free(bt_yard *y)
+void bt_region_free(bt_region *y)
 {
     free(y->obstacles);
-    *y = (bt_yard){0};
+    *y = (bt_region){0};
 }
 
 static double wrap(double x, double low, double high)
@@ -130,7 +140,7 @@ static double wrap(double x, double low, double high)
     return x < high ? x : low; // round-off may land on the upper edge
 }
 
-void bt_yard_wrap(const bt_yard *y, double *px, double *py)
+void bt_region_wrap(const bt_region *y, double *px, double *py)
 {
     if (y->periodic_x) *px = wrap(*px, y->x0, y->x1);
     if (y->periodic_y) *py = wrap(*py, y->y0, y->y1);
@@ -158,12 +168,12 @@ static bool edge_separates(int n, const double *v, int m, const double *o)
     return false;
 }
 
-int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
+int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed)
 {
     enum { CAP = 2 * BT_MAX_VERTICES };
     double trial[2 * CAP], best[2 * CAP];
     for (int k = 0; k < y->n_obstacles && n >= 3; k++) {
-        if (n > 4 * BT_CELL_VERTICES) n = bt_cell_clean(n, v, 0); // many obstacles around one cell
+        if (n > 4 * BT_TESSELLATION_VERTICES) n = bt_tessellation_clean(n, v, 0); // many obstacles around one cell
         const bt_obstacle *o = &y->obstacles[k];
         double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
         for (int i = 0; i < n; i++) {
@@ -203,7 +213,7 @@ int bt_cell_clear(const bt_yard *y, int n, double *v, bool boxed)
     return n;
 }
 
-int bt_cell_clean(int n, double *v, double shortest)
+int bt_tessellation_clean(int n, double *v, double shortest)
 {
     // A subset of the vertices of a convex polygon is convex and lies inside it. Of the shortest edge's two ends, the
     // one whose removal costs less area goes.
@@ -215,10 +225,11 @@ int bt_cell_clean(int n, double *v, double shortest)
             double l = hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
             if (l < least) least = l, at = i;
         }
-        if (least >= shortest && n <= BT_CELL_VERTICES) break;
+        if (least >= shortest && n <= BT_TESSELLATION_VERTICES) break;
         double loss[2];
         for (int e = 0; e < 2; e++) {
-            const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n), *r = v + 2 * ((at + e + 1) % n);
+            const double *p = v + 2 * ((at + e + n - 1) % n), *q = v + 2 * ((at + e) % n),
+                         *r = v + 2 * ((at + e + 1) % n);
             loss[e] = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         }
         int gone = (at + (loss[1] < loss[0])) % n;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// How far floes are from touching: separating axes, pairs from a grid, room to grow. Independent of the contact code, so
-// that it can check it.
+// How far floes are from touching: separating axes, pairs from a grid, room to grow. Independent of the contact code,
+// so that it can check it.
 //
-// Two convex polygons a, b, scaled by t about their centroids, with D from centroid to centroid: they are apart if an edge
-// normal n of either has n·D > t (h_a(n) + h_b(−n)), h the support function. So they touch at
+// Two convex polygons a, b, scaled by t about their centroids, with D from centroid to centroid: they are apart if an
+// edge normal n of either has n·D > t (h_a(n) + h_b(−n)), h the support function. So they touch at
 //     t_ab = max over n of  n·D / (h_a(n) + h_b(−n)).
 // A convex body that holds its centroid grows with t, so any factors t_a, t_b <= t_ab leave them apart, and
 // room_a = min over b of t_ab can be used by all floes at the same time.
@@ -48,8 +48,8 @@ static entry make_entry(const bt_field *f, const double *outline, bt_idx i, doub
     return e;
 }
 
-void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *outline, double limit, bt_pair_visit *visit,
-                          void *context)
+void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit,
+                          bt_pair_visit *visit, void *context)
 {
     if (f->n < 1) return;
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0;
@@ -59,7 +59,7 @@ void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *out
     for (bt_idx i = 0; i < f->n; i++) {
         entry e = make_entry(f, outline, i, limit);
         double x = e.x, z = e.y; // a floe read from a file may lie outside a periodic domain
-        bt_yard_wrap(y, &x, &z);
+        bt_region_wrap(y, &x, &z);
         e.x0 += x - e.x, e.x1 += x - e.x, e.x = x;
         e.y0 += z - e.y, e.y1 += z - e.y, e.y = z;
         extent += (e.x1 - e.x0 + e.y1 - e.y0) / 2 / f->n;
@@ -75,7 +75,8 @@ void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *out
                 e.x += ix * lx, e.x0 += ix * lx, e.x1 += ix * lx;
                 e.y += iy * ly, e.y0 += iy * ly, e.y1 += iy * ly;
                 // Floes themselves reach beyond the region by up to their extent, and may meet an image there.
-                if ((ix && (e.x1 < y->x0 - over || e.x0 > y->x1 + over)) || (iy && (e.y1 < y->y0 - over || e.y0 > y->y1 + over)))
+                if ((ix && (e.x1 < y->x0 - over || e.x0 > y->x1 + over)) ||
+                    (iy && (e.y1 < y->y0 - over || e.y0 > y->y1 + over)))
                     continue;
                 if (n == cap) all = bt_realloc(all, cap += cap / 2, sizeof *all);
                 all[n++] = e;
@@ -110,7 +111,8 @@ void bt_field_visit_pairs(const bt_yard *y, const bt_field *f, const double *out
     for (size_t b = 0; b < bins; b++)
         for (int64_t p = first[b]; p < first[b + 1]; p++)
             for (int64_t q = p + 1; q < first[b + 1]; q++) {
-                const entry *c = &all[member[p]], *d = &all[member[q]]; // ascending, so c is a floe itself or both are images
+                // ascending, so c is a floe itself or both are images
+                const entry *c = &all[member[p]], *d = &all[member[q]];
                 if (member[p] >= (uint32_t)f->n) continue;
                 double ox = bt_max(c->x0, d->x0), oy = bt_max(c->y0, d->y0);
                 if (ox > bt_min(c->x1, d->x1) || oy > bt_min(c->y1, d->y1)) continue;
@@ -135,12 +137,13 @@ static void room_of_pair(void *context, bt_idx i, bt_idx j, double dx, double dy
     double reach = s->limit * (s->radius[i] + s->radius[j]);
     if (dx * dx + dy * dy >= reach * reach) return;
     const int64_t *o = s->f->offsets;
-    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]), s->outline + 2 * o[j], dx, dy);
+    bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]),
+                             s->outline + 2 * o[j], dx, dy);
     s->room[i] = bt_min(s->room[i], a.both);
     s->room[j] = bt_min(s->room[j], a.both);
 }
 
-static double room_within(const bt_yard *y, double x, double z, int n, const double *v, double room)
+static double room_within(const bt_region *y, double x, double z, int n, const double *v, double room)
 {
     for (int k = 0; k < n; k++) {
         double px = v[2 * k], pz = v[2 * k + 1];
@@ -150,7 +153,7 @@ static double room_within(const bt_yard *y, double x, double z, int n, const dou
     return room;
 }
 
-void bt_field_room(const bt_yard *y, const bt_field *f, double limit, double *room)
+void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room)
 {
     double *outline = bt_field_outlines(f), *radius = bt_alloc((size_t)f->n, sizeof *radius);
     for (bt_idx i = 0; i < f->n; i++) {

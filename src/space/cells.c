@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Labels of the floes, storage in the order of the tiles, and the array of tiles; what they are for: space/tiles.h.
-#include "space/tiles.h"
+// Labels of the floes, storage in the order of the cells, and the array of cells; what they are for: space/cells.h.
+#include "space/cells.h"
 
 #include <assert.h>
 #include <math.h>
@@ -11,48 +11,50 @@
 #include "space/exchange.h"
 #include "space/margin.h"
 
-#define TILE_DIAMETERS 5.0 // least side of a tile by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
+#define CELL_DIAMETERS                                                                                                 \
+    5.0 // least side of a cell by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
 
-bt_tiles *bt_tiles_create(void) { return bt_alloc(1, sizeof(bt_tiles)); }
+bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
-static void free_tile(bt_tile *t)
+static void free_cell(bt_cell *t)
 {
     free(t->pairs);
     free(t->near);
-    free(t->units);
+    free(t->contacts);
     free(t->gaps);
     free(t->limits);
     free(t->memory);
     free(t->list);
     free(t->before);
     free(t->batch);
-    *t = (bt_tile){0};
+    *t = (bt_cell){0};
 }
 
-void bt_tiles_free(bt_tiles *t)
+void bt_cells_free(bt_cells *t)
 {
     if (!t) return;
-    for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
-    void *arrays[] = {t->at, t->speed, t->bound, t->moved, t->rest, t->awake, t->busy, t->is_busy, t->order, t->share, t->tile, t};
+    for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
+    void *arrays[] = {t->at,   t->speed,   t->bound, t->moved, t->asleep, t->awake,
+                      t->busy, t->is_busy, t->order, t->share, t->cell,   t};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
 }
 
 static int32_t wrapped(int32_t c, int32_t n) { return ((c % n) + n) % n; }
 
-/// Lower of two adjacent coordinates, around a periodic direction of n tiles.
+/// Lower of two adjacent coordinates, around a periodic direction of n cells.
 static int32_t lower(int32_t p, int32_t q, int32_t n)
 {
     if (n > 1) return p == q || wrapped(p + 1, n) == q ? p : q;
     return p < q ? p : q;
 }
 
-void bt_tiles_owner(const bt_tiles *t, const int32_t p[2], const int32_t q[2], int32_t out[2])
+void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], int32_t out[2])
 {
     out[0] = lower(p[0], q[0], t->wrap_x);
     out[1] = lower(p[1], q[1], t->wrap_y);
 }
 
-bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y)
+bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y)
 {
     if (t->wrap_x == 1 && x != 0) return -1;
     if (t->wrap_y == 1 && y != 0) return -1;
@@ -63,16 +65,9 @@ bt_idx bt_tiles_at(const bt_tiles *t, int32_t x, int32_t y)
     return t->at[(int64_t)y * t->n_x + x];
 }
 
-bool bt_tiles_calm(const bt_world *w)
-{
-    const bt_params *p = &w->par;
-    const bool balanced = p->coriolis == 0 || (p->balance_u == p->water_u && p->balance_v == p->water_v);
-    return balanced && p->tilt_ax == 0 && p->tilt_ay == 0 && p->air_u == p->water_u && p->air_v == p->water_v;
-}
+// --- busy cells ------------------------------------------------------------------------------------------------------
 
-// --- busy tiles ------------------------------------------------------------------------------------------------------
-
-void bt_tiles_wake(bt_tiles *t, bt_idx k)
+void bt_cells_wake(bt_cells *t, bt_idx k)
 {
     if (t->is_busy[k]) return;
     t->is_busy[k] = 1;
@@ -80,7 +75,7 @@ void bt_tiles_wake(bt_tiles *t, bt_idx k)
     t->busy[t->n_busy++] = k;
 }
 
-void bt_tiles_wake_all(bt_tiles *t)
+void bt_cells_wake_all(bt_cells *t)
 {
     if (t->n_busy == t->n) return;
     for (bt_idx k = 0; k < t->n; k++) {
@@ -97,45 +92,45 @@ static int ascending(const void *p, const void *q)
     return (a > b) - (a < b);
 }
 
-void bt_tiles_sort_busy(bt_tiles *t)
+void bt_cells_sort_busy(bt_cells *t)
 {
     if (!t->busy_sorted) qsort(t->busy, (size_t)t->n_busy, sizeof *t->busy, ascending);
     t->busy_sorted = true;
 }
 
-void bt_tiles_leave(bt_tiles *t)
+void bt_cells_leave(bt_cells *t)
 {
     if (!t->still) return;
     bt_idx kept = 0;
     for (bt_idx i = 0; i < t->n_busy; i++) {
         const bt_idx k = t->busy[i];
-        if (k == t->n - 1 || t->rest[k] != BT_REST_KNOWN || t->awake[k] || t->bound[k] > 0) {
+        if (k == t->n - 1 || t->asleep[k] != BT_ASLEEP || t->awake[k] || t->bound[k] > 0) {
             t->busy[kept++] = k;
         } else {
             t->is_busy[k] = 0;
-            t->tile[k].swept = false; // as a look would have it: nothing here moved on
+            t->cell[k].swept = false; // as a look would have it: nothing here moved on
         }
     }
     t->n_busy = kept;
 }
 
-double bt_tiles_outside(const bt_world *w, bt_idx i)
+double bt_cells_outside(const bt_world *w, bt_idx i)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     double out = 0;
     if (t->wrap_x != 1) {
-        const double middle = t->x0 + (w->bodies.tile[i][0] + 0.5) * t->side_x;
+        const double middle = t->x0 + (w->bodies.cell[i][0] + 0.5) * t->side_x;
         out = bt_max(out, fabs(bt_nearest_image(w->bodies.pose[i].x - middle, w->par.period_x)) - 0.5 * t->side_x);
     }
     if (t->wrap_y != 1) {
-        const double middle = t->y0 + (w->bodies.tile[i][1] + 0.5) * t->side_y;
+        const double middle = t->y0 + (w->bodies.cell[i][1] + 0.5) * t->side_y;
         out = bt_max(out, fabs(bt_nearest_image(w->bodies.pose[i].y - middle, w->par.period_y)) - 0.5 * t->side_y);
     }
     return out;
 }
 
-/// Side of the tiles along one direction. Around a period their number is even, or the colours would meet at the seam; below
-/// four the block of a tile would meet itself, and one tile takes the whole period.
+/// Side of the cells along one direction. Around a period their number is even, or the colours would meet at the seam;
+/// below four the block of a cell would meet itself, and one cell takes the whole period.
 static double side_along(double side, double period, int32_t *wrap)
 {
     *wrap = 0;
@@ -145,7 +140,7 @@ static double side_along(double side, double period, int32_t *wrap)
     return period / *wrap;
 }
 
-/// Floor of the coordinate, within what 32 bits hold; a body with a pose that is not a number lands in tile 0 and is
+/// Floor of the coordinate, within what 32 bits hold; a body with a pose that is not a number lands in cell 0 and is
 /// reported by the run.
 static int32_t coordinate(double x, double x0, double side, int32_t wrap)
 {
@@ -155,10 +150,10 @@ static int32_t coordinate(double x, double x0, double side, int32_t wrap)
     return isfinite(c) ? (int32_t)bt_max(-1e9, bt_min(1e9, c)) : 0;
 }
 
-/// Choose the tiles for the poses of now and margins up to twice the present one.
+/// Choose the cells for the poses of now and margins up to twice the present one.
 static void choose(bt_world *w, double margin)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     // Box of the floes [0..3], largest radius [4], mass [5], restitution [6] and speed [7], as maxima.
     double most[8] = {-INFINITY, -INFINITY, -INFINITY, -INFINITY, 0, 0, 0, 0};
@@ -181,9 +176,10 @@ static void choose(bt_world *w, double margin)
     const bool any = most[0] + most[2] >= 0;
     t->x0 = w->par.x0 + (w->par.period_x > 0 ? 0 : w->drift_x);
     t->y0 = w->par.y0 + (w->par.period_y > 0 ? 0 : w->drift_y);
-    double side = bt_max((w->par.tile > 0 ? w->par.tile : TILE_DIAMETERS) * w->par.size, 2 * t->reach + t->margin_max + 0.5 * w->par.size);
+    double side = bt_max((w->par.cell > 0 ? w->par.cell : CELL_DIAMETERS) * w->par.size,
+                         2 * t->reach + t->margin_max + 0.5 * w->par.size);
     if (!(side > 0)) side = 1;
-    for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 tiles a floe, by larger tiles
+    for (;; side *= 2) { // a floe far out must not ask for memory: at most 4 cells a floe, by larger cells
         t->side_x = side_along(side, w->par.period_x, &t->wrap_x);
         t->side_y = side_along(side, w->par.period_y, &t->wrap_y);
         int32_t low[2] = {0, 0}, high[2] = {0, 0};
@@ -199,7 +195,7 @@ static void choose(bt_world *w, double margin)
         t->n_x = (int32_t)n_x, t->n_y = (int32_t)n_y;
         break;
     }
-    // A direction that one tile spans has no neighbours, and no bound on where a centroid stands.
+    // A direction that one cell spans has no neighbours, and no bound on where a centroid stands.
     double slack = INFINITY;
     if (t->wrap_x != 1) slack = bt_min(slack, t->side_x - 2 * t->reach - t->margin_max);
     if (t->wrap_y != 1) slack = bt_min(slack, t->side_y - 2 * t->reach - t->margin_max);
@@ -211,27 +207,27 @@ static int32_t within(int32_t c, int32_t low, int32_t n) { return c < low ? low 
 
 static void label(bt_world *w)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     bt_bodies *b = &w->bodies;
     for (bt_idx i = 0; i < b->n; i++) {
         if (b->large[i]) continue;
-        b->tile[i][0] = within(coordinate(b->pose[i].x, t->x0, t->side_x, t->wrap_x), t->low_x, t->n_x);
-        b->tile[i][1] = within(coordinate(b->pose[i].y, t->y0, t->side_y, t->wrap_y), t->low_y, t->n_y);
+        b->cell[i][0] = within(coordinate(b->pose[i].x, t->x0, t->side_x, t->wrap_x), t->low_x, t->n_x);
+        b->cell[i][1] = within(coordinate(b->pose[i].y, t->y0, t->side_y, t->wrap_y), t->low_y, t->n_y);
     }
 }
 
 // --- storage -------------------------------------------------------------------------------------------------------
 
 typedef struct {
-    int64_t tile; ///< row-major, large bodies last
+    int64_t cell; ///< row-major, large bodies last
     bt_gid gid;
     bt_idx from;
 } sort_key;
 
-static int by_tile(const void *p, const void *q)
+static int by_cell(const void *p, const void *q)
 {
     const sort_key *a = p, *b = q;
-    if (a->tile != b->tile) return a->tile < b->tile ? -1 : 1;
+    if (a->cell != b->cell) return a->cell < b->cell ? -1 : 1;
     return a->gid < b->gid ? -1 : a->gid > b->gid;
 }
 
@@ -253,9 +249,11 @@ static void permute(bt_bodies *b, const sort_key *key)
     for (size_t i = 0; i < n; i++) offset[i + 1] = offset[i] + (b->offset[key[i].from + 1] - b->offset[key[i].from]);
     for (int k = 0; k < bt_n_vertex_fields; k++) {
         const size_t size = bt_vertex_fields[k].size;
-        char **array = (char **)((char *)b + bt_vertex_fields[k].array), *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
+        char **array = (char **)((char *)b + bt_vertex_fields[k].array),
+             *new = bt_realloc(NULL, (size_t)b->cap_vertices, size);
         for (size_t i = 0; i < n; i++)
-            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size, size * (size_t)(offset[i + 1] - offset[i]));
+            memcpy(new + (size_t)offset[i] * size, *array + (size_t)b->offset[key[i].from] * size,
+                   size * (size_t)(offset[i + 1] - offset[i]));
         free(*array);
         *array = new;
     }
@@ -266,44 +264,44 @@ static void permute(bt_bodies *b, const sort_key *key)
 static void sort_bodies(bt_world *w)
 {
     bt_bodies *b = &w->bodies;
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     sort_key *key = bt_alloc((size_t)b->n, sizeof *key);
     bool sorted = true;
-    t->n_tiled = 0;
+    t->n_in_cells = 0;
     for (bt_idx i = 0; i < b->n; i++) {
         key[i] = (sort_key){INT64_MAX, b->gid[i], i};
         if (!b->large[i]) {
-            key[i].tile = (int64_t)(b->tile[i][1] - t->low_y) * t->n_x + (b->tile[i][0] - t->low_x);
-            t->n_tiled++;
+            key[i].cell = (int64_t)(b->cell[i][1] - t->low_y) * t->n_x + (b->cell[i][0] - t->low_x);
+            t->n_in_cells++;
         }
-        sorted = sorted && (i == 0 || by_tile(&key[i - 1], &key[i]) < 0);
+        sorted = sorted && (i == 0 || by_cell(&key[i - 1], &key[i]) < 0);
     }
     if (!sorted) {
-        qsort(key, (size_t)b->n, sizeof *key, by_tile);
+        qsort(key, (size_t)b->n, sizeof *key, by_cell);
         permute(b, key);
     }
     for (bt_idx i = 0; i < b->n; i++) b->index_of[b->gid[i]] = i;
     free(key);
 }
 
-// --- tiles ---------------------------------------------------------------------------------------------------------
+// --- cells ---------------------------------------------------------------------------------------------------------
 
-static bt_tile *new_tile(bt_tiles *t, int32_t x, int32_t y)
+static bt_cell *new_cell(bt_cells *t, int32_t x, int32_t y)
 {
     if (t->n == t->cap) {
         t->cap = t->cap ? t->cap + t->cap / 2 : 64;
-        t->tile = bt_realloc(t->tile, (size_t)t->cap, sizeof *t->tile);
+        t->cell = bt_realloc(t->cell, (size_t)t->cap, sizeof *t->cell);
     }
-    bt_tile *tile = &t->tile[t->n++];
-    *tile = (bt_tile){.x = x, .y = y, .right = -1, .above = -1, .diagonal = -1};
-    tile->phase = (int8_t)((x & 1) | (y & 1) << 1);
-    return tile;
+    bt_cell *cell = &t->cell[t->n++];
+    *cell = (bt_cell){.x = x, .y = y, .right = -1, .above = -1, .diagonal = -1};
+    cell->phase = (int8_t)((x & 1) | (y & 1) << 1);
+    return cell;
 }
 
-/// A tile for every place of the box that this rank owns or whose bodies it holds; the last one for the large bodies.
-static void make_tiles(bt_world *w)
+/// A cell for every place of the box that this rank owns or whose bodies it holds; the last one for the large bodies.
+static void make_cells(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     const int64_t n_at = (int64_t)t->n_x * t->n_y;
     if (n_at > t->cap_at) {
@@ -315,24 +313,24 @@ static void make_tiles(bt_world *w)
         for (int32_t x = 0; x < t->n_x; x++) {
             const int32_t tx = x + t->low_x, ty = y + t->low_y;
             const bt_idx first = i;
-            while (i < t->n_tiled && b->tile[i][0] == tx && b->tile[i][1] == ty) i++;
-            const bool own = !w->exchange || w->exchange->owns_tile(w, tx, ty);
+            while (i < t->n_in_cells && b->cell[i][0] == tx && b->cell[i][1] == ty) i++;
+            const bool own = !w->exchange || w->exchange->owns_cell(w, tx, ty);
             t->at[(int64_t)y * t->n_x + x] = own || i > first ? t->n : -1;
             if (!own && i == first) continue;
-            bt_tile *tile = new_tile(t, tx, ty);
-            tile->first = first;
-            tile->end = i;
-            tile->own = own;
+            bt_cell *cell = new_cell(t, tx, ty);
+            cell->first = first;
+            cell->end = i;
+            cell->own = own;
         }
-    assert(i == t->n_tiled);
+    assert(i == t->n_in_cells);
     for (bt_idx k = 0; k < t->n; k++) {
-        bt_tile *tile = &t->tile[k];
-        tile->right = bt_tiles_at(t, tile->x + 1, tile->y);
-        tile->above = bt_tiles_at(t, tile->x, tile->y + 1);
-        tile->diagonal = bt_tiles_at(t, tile->x + 1, tile->y + 1);
+        bt_cell *cell = &t->cell[k];
+        cell->right = bt_cells_at(t, cell->x + 1, cell->y);
+        cell->above = bt_cells_at(t, cell->x, cell->y + 1);
+        cell->diagonal = bt_cells_at(t, cell->x + 1, cell->y + 1);
     }
-    bt_tile *large = new_tile(t, 0, 0);
-    large->first = t->n_tiled;
+    bt_cell *large = new_cell(t, 0, 0);
+    large->first = t->n_in_cells;
     large->end = b->n;
     large->phase = BT_COLOURS;
     large->own = !w->exchange || w->exchange->owns_large(w);
@@ -340,21 +338,21 @@ static void make_tiles(bt_world *w)
     t->speed = bt_realloc(t->speed, n, sizeof *t->speed);
     t->bound = bt_realloc(t->bound, n, sizeof *t->bound);
     t->moved = bt_realloc(t->moved, n, sizeof *t->moved);
-    t->rest = bt_realloc(t->rest, n, sizeof *t->rest);
+    t->asleep = bt_realloc(t->asleep, n, sizeof *t->asleep);
     t->awake = bt_realloc(t->awake, n, sizeof *t->awake);
     t->order = bt_realloc(t->order, n, sizeof *t->order);
     t->busy = bt_realloc(t->busy, n, sizeof *t->busy);
     t->is_busy = bt_realloc(t->is_busy, n, sizeof *t->is_busy);
-    for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->rest[k] = t->awake[k] = 0;
+    for (size_t k = 0; k < n; k++) t->speed[k] = t->bound[k] = t->moved[k] = t->asleep[k] = t->awake[k] = 0;
     t->n_busy = 0;
-    bt_tiles_wake_all(t);
+    bt_cells_wake_all(t);
 }
 
 // --- what the contacts were ------------------------------------------------------------------------------------------
 
-int bt_trace_by_names(const void *p, const void *q)
+int bt_memory_by_names(const void *p, const void *q)
 {
-    const bt_trace *a = p, *b = q;
+    const bt_memory *a = p, *b = q;
     if (a->a != b->a) return a->a < b->a ? -1 : 1;
     if (a->b != b->b) return a->b < b->b ? -1 : 1;
     if (a->part[0] != b->part[0]) return a->part[0] < b->part[0] ? -1 : 1;
@@ -362,7 +360,7 @@ int bt_trace_by_names(const void *p, const void *q)
     return a->law - b->law;
 }
 
-void bt_tiles_remember(bt_tile *t, const bt_trace *r)
+void bt_cells_remember(bt_cell *t, const bt_memory *r)
 {
     if (t->n_memory == t->cap_memory) {
         t->cap_memory = t->cap_memory ? 2 * t->cap_memory : 8;
@@ -371,61 +369,63 @@ void bt_tiles_remember(bt_tile *t, const bt_trace *r)
     t->memory[t->n_memory++] = *r;
 }
 
-static bt_trace trace_of(const bt_gid *gid, const bt_pair *p)
+static bt_memory trace_of(const bt_gid *gid, const bt_pair *p)
 {
-    return (bt_trace){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = p->n_points,
+    return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = p->n_points,
                       .feature = {p->feature[0], p->feature[1]}, .value = {p->ln[0], p->ln[1], p->lt}};
 }
 
-bt_trace *bt_tiles_take_traces(const bt_world *w, int64_t *n)
+bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     int64_t cap = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        for (bt_idx i = 0; t->tile[k].own && i < t->tile[k].n_pairs; i++) cap += t->tile[k].pairs[i].n_points > 0;
-        if (t->tile[k].own) cap += t->tile[k].n_memory;
+        for (bt_idx i = 0; t->cell[k].own && i < t->cell[k].n_pairs; i++) cap += t->cell[k].pairs[i].n_points > 0;
+        if (t->cell[k].own) cap += t->cell[k].n_memory;
     }
-    bt_trace *trace = bt_alloc((size_t)cap, sizeof *trace);
+    bt_memory *trace = bt_alloc((size_t)cap, sizeof *trace);
     *n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        const bt_tile *tile = &t->tile[k];
-        for (bt_idx i = 0; tile->own && i < tile->n_memory; i++) trace[(*n)++] = tile->memory[i];
-        for (bt_idx i = 0; tile->own && i < tile->n_pairs; i++)
-            if (tile->pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &tile->pairs[i]);
+        const bt_cell *cell = &t->cell[k];
+        for (bt_idx i = 0; cell->own && i < cell->n_memory; i++) trace[(*n)++] = cell->memory[i];
+        for (bt_idx i = 0; cell->own && i < cell->n_pairs; i++)
+            if (cell->pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &cell->pairs[i]);
     }
     return trace;
 }
 
-bt_idx bt_tiles_of_pair(const bt_world *w, bt_idx a, bt_idx b)
+bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     const bt_bodies *s = &w->bodies;
     const bool large_a = s->large[a], large_b = s->large[b];
     if ((large_a && s->motion[a] == BT_DYNAMIC) || (large_b && s->motion[b] == BT_DYNAMIC)) return t->n - 1;
     const bt_idx one = large_a ? b : a, other = large_b ? a : b;
     int32_t at[2];
-    bt_tiles_owner(t, s->tile[one], s->tile[other], at);
-    return bt_tiles_at(t, at[0], at[1]);
+    bt_cells_owner(t, s->cell[one], s->cell[other], at);
+    return bt_cells_at(t, at[0], at[1]);
 }
 
-void bt_tiles_put_traces(bt_world *w, bt_trace *trace, int64_t n)
+void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
 {
-    bt_tiles *t = w->tiles;
-    if (n > 0) qsort(trace, (size_t)n, sizeof *trace, bt_trace_by_names);
+    bt_cells *t = w->cells;
+    if (n > 0) qsort(trace, (size_t)n, sizeof *trace, bt_memory_by_names);
     for (int64_t k = 0; k < n; k++) {
         const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
-        if (a < 0 || b < 0) continue; // a floe that has shot so far away from a large body that its rank does not hold it any more
-        bt_tile *tile = &t->tile[bt_tiles_of_pair(w, a, b)];
+        // a floe that has shot so far away from a large body that its rank does not hold it any more
+        if (a < 0 || b < 0) continue;
+        bt_cell *cell = &t->cell[bt_cells_of_pair(w, a, b)];
         if (trace[k].law != 0) {
-            bt_tiles_remember(tile, &trace[k]);
+            bt_cells_remember(cell, &trace[k]);
             continue;
         }
-        if (tile->n_pairs == tile->cap_pairs) {
-            tile->cap_pairs = tile->cap_pairs ? 2 * tile->cap_pairs : 16;
-            tile->pairs = bt_realloc(tile->pairs, (size_t)tile->cap_pairs, sizeof *tile->pairs);
+        if (cell->n_pairs == cell->cap_pairs) {
+            cell->cap_pairs = cell->cap_pairs ? 2 * cell->cap_pairs : 16;
+            cell->pairs = bt_realloc(cell->pairs, (size_t)cell->cap_pairs, sizeof *cell->pairs);
         }
-        bt_pair *p = &tile->pairs[tile->n_pairs++];
-        *p = (bt_pair){.a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
+        bt_pair *p = &cell->pairs[cell->n_pairs++];
+        *p = (bt_pair){
+            .a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
         memcpy(p->part, trace[k].part, sizeof p->part);
         memcpy(p->feature, trace[k].feature, sizeof p->feature);
         memcpy(p->ln, trace[k].value, sizeof p->ln);
@@ -438,72 +438,76 @@ static bool adjacent(int32_t p, int32_t q, int32_t n)
     return d <= 1 || n == 1 || (n > 1 && d == n - 1);
 }
 
-bool bt_tiles_adjacent(const bt_tiles *t, const int32_t p[2], const int32_t q[2]) { return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y); }
+bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2])
+{
+    return adjacent(p[0], q[0], t->wrap_x) && adjacent(p[1], q[1], t->wrap_y);
+}
 
-/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the margin they had (the
-/// last solution may be one that did not converge). No tile has both in its block, and no rank may hold both.
-static void drop_parted(const bt_world *w, bt_trace *trace, int64_t *n)
+/// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
+/// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
+/// hold both.
+static void drop_parted(const bt_world *w, bt_memory *trace, int64_t *n)
 {
     const bt_bodies *b = &w->bodies;
     int64_t kept = 0;
     for (int64_t k = 0; k < *n; k++) {
         const bt_idx i = bt_world_index(w, trace[k].a), j = bt_world_index(w, trace[k].b);
         const bool one_large = b->large[i] || b->large[j];
-        if (one_large || bt_tiles_adjacent(w->tiles, b->tile[i], b->tile[j])) trace[kept++] = trace[k];
+        if (one_large || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j])) trace[kept++] = trace[k];
     }
     *n = kept;
 }
 
-/// Bodies to their ranks and places under the labels they have, and tiles around them with these traces, which are released.
-static void place(bt_world *w, bt_trace *trace, int64_t n)
+/// Bodies to their ranks and places under the labels they have, and cells around them with these traces, which are
+/// released.
+static void place(bt_world *w, bt_memory *trace, int64_t n)
 {
-    bt_tiles *t = w->tiles;
-    for (bt_idx k = 0; k < t->n; k++) free_tile(&t->tile[k]);
+    bt_cells *t = w->cells;
+    for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
     t->n = 0;
     if (w->exchange) trace = w->exchange->migrate(w, trace, &n);
     sort_bodies(w);
-    make_tiles(w);
-    bt_tiles_put_traces(w, trace, n);
+    make_cells(w);
+    bt_cells_put_memory(w, trace, n);
     if (w->exchange) w->exchange->connect(w);
     free(trace);
     t->labelled = true;
 }
 
-/// With `renew` new tiles and labels, otherwise only new owners.
+/// With `renew` new cells and labels, otherwise only new owners.
 static void deal(bt_world *w, bool renew, double margin)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     if (renew) {
         choose(w, margin);
         label(w);
         t->n_labellings++;
     }
     int64_t n;
-    bt_trace *trace = bt_tiles_take_traces(w, &n);
+    bt_memory *trace = bt_cells_take_memory(w, &n);
     if (renew) drop_parted(w, trace, &n);
     place(w, trace, n);
     t->relabel = false;
 }
 
-void bt_tiles_restore(bt_world *w, bt_trace *trace, int64_t n) { place(w, trace, n); }
+void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n) { place(w, trace, n); }
 
-void bt_tiles_begin(bt_world *w)
+void bt_cells_begin(bt_world *w)
 {
-    bt_tiles *t = w->tiles;
+    bt_cells *t = w->cells;
     if (!t->labelled || t->relabel) {
         if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
         deal(w, true, w->par.slop);
     } else if (w->exchange && w->exchange->due(w)) {
         deal(w, false, 0);
     }
-    t->calm = bt_tiles_calm(w);
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
-    if (!t->still) bt_tiles_wake_all(t);
+    if (!t->still) bt_cells_wake_all(t);
 }
 
-bool bt_tiles_update(bt_world *w, double margin)
+bool bt_cells_update(bt_world *w, double margin)
 {
-    if (margin <= w->tiles->margin_max) return false;
+    if (margin <= w->cells->margin_max) return false;
     deal(w, true, margin);
     return true;
 }

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 // Contacts of the towed body as a step leaves them: where, how hard, how fast; see loads/impact.h for the equations.
-#include "loads/touch.h"
+#include "loads/body_contacts.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#include "space/tiles.h"
+#include "space/cells.h"
 #include "partition/domain.h"
 #include "solve/kernel.h"
 #include "space/phases.h"
 
-enum { TOUCH_WIDTH = sizeof(bt_touch) / sizeof(double) };
-_Static_assert(sizeof(bt_touch) % sizeof(double) == 0, "a touch is a row of doubles");
+enum { TOUCH_WIDTH = sizeof(bt_body_contact) / sizeof(double) };
+_Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a touch is a row of doubles");
 
 typedef struct {
-    bt_touch *row;
+    bt_body_contact *row;
     int64_t n, cap;
 } touches;
 
@@ -30,10 +30,12 @@ static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
     return BT_PI - atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
-/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that meet, the sharper.
-static double corner_of(const bt_bodies *b, const bt_unit *u, uint32_t feature)
+/// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that
+/// meet, the sharper.
+static double corner_of(const bt_bodies *b, const bt_contact *u, uint32_t feature)
 {
-    if ((feature >> 20) == 0x7ffu) return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
+    if ((feature >> 20) == 0x7ffu)
+        return bt_min(interior_angle(b, u->a, (feature >> 10) & 0x3ffu), interior_angle(b, u->b, feature & 0x3ffu));
     const bool reference_b = feature >> 31, of_reference = feature & 1u;
     return interior_angle(b, reference_b == of_reference ? u->b : u->a, (feature & 0xfffffu) >> 1);
 }
@@ -44,7 +46,8 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-static bt_touch touch_of(const bt_world *w, const bt_impacts *m, const bt_tile *tile, const bt_unit *u, bt_idx towed)
+static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
+                                bt_idx towed)
 {
     const bt_bodies *b = &w->bodies;
     const bool is_b = u->b == towed;
@@ -68,7 +71,7 @@ static bt_touch touch_of(const bt_world *w, const bt_impacts *m, const bt_tile *
     const bt_pose *p = &b->pose[towed];
     const double along = is_b ? u->rbt : u->rat;
     const double nx = p->c * u->nx + p->s * u->ny, ny = p->c * u->ny - p->s * u->nx;
-    bt_touch t = {
+    bt_body_contact t = {
         .gid = (double)b->gid[other],
         .x = along * nx + arm * ny,
         .y = along * ny - arm * nx,
@@ -81,7 +84,8 @@ static bt_touch touch_of(const bt_world *w, const bt_impacts *m, const bt_tile *
         .rest = bt_max(0, -v2),
         .mass = 1 / effect,
         .thickness = b->mass[other] > 0 ? b->mass[other] / (m->sheet * b->area[other]) : m->body_height,
-        .corner = corner_of(b, u, tile->pairs[tile->gaps[u - tile->units].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
+        .corner =
+            corner_of(b, u, cell->pairs[cell->gaps[u - cell->contacts].pair].feature[u->n > 1 && u->ln[1] > u->ln[0]]),
     };
     for (int i = 0; i < u->n; i++) {
         const double a = is_b ? u->rbn[i] : u->ran[i];
@@ -92,7 +96,7 @@ static bt_touch touch_of(const bt_world *w, const bt_impacts *m, const bt_tile *
     return t;
 }
 
-static void add(touches *t, const bt_touch *row)
+static void add(touches *t, const bt_body_contact *row)
 {
     if (t->n == t->cap) t->row = bt_realloc(t->row, (size_t)(t->cap = t->cap ? 2 * t->cap : 64), sizeof *t->row);
     t->row[t->n++] = *row;
@@ -101,29 +105,30 @@ static void add(touches *t, const bt_touch *row)
 static int by_gid(const void *a, const void *b)
 {
     // A pair has one manifold. A floe of several parts has more: then by place.
-    const bt_touch *p = a, *q = b;
+    const bt_body_contact *p = a, *q = b;
     if (p->gid != q->gid) return p->gid < q->gid ? -1 : 1;
     if (p->x != q->x) return p->x < q->x ? -1 : 1;
     return (p->y > q->y) - (p->y < q->y);
 }
 
-bt_touch *bt_touch_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
+bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
 {
-    const bt_tiles *ts = w->tiles;
+    const bt_cells *ts = w->cells;
     const bt_idx towed = bt_world_towed(w);
-    // A large movable body has its contacts in the last tile, which comes last of all; one of infinite mass has them in the tiles of the floes.
+    // A large movable body has its contacts in the last cell, which comes last of all; one of infinite mass has them in
+    // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
     touches all = {0};
-#pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_TILES))
+#pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_CELLS))
     {
         touches mine = {0};
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx i = from; i < ts->n_order; i++) {
-            const bt_tile *tile = &ts->tile[ts->order[i]];
-            for (bt_idx j = 0; j < tile->n_units; j++) {
-                const bt_unit *u = &tile->units[j];
+            const bt_cell *cell = &ts->cell[ts->order[i]];
+            for (bt_idx j = 0; j < cell->n_contacts; j++) {
+                const bt_contact *u = &cell->contacts[j];
                 if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-                const bt_touch t = touch_of(w, m, tile, u, towed);
+                const bt_body_contact t = touch_of(w, m, cell, u, towed);
                 add(&mine, &t);
             }
         }
@@ -131,10 +136,11 @@ bt_touch *bt_touch_collect(const bt_world *w, const bt_impacts *m, int64_t *n)
         for (int64_t i = 0; i < mine.n; i++) add(&all, &mine.row[i]);
         free(mine.row);
     }
-    bt_touch *rows = all.row;
+    bt_body_contact *rows = all.row;
     *n = all.n;
     if (w->domain) {
-        rows = (bt_touch *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row, n);
+        rows = (bt_body_contact *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row,
+                                                           n);
         free(all.row);
     }
     if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_gid);

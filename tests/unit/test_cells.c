@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Tiles on one rank: labels that follow the floes, tiles at rest that cost nothing and wake up, blows that go farther than a tile,
-// boxes of few tiles around a period, and floes of very different size.
+// Cells on one rank: labels that follow the floes, cells at rest that cost nothing and wake up, blows that go farther
+// than a cell, boxes of few cells around a period, and floes of very different size.
 #include <sys/resource.h>
 
 #include "space/pairs.h"
@@ -33,7 +33,8 @@ static void add_field(bt_world *w, double x0, double y0, int nx, int ny, double 
 }
 
 /// A disc-like heavy body.
-static bt_gid add_hitter(bt_world *w, double radius, double x, double y, double u, double v, bt_motion motion, bool large)
+static bt_gid add_hitter(bt_world *w, double radius, double x, double y, double u, double v, bt_motion motion,
+                         bool large)
 {
     double s[32];
     for (int k = 0; k < 16; k++) s[2 * k] = radius * cos(BT_PI * k / 8), s[2 * k + 1] = radius * sin(BT_PI * k / 8);
@@ -49,31 +50,31 @@ static bt_vel vel_of(const bt_world *w, bt_gid g) { return w->bodies.vel[bt_worl
 
 static void assert_same_pose(bt_pose a, bt_pose b) { assert_true(a.x == b.x && a.y == b.y && a.yaw == b.yaw); }
 
-/// The invariants of tiles.h at the start of a step.
-static void check_tiles(const bt_world *w)
+/// The invariants of cells.h at the start of a step.
+static void check_cells(const bt_world *w)
 {
-    const bt_tiles *t = w->tiles;
+    const bt_cells *t = w->cells;
     const bt_bodies *b = &w->bodies;
     bt_idx n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        assert_int_equal(t->tile[k].first, n);
-        for (n = t->tile[k].first; n < t->tile[k].end; n++) {
+        assert_int_equal(t->cell[k].first, n);
+        for (n = t->cell[k].first; n < t->cell[k].end; n++) {
             assert_int_equal(bt_world_index(w, b->gid[n]), n);
             if (k == t->n - 1) continue;
-            assert_true(b->tile[n][0] == t->tile[k].x && b->tile[n][1] == t->tile[k].y);
-            assert_true(n == t->tile[k].first || b->gid[n - 1] < b->gid[n]);
-            assert_true(bt_tiles_outside(w, n) <= t->allowance);
+            assert_true(b->cell[n][0] == t->cell[k].x && b->cell[n][1] == t->cell[k].y);
+            assert_true(n == t->cell[k].first || b->gid[n - 1] < b->gid[n]);
+            assert_true(bt_cells_outside(w, n) <= t->allowance);
         }
     }
     assert_int_equal(n, b->n);
 }
 
-// Red: `relabel` never set, or the distance outside taken from another tile.
+// Red: `relabel` never set, or the distance outside taken from another cell.
 static void labels_follow_the_floes(void **state)
 {
     (void)state;
     bt_params p = calm_params();
-    p.water_u = 0.3; // tiles go with the water: the field stays behind, and goes across
+    p.water_u = 0.3; // cells go with the water: the field stays behind, and goes across
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, SIDE, SIDE, 0, 1);
     for (bt_idx i = 0; i < w->bodies.n; i++) w->bodies.drag[i] = (bt_drag){0};
@@ -83,17 +84,17 @@ static void labels_follow_the_floes(void **state)
         bt_world_step(w);
         assert_false(w->stats.outrun);
         touching += w->stats.n_points;
-        bt_tiles_begin(w);
-        check_tiles(w);
+        bt_cells_begin(w);
+        check_cells(w);
     }
-    assert_true(w->tiles->n_labellings > 5 && w->tiles->n_labellings < 100);
+    assert_true(w->cells->n_labellings > 5 && w->cells->n_labellings < 100);
     assert_true(touching > 100 && vel_of(w, runner).x < 1.4);
-    // The storage is in the order of the tiles and not of the gids: names lead to the right body all the same.
+    // The storage is in the order of the cells and not of the gids: names lead to the right body all the same.
     for (bt_gid g = 0; g <= runner; g++) assert_int_equal(w->bodies.gid[bt_world_index(w, g)], g);
     bt_world_free(w);
 }
 
-// Red: a tile at rest that is stepped all the same (n_active), or one that never wakes up (momentum).
+// Red: a cell at rest that is stepped all the same (n_active), or one that never wakes up (momentum).
 static void rest_costs_nothing_and_ends(void **state)
 {
     (void)state;
@@ -106,19 +107,19 @@ static void rest_costs_nothing_and_ends(void **state)
     for (int k = 0; k < 3; k++) bt_world_step(w); // new bodies have to be looked at once
     assert_int_equal(w->stats.n_active, 0);
     assert_int_equal(w->stats.n_points, 0);
-    assert_int_equal(w->tiles->n_units, 0);
-    assert_int_equal(w->tiles->n_busy, 1);
+    assert_int_equal(w->cells->n_contacts, 0);
+    assert_int_equal(w->cells->n_busy, 1);
     for (bt_gid g = 0; g < n; g++) before[g] = pose_of(w, g);
-    const int64_t listings = w->tiles->n_listings;
+    const int64_t listings = w->cells->n_listings;
     for (int k = 0; k < 50; k++) bt_world_step(w);
-    assert_int_equal(w->tiles->n_listings, listings);
+    assert_int_equal(w->cells->n_listings, listings);
     for (bt_gid g = 0; g < n; g++) assert_same_pose(before[g], pose_of(w, g));
-    for (bt_idx k = 0; k < w->tiles->n - 1; k++) assert_null(w->tiles->tile[k].pairs);
+    for (bt_idx k = 0; k < w->cells->n - 1; k++) assert_null(w->cells->cell[k].pairs);
 
     // One floe is set in motion from outside: its neighbourhood wakes up, the far end does not.
     const bt_gid first = 10 * LONG + 2;
     w->bodies.vel[bt_world_index(w, first)] = (bt_vel){.x = 1};
-    w->tiles->labelled = false; // as after every change from outside
+    w->cells->labelled = false; // as after every change from outside
     int64_t most = 0;
     for (int k = 0; k < 30; k++) {
         bt_world_step(w);
@@ -139,7 +140,7 @@ static void rest_costs_nothing_and_ends(void **state)
 }
 
 /// What is not listed is at rest and idle; the list ascends.
-static void check_busy(const bt_tiles *t)
+static void check_busy(const bt_cells *t)
 {
     bt_idx n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
@@ -148,14 +149,16 @@ static void check_busy(const bt_tiles *t)
             n++;
             continue;
         }
-        assert_true(k < t->n - 1 && t->rest[k] == BT_REST_KNOWN && !t->awake[k] && t->bound[k] == 0 && t->speed[k] == 0);
-        assert_true(!t->tile[k].active && !t->tile[k].pairs && t->tile[k].n_units == 0 && t->tile[k].overlap == 0 && !t->tile[k].swept);
+        assert_true(k < t->n - 1 && t->asleep[k] == BT_ASLEEP && !t->awake[k] && t->bound[k] == 0 && t->speed[k] == 0);
+        assert_true(!t->cell[k].active && !t->cell[k].pairs && t->cell[k].n_contacts == 0 && t->cell[k].overlap == 0 &&
+                    !t->cell[k].swept);
     }
     assert_int_equal(n, t->n_busy);
 }
 
-// Red: a tile that contacts wake left out of the list; an awake tile that leaves it; a pair left out of the near ones while it may close.
-static void a_step_looks_at_busy_tiles_alone(void **state)
+// Red: a cell that contacts wake left out of the list; an awake cell that leaves it; a pair left out of the near ones
+// while it may close.
+static void a_step_looks_at_busy_cells_alone(void **state)
 {
     (void)state;
     bt_world *w[2]; // the second looks at everything in every step
@@ -170,30 +173,32 @@ static void a_step_looks_at_busy_tiles_alone(void **state)
         hitter = add_hitter(w[k], 2, 3, 10.1, 0.8, 0, BT_KINEMATIC, true);
     }
     int64_t points = 0;
-    bt_idx least = w[0]->tiles->n + 1000;
+    bt_idx least = w[0]->cells->n + 1000;
     for (int n = 0; n < 120; n++) {
         // It goes on, stops until nearly all rests, and comes back.
         for (int k = 0; k < 2; k++) w[k]->bodies.vel[bt_world_index(w[k], hitter)].x = n < 50 ? 0.8 : n < 70 ? 0 : -0.8;
-        bt_tiles *all = w[1]->tiles;
+        bt_cells *all = w[1]->cells;
         for (bt_idx k = 0; k < all->n; k++) {
-            all->rest[k] = BT_REST_NO;
-            all->tile[k].near_known = false;
+            all->asleep[k] = BT_AWAKE;
+            all->cell[k].near_known = false;
         }
-        if (n > 0) bt_tiles_wake_all(all);
+        if (n > 0) bt_cells_wake_all(all);
         for (int k = 0; k < 2; k++) bt_world_step(w[k]);
         assert_true(bt_world_hash(w[0]) == bt_world_hash(w[1]));
-        assert_true(w[0]->stats.n_active == w[1]->stats.n_active && w[0]->stats.kinetic_energy == w[1]->stats.kinetic_energy);
+        assert_true(w[0]->stats.n_active == w[1]->stats.n_active &&
+                    w[0]->stats.kinetic_energy == w[1]->stats.kinetic_energy);
         assert_true(w[0]->stats.unit_updates == w[1]->stats.unit_updates && w[0]->stats.overlap == w[1]->stats.overlap);
-        check_busy(w[0]->tiles);
+        check_busy(w[0]->cells);
         points += w[0]->stats.n_points;
-        least = n > 2 && w[0]->tiles->n_busy < least ? w[0]->tiles->n_busy : least;
+        least = n > 2 && w[0]->cells->n_busy < least ? w[0]->cells->n_busy : least;
     }
-    assert_true(points > 1000 && least < w[0]->tiles->n / 2);
+    assert_true(points > 1000 && least < w[0]->cells->n / 2);
     for (int k = 0; k < 2; k++) bt_world_free(w[k]);
 }
 
 /// A body goes through a field at `speed` relative to water that flows with (u, v).
-static bt_world *tow_in_current(double u, double v, double speed, int steps, int64_t *active, int64_t *points, bool *projected)
+static bt_world *tow_in_current(double u, double v, double speed, int steps, int64_t *active, int64_t *points,
+                                bool *projected)
 {
     bt_params p = calm_params();
     p.slop = 1e-5; // so that overlap is pushed out now and then
@@ -214,7 +219,8 @@ static bt_world *tow_in_current(double u, double v, double speed, int steps, int
     return w;
 }
 
-// Red: tiles that do not move with the water; a floe whose velocity the rounding of the drag takes off that of the water.
+// Red: cells that do not move with the water; a floe whose velocity the rounding of the drag takes off that of the
+// water.
 static void uniform_current_is_a_moving_frame(void **state)
 {
     (void)state;
@@ -228,22 +234,23 @@ static void uniform_current_is_a_moving_frame(void **state)
     assert_true(points[0] > 1000 && active[0] > 50 && active[0] < 400);
     assert_int_equal(active[0], active[1]);
     assert_int_equal(points[0], points[1]);
-    int rest = 0, stirred = 0;
+    int rest = 0, disturbed = 0;
     for (bt_gid g = 0; g < 50 * SIDE; g++) {
         const bt_pose p = pose_of(still, g), q = pose_of(drift, g);
         if (p.x == 6.5 + g % 50) rest++;
-        else stirred++;
+        else disturbed++;
         CHECK_CLOSE(q.x, p.x + u * t, 1e-10);
         CHECK_CLOSE(q.y, p.y + v * t, 1e-10);
         CHECK_CLOSE(q.yaw, p.yaw, 1e-10);
         if (p.x == 6.5 + g % 50) assert_true(vel_of(drift, g).x == u && vel_of(drift, g).y == v);
     }
-    assert_true(rest > 800 && stirred >= 10);
+    assert_true(rest > 800 && disturbed >= 10);
     bt_world_free(still);
     bt_world_free(drift);
 }
 
-// Red: displacements of an earlier step applied to floes that rest meanwhile (seen: their array is not cleared where nothing moves).
+// Red: displacements of an earlier step applied to floes that rest meanwhile (seen: their array is not cleared where
+// nothing moves).
 static void old_displacements_are_forgotten(void **state)
 {
     (void)state;
@@ -251,12 +258,13 @@ static void old_displacements_are_forgotten(void **state)
     p.water_u = p.air_u = 0.25;
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 40, SIDE, 0.25, 0);
-    for (int k = 0; k < 2; k++) { // two places far apart where a floe is set upon its neighbour, the second when all is over at the first
+    // two places far apart where a floe is set upon its neighbour, the second when all is over at the first
+    for (int k = 0; k < 2; k++) {
         const bt_gid g = 3 * 40 + (k ? 35 : 3);
         const bt_idx i = bt_world_index(w, g);
         w->bodies.pose[i].x += 0.4;
-        w->bodies.stirred[i] = 1;
-        if (k) w->tiles->rest[bt_tiles_at(w->tiles, w->bodies.tile[i][0], w->bodies.tile[i][1])] = BT_REST_NO;
+        w->bodies.disturbed[i] = 1;
+        if (k) w->cells->asleep[bt_cells_at(w->cells, w->bodies.cell[i][0], w->bodies.cell[i][1])] = BT_AWAKE;
         const double before = pose_of(w, g).x;
         double near[10]; // floes at the first place
         for (int m = 0; m < 10; m++) near[m] = pose_of(w, 3 * 40 + m).x;
@@ -272,10 +280,10 @@ static void old_displacements_are_forgotten(void **state)
 }
 
 /// A row of n touching squares of 1 m at rest, the first hit by a heavy one at 1 m/s, no restitution.
-static bt_world *hit_row(int n, double tile, int steps, bool *outrun, int64_t *repeats, double *lost)
+static bt_world *hit_row(int n, double cell, int steps, bool *outrun, int64_t *repeats, double *lost)
 {
     bt_params p = calm_params();
-    p.tile = tile;
+    p.cell = cell;
     bt_world *w = bt_world_create(&p);
     double s[8];
     scene_square(1, s);
@@ -289,7 +297,7 @@ static bt_world *hit_row(int n, double tile, int steps, bool *outrun, int64_t *r
     for (int k = 0; k < 3; k++) bt_world_step(w); // new bodies are looked at; now all rest
     assert_int_equal(w->stats.n_active, 0);
     w->bodies.vel[bt_world_index(w, n)].x = 1;
-    w->tiles->labelled = false; // as after every change from outside
+    w->cells->labelled = false; // as after every change from outside
     *outrun = false;
     *repeats = 0;
     *lost = 0;
@@ -304,14 +312,15 @@ static bt_world *hit_row(int n, double tile, int steps, bool *outrun, int64_t *r
     return w;
 }
 
-// Red: no look at what the solution outran (the far end of the row stays at rest, its neighbour runs into it, nothing is said).
+// Red: no look at what the solution outran (the far end of the row stays at rest, its neighbour runs into it, nothing
+// is said).
 static void a_blow_goes_through_a_row(void **state)
 {
     (void)state;
     bool outrun;
     int64_t repeats;
     double lost;
-    // Tiles of four floes: eight of them are more than the hit tile and the ring around it.
+    // Cells of four floes: eight of them are more than the hit cell and the ring around it.
     enum { N = 32 };
     bt_world *w = hit_row(N, 4, 2, &outrun, &repeats, &lost);
     assert_false(outrun);
@@ -320,7 +329,8 @@ static void a_blow_goes_through_a_row(void **state)
     for (bt_gid g = 0; g <= N; g++) CHECK_CLOSE(vel_of(w, g).x, 1.0 / (N + 1), 1e-6);
     bt_world_free(w);
 
-    // So long that the repeats of a step do not reach the end: told as outrun; nothing is lost, and no floe runs through another.
+    // So long that the repeats of a step do not reach the end: told as outrun; nothing is lost, and no floe runs
+    // through another.
     enum { LONG = 160 };
     w = hit_row(LONG, 2.5, 1, &outrun, &repeats, &lost);
     assert_true(outrun);
@@ -335,19 +345,20 @@ static void a_blow_goes_through_a_row(void **state)
     bt_world_free(w);
 }
 
-/// (margin: a power of two, which is not rounded up). Do the units of every tile, together, have the pairs that testing all with all finds, each once?
+/// (margin: a power of two, which is not rounded up). Do the contacts of every cell, together, have the pairs that
+/// testing all with all finds, each once?
 static void check_contacts(bt_world *w, double margin)
 {
     bt_manifold *want;
     bt_idx n_want;
     bt_contacts_detect_all(w, margin);
     bt_contacts_brute_force(w, margin, &want, &n_want);
-    assert_int_equal(w->tiles->n_units, n_want);
+    assert_int_equal(w->cells->n_contacts, n_want);
     const bt_gid *gid = w->bodies.gid;
     uint64_t sum = 0, sum_want = 0;
-    for (bt_idx k = 0; k < w->tiles->n; k++)
-        for (bt_idx j = 0; j < w->tiles->tile[k].n_units; j++) {
-            const bt_unit *u = &w->tiles->tile[k].units[j];
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {
+            const bt_contact *u = &w->cells->cell[k].contacts[j];
             sum += (uint64_t)(gid[u->a] + 1) * (uint64_t)(gid[u->b] + 7) * (uint64_t)(gid[u->b] + 3);
         }
     for (bt_idx k = 0; k < n_want; k++)
@@ -356,27 +367,30 @@ static void check_contacts(bt_world *w, double margin)
     free(want);
 }
 
-// Red: three tiles around a period (two of one colour meet at the seam), two (a block that holds a tile twice), wrong nearest tile.
-static void few_tiles_around_a_period(void **state)
+// Red: three cells around a period (two of one colour meet at the seam), two (a block that holds a cell twice), wrong
+// nearest cell.
+static void few_cells_around_a_period(void **state)
 {
     (void)state;
     uint64_t seed = 11;
-    for (int around = 1; around <= 5; around++) { // periods of room for 1 to 5 tiles of 4 m
+    for (int around = 1; around <= 5; around++) { // periods of room for 1 to 5 cells of 4 m
         for (int both = 0; both < 2; both++) {
             bt_params p = calm_params();
-            p.tile = 4;
+            p.cell = 4;
             p.period_x = 4.2 * around;
             p.period_y = both ? 4.2 * around : 0;
             bt_world *w = bt_world_create(&p);
             add_field(w, 0.3, 0.3, (int)p.period_x, both ? (int)p.period_y : 12, 0, 0);
             for (bt_idx i = 0; i < w->bodies.n; i++) {
-                w->bodies.vel[i] = (bt_vel){.x = scene_uniform(&seed) - 0.2, .y = scene_uniform(&seed) - (both ? 0.8 : 0.5), .w = scene_uniform(&seed) - 0.5};
+                w->bodies.vel[i] = (bt_vel){.x = scene_uniform(&seed) - 0.2,
+                                            .y = scene_uniform(&seed) - (both ? 0.8 : 0.5),
+                                            .w = scene_uniform(&seed) - 0.5};
                 w->bodies.drag[i] = (bt_drag){0};
             }
-            bt_tiles_begin(w);
+            bt_cells_begin(w);
             const int want = around < 4 ? 1 : 4;
-            assert_int_equal(w->tiles->wrap_x, want);
-            assert_int_equal(w->tiles->wrap_y, both ? want : 0);
+            assert_int_equal(w->cells->wrap_x, want);
+            assert_int_equal(w->cells->wrap_y, both ? want : 0);
             double before[2] = {0, 0}, after[2] = {0, 0};
             for (bt_idx i = 0; i < w->bodies.n; i++) before[0] += w->bodies.vel[i].x, before[1] += w->bodies.vel[i].y;
             double overlap = 0;
@@ -384,7 +398,8 @@ static void few_tiles_around_a_period(void **state)
                 bt_world_step(w);
                 overlap = bt_max(overlap, w->stats.overlap);
                 assert_false(w->stats.outrun);
-                for (bt_idx i = 0; i < w->bodies.n; i++) assert_true(w->bodies.pose[i].x >= 0 && w->bodies.pose[i].x < p.period_x);
+                for (bt_idx i = 0; i < w->bodies.n; i++)
+                    assert_true(w->bodies.pose[i].x >= 0 && w->bodies.pose[i].x < p.period_x);
             }
             for (bt_idx i = 0; i < w->bodies.n; i++) after[0] += w->bodies.vel[i].x, after[1] += w->bodies.vel[i].y;
             CHECK_CLOSE(after[0], before[0], 1e-9);
@@ -396,13 +411,13 @@ static void few_tiles_around_a_period(void **state)
     }
 }
 
-// Red: tiles made for the mean size, so that a large floe touches others beyond its block.
+// Red: cells made for the mean size, so that a large floe touches others beyond its block.
 static void floes_of_very_different_size(void **state)
 {
     (void)state;
     uint64_t seed = 5;
     bt_params p = calm_params();
-    p.tile = 2;
+    p.cell = 2;
     bt_world *w = bt_world_create(&p);
     double v[2 * BT_MAX_VERTICES];
     for (int k = 0; k < 300; k++) {
@@ -414,27 +429,28 @@ static void floes_of_very_different_size(void **state)
         bt_world_add(w, &d);
     }
     check_contacts(w, 0.0625); // they overlap at random: only the pairs matter here
-    assert_true(w->tiles->side_x > 2 * w->tiles->reach && w->tiles->reach > 3);
-    // A margin beyond what the tiles were made for makes larger ones.
-    const double side = w->tiles->side_x;
+    assert_true(w->cells->side_x > 2 * w->cells->reach && w->cells->reach > 3);
+    // A margin beyond what the cells were made for makes larger ones.
+    const double side = w->cells->side_x;
     check_contacts(w, 4);
-    assert_true(w->tiles->side_x > side);
+    assert_true(w->cells->side_x > side);
     for (int n = 0; n < 20; n++) bt_world_step(w);
     check_contacts(w, 0.25);
-    bt_tiles_begin(w);
-    check_tiles(w);
+    bt_cells_begin(w);
+    check_cells(w);
     bt_world_free(w);
 }
 
-// Red: a row of tiles that does not fit into its integer (found by fuzzing a checkpoint): undefined, and on x86 the whole field.
-static void a_body_far_away_covers_no_tile(void **state)
+// Red: a row of cells that does not fit into its integer (found by fuzzing a checkpoint): undefined, and on x86 the
+// whole field.
+static void a_body_far_away_covers_no_cell(void **state)
 {
     (void)state;
     bt_params p = calm_params();
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 5, 5, 0, 0);
     const bt_gid berg = add_hitter(w, 2, 10, 2, 0, 0, BT_DYNAMIC, true);
-    bt_tiles_begin(w);
+    bt_cells_begin(w);
     const bt_idx i = bt_world_index(w, berg);
     static const double far[] = {1e6, 3e10, 1e14, 1e300};
     for (size_t k = 0; k < sizeof far / sizeof *far; k++)
@@ -442,16 +458,17 @@ static void a_body_far_away_covers_no_tile(void **state)
             const double at = direction & 1 ? far[k] : -far[k];
             w->bodies.pose[i].x = direction & 2 ? 2 : at;
             w->bodies.pose[i].y = direction & 2 ? at : 2;
-            const bt_tile_range r = bt_pairs_range(w, i, 1);
+            const bt_cell_range r = bt_pairs_range(w, i, 1);
             assert_true(r.x0 > r.x1 || r.y0 > r.y1);
         }
     w->bodies.pose[i].x = w->bodies.pose[i].y = 2;
-    const bt_tile_range r = bt_pairs_range(w, i, 1);
+    const bt_cell_range r = bt_pairs_range(w, i, 1);
     assert_true(r.x0 <= 0 && r.x1 >= 0 && r.y0 <= 0 && r.y1 >= 0);
     bt_world_free(w);
 }
 
-// Red: rows for every tile around the period, of nanometres, where there is no floe (found by fuzzing: 2 GB and a minute).
+// Red: rows for every cell around the period, of nanometres, where there is no floe (found by fuzzing: 2 GB and a
+// minute).
 static void no_floes_need_no_rows(void **state)
 {
     (void)state;
@@ -465,7 +482,7 @@ static void no_floes_need_no_rows(void **state)
     getrusage(RUSAGE_SELF, &before);
     bt_world_step(w);
     getrusage(RUSAGE_SELF, &after);
-    assert_true(w->tiles->wrap_y > 1000000);
+    assert_true(w->cells->wrap_y > 1000000);
     assert_in_range(after.ru_maxrss - before.ru_maxrss, 0, 200000); // kB
     bt_world_free(w);
 }
@@ -475,13 +492,13 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(labels_follow_the_floes),
         cmocka_unit_test(rest_costs_nothing_and_ends),
-        cmocka_unit_test(a_step_looks_at_busy_tiles_alone),
+        cmocka_unit_test(a_step_looks_at_busy_cells_alone),
         cmocka_unit_test(uniform_current_is_a_moving_frame),
         cmocka_unit_test(old_displacements_are_forgotten),
         cmocka_unit_test(a_blow_goes_through_a_row),
-        cmocka_unit_test(few_tiles_around_a_period),
+        cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
-        cmocka_unit_test(a_body_far_away_covers_no_tile),
+        cmocka_unit_test(a_body_far_away_covers_no_cell),
         cmocka_unit_test(no_floes_need_no_rows),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

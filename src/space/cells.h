@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+// Cells: the division of space that orders the contacts, colours them, and is dealt to threads and ranks.
+//
+// Space is cut into square cells, some floe diameters wide. A floe carries the coordinates (tx, ty) of the cell that
+// its centroid was in when labels were last renewed. A contact of bodies a and b belongs to cell
+//     T = (min(tx_a, tx_b), min(ty_a, ty_b)),
+// so T touches only bodies of the 2×2 block {T, T+x, T+y, T+xy}, provided that bodies within reach of each other are in
+// adjacent cells. This holds while side >= 2 r + margin + 2 a: r the largest radius, a how far a centroid may stand
+// outside its cell. When some floe stands farther out, all labels are renewed (and floes sorted, and moved to their
+// ranks).
+//
+// Cells whose coordinates have the same parity touch disjoint blocks: four colours, always, whatever the contacts.
+// A Gauss–Seidel sweep goes through the colours; the cells of a colour are done at once by threads and ranks, the
+// contacts of a cell one after the other, in an order that follows from gids. So the sequence of updates as any body
+// sees it is the same for every division among threads and ranks. Why not a colouring of the contact graph (first
+// tried): 8 to 12 colours and as many barriers and exchanges a sweep, tail colours of a few contacts, rows of one
+// colour scattered over all memory, and colours that depend on each other through all ranks. A cell's floes and rows
+// stay in the first-level cache while it is swept, may be swept more than once at that price, and its partial sums are
+// formed in a fixed order.
+//
+// Contacts with a large movable body (the berg on a line has hundreds) belong to one last cell, done in sequence after
+// the four colours by the one rank that owns the large bodies; its bodies, and large bodies of infinite mass, are on
+// every rank.
+//
+// Rest. A cell T is idle, and costs nothing, when every floe in its block and in a ring of cells around it has exactly
+// the velocity of the water, there is no other force (bt_forces_rest), no large body that moves is near, and the
+// position projection moved nothing there in the last step. So a floe costs nothing until it is touched; one that was
+// touched slows down by its quadratic drag and never comes quite to rest. The ring is there because contacts hand
+// motion on within a step; what goes farther still is caught after the solve (step.c).
+//
+// A step goes over the list of busy cells alone: those that are not at rest, those that are not idle, and those whose
+// bodies may be moved by a contact that was found. Cells enter the list where they are woken (something moves near,
+// forces have changed, labels are new) and leave it when they are none of these. Everything in the others is as it was,
+// and their part of every sum is zero. Floes that drift with moving water are moved in every step: then all cells are
+// busy.
+#ifndef BERGTOW_CELLS_H
+#define BERGTOW_CELLS_H
+
+#include <stdint.h>
+
+#include "bergtow/sum.h"
+#include "bergtow/world.h"
+
+/// the fifth phase is the cell of the large movable bodies
+enum { BT_COLOURS = 4, BT_PHASES = 5, BT_STRETCHES = 2 * BT_PHASES };
+
+/// A pair near enough to be looked at, and what its contact was in the last step.
+typedef struct bt_pair {
+    bt_idx a, b;         ///< gid[a] < gid[b]
+    uint16_t part[2];    ///< of a and of b (bt_part_first, _next); 0 unless not convex
+    int32_t axis;        ///< edge that separated them last: of a when < n_a, else of b; −1 = unknown
+    int32_t n_points;    ///< contact points in the last solution
+    uint32_t feature[2]; ///< of those
+    double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
+    /// gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
+    double reach;
+} bt_pair;
+
+/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line
+/// along the tangent, so both have the same tangential row.
+typedef struct bt_contact {
+    bt_idx a, b;
+    double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
+    double ran[2], rbn[2]; ///< ra×n, rb×n of each point, m
+    double rat, rbt;       ///< ra×t, rb×t, m
+    double w[2], w12;      ///< W of the normals and their coupling, 1/kg
+    double mn[2];          ///< 1/W, kg; 0 for the second of one point
+    double per_det;        ///< 1/(W1 W2 − W12²), kg²; 0 when singular or one point
+    double wt, mt;         ///< W of the tangent and its inverse
+    double bias[2];        ///< b of the normals, m/s
+    double mu;
+    double ln[2], lt;      ///< impulse on b, N s
+    int32_t n, spare;      ///< points, 1 or 2; 0: sheets, whose impulse along x is ln[0], along y lt (contact/raft.h)
+} bt_contact;
+_Static_assert(sizeof(bt_contact) == 192, "three cache lines");
+
+/// What the sweep does not see of it.
+typedef struct bt_gaps {
+    double gap[2];         ///< m
+    double after[2];       ///< gaps that U2 leaves at the end of the step, m
+    double push[2];        ///< multipliers of the position projection, kg m
+    int32_t pair;          ///< its pair in the cell
+} bt_gaps;
+
+/// What a contact law remembers of a pair, by the names that last: state of the world (contact/law.h).
+typedef struct bt_memory {
+    bt_gid a, b;
+    uint16_t part[2];    ///< as in bt_pair
+    int32_t n_points;
+    uint32_t feature[2]; ///< of the points
+    double value[4];     ///< rigid: impulses as in bt_pair (ln, lt), N s; of other laws: see there
+    uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
+} bt_memory;
+
+typedef struct bt_cell {
+    int32_t x, y;                   ///< coordinates
+    bt_idx first, end;              ///< its bodies in storage
+    bt_idx right, above, diagonal;  ///< cells +x, +y, +xy: index, −1 = none
+    bool own;                       ///< this rank solves its contacts and answers for its bodies
+    bool border;                    ///< some body of its block is held by other ranks too
+    int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
+    bool active;                    ///< its contacts are looked at in this step
+    double margin;                  ///< m, of this step's detection
+    // pair list
+    bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b, parts)
+    bt_idx n_pairs, cap_pairs;
+    bool listed;                    ///< the list is valid for margin_listed
+    double margin_listed;           ///< m
+    double moved_listed[4], large_listed; ///< what had moved when the list was made, see pairs.c
+    /// [n_near] ascending: pairs that may come within the margin soon; of others nothing need be looked at
+    bt_idx *near;
+    bt_idx n_near, cap_near;
+    bool near_known;                ///< they are those of the list
+    double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
+    // contacts of this step
+    bt_contact *contacts;                 ///< [n_contacts]
+    bt_gaps *gaps;                  ///< [n_contacts] of the contacts
+    bt_idx n_contacts, cap_contacts;
+    int64_t n_points;
+    double overlap;                 ///< deepest, m
+    // contact laws (contact/law.h)
+    struct bt_limit *limits;        ///< [n_contacts] bounds of the contacts; NULL where contacts are rigid
+    /// [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
+    bt_memory *memory;
+    bt_idx cap_limits, n_memory, cap_memory;
+    bool rising;                    ///< some bounds have a rising part
+    // contacts that are swept (src/solve/rounds.h)
+    bt_idx *list;                   ///< [n_list] ascending
+    double (*before)[3];            ///< [n_contacts] unknowns before the last sweep
+    bt_idx n_list, cap_list;
+    struct bt_batch *batch;         ///< [n_batches] the listed contacts again (src/solve/batch.h)
+    bt_idx n_batches, cap_batches;
+    bool packed;                    ///< their impulses are there, and not in the contacts
+    int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
+    bool bad;                       ///< some contact is not yet near the tolerance
+    bool kept;                      ///< swept in a round over a part of the field
+    bool still;                     ///< they could not in the round before: nothing of theirs moves on
+    bool swept;                     ///< listed contacts, here or on another rank, may move its bodies
+} bt_cell;
+
+/// What one thread is to do of one stretch of the order (src/space/phases.h).
+typedef struct bt_share {
+    _Atomic bt_idx next;            ///< the next cell to be taken, a place in the order
+    bt_idx begin, end;
+    char apart[64 - 3 * sizeof(bt_idx)]; ///< a cache line each
+} bt_share;
+
+enum { BT_FEW_CELLS = 64 }; ///< fewer are done by one thread: a team costs microseconds
+
+enum { BT_AWAKE, BT_ASLEEP_NEW, BT_ASLEEP }; ///< at rest since the last step; and forces have been told
+
+typedef struct bt_cells {
+    bool labelled;                  ///< labels and storage order are valid
+    double x0, y0;                  ///< corner of cell (0, 0) m, moving with the water
+    double side_x, side_y;          ///< m
+    double allowance;               ///< m, how far a centroid may stand outside its cell
+    double reach;                   ///< largest radius of a floe in a cell, over all ranks, m
+    double heaviest;                ///< largest mass, kg
+    bool rebounds;                  ///< some body has a restitution
+    double margin_max;              ///< largest margin that these cells allow, m
+    int32_t low_x, low_y, n_x, n_y; ///< the box of cells that hold floes
+    /// cells around a periodic direction, 0 = open; 1 = one cell, its own neighbour nowhere
+    int32_t wrap_x, wrap_y;
+    bt_cell *cell;                  ///< [n] last: the large bodies
+    bt_idx n, cap;
+    bt_idx *at;                     ///< [n_y][n_x] index of a cell, −1 = not on this rank
+    int64_t cap_at;
+    bt_idx n_in_cells;                 ///< bodies in cells: storage [0, n_in_cells); large and everywhere after them
+    // every step
+    /// [n] largest speed of the cell's bodies through the water's frame, m/s; 0 = all at rest
+    double *speed;
+    double *bound;                  ///< [n] speed that the margin of cell T is made for, m/s
+    double *moved;                  ///< [n] path length that no body of the cell exceeds, m; grows only
+    double moved_any;               ///< the same for any body in a cell
+    /// [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
+    uint8_t *asleep;
+    uint8_t *awake;                 ///< [n] contacts of this step may move the cell's bodies
+    bt_idx *busy;                   ///< [n_busy] cells that a step looks at, ascending; the last cell is always one
+    bt_idx n_busy;
+    uint8_t *is_busy;               ///< [n]
+    bool busy_sorted;
+    /// [n_order] cells of this rank with work, by phase, in each those at the border of the rank first
+    bt_idx *order;
+    bt_idx n_order;
+    bt_idx start[BT_PHASES + 1];    ///< first cell of each phase in the order
+    bt_idx n_border[BT_PHASES];     ///< cells at the border among those of each phase
+    bt_share *share;                ///< [BT_STRETCHES][n_shares] at the border and not, of every phase
+    bt_idx n_shares, cap_shares;    ///< threads
+    bt_idx n_contacts;                 ///< on this rank
+    bool relabel;                   ///< some floe stands too far outside its cell: renew before the next step
+    bool still;                     ///< the water is at rest
+    int64_t n_labellings, n_listings;
+} bt_cells;
+
+bt_cells *bt_cells_create(void);
+void bt_cells_free(bt_cells *t);
+
+/// At the start of a step: renew labels, storage and cells if some floe has left its cell too far. Collective.
+void bt_cells_begin(bt_world *w);
+
+/// The same if the cells are too small for this margin, m. True when renewed: every index of a body has changed.
+/// Collective.
+bool bt_cells_update(bt_world *w, double margin);
+
+/// Cell k, or every cell, is looked at from now on.
+void bt_cells_wake(bt_cells *t, bt_idx k);
+void bt_cells_wake_all(bt_cells *t);
+/// The list of busy cells in its order, after some have been woken.
+void bt_cells_sort_busy(bt_cells *t);
+/// Leave out of the list what is at rest, idle, and not moved by contacts.
+void bt_cells_leave(bt_cells *t);
+
+/// How far the centroid of body i stands outside its cell, m.
+double bt_cells_outside(const bt_world *w, bt_idx i);
+
+/// Coordinates of the cell that owns the contacts between bodies of cells p and q.
+void bt_cells_owner(const bt_cells *t, const int32_t p[2], const int32_t q[2], int32_t out[2]);
+
+/// Are cells p and q the same or side by side, around periods too?
+bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]);
+
+/// Index of the cell at (x, y), −1 = not here.
+bt_idx bt_cells_at(const bt_cells *t, int32_t x, int32_t y);
+
+/// May the bodies of cell k have another velocity, or pose, than by drifting with the water?
+static inline bool bt_cells_moves(const bt_cells *t, bt_idx k) { return !t->asleep[k] || t->awake[k]; }
+
+/// In the order of (a, b, part, law).
+int bt_memory_by_names(const void *p, const void *q);
+/// Append a record to the memory of a cell.
+void bt_cells_remember(bt_cell *t, const bt_memory *r);
+
+/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
+/// frees.
+bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
+/// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
+/// have been set, and the traces [n], which are released, are those of all ranks. A domain has been created, but
+/// nothing is dealt yet.
+void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n);
+/// Put traces, in any order, into the pair lists of empty cells.
+void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n);
+
+/// Cell that owns the contacts of bodies a and b, −1 = not here.
+bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b);
+
+#endif
