@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: MIT
 """Short scenes that use every mode and option, and digests of all that a run of each leaves: what holds a refactoring.
 
-    tests/scenes.py --compare OTHER [NAME...]   run the scenes with $BERGTOW and with another binary; print the first
-                                                difference of each item; exit code 1 if there is any
-    tests/scenes.py --record                    renew tests/parallel/scenes.json, after a change meant to move results
+    tests/scenes.py --compare OTHER [NAME...]   run the scenes with $BERGTOW, each in its layout, and with another
+                                                binary on one thread; prints the earliest differences; exit code 1
+                                                if there are any
+    tests/scenes.py --record [NAME...]          renew the scenes named, or all, in tests/parallel/scenes.json, after
+                                                a change that is meant to move results, or for a new scene
 
-Every scene has a layout of its own (ranks, threads, resumed or not), so that the set holds the layouts against each
-other, too. Digests depend on the elementary functions of libm and on the compiler: scenes.json names both, see
-fingerprint().
+Digests depend on the elementary functions of libm and on the compiler: scenes.json holds a fingerprint() of both.
 """
 import argparse
 import hashlib
@@ -16,6 +16,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -23,27 +24,27 @@ import tempfile
 import h5py
 import numpy as np
 
-from harness import BERGTOW, PRESS, ROOT, TOW, changed, environment, write_case
+from harness import BERGTOW, CLOSING, PRESS, ROOT, TOW, changed, environment, write_case
 
 STORED = ROOT / "tests/parallel/scenes.json"
 
-#: ranks, threads, step after which the run is stopped and resumed (0: not)
-LAYOUTS = [(1, 1, 0), (1, 2, 0), (2, 1, 0), (1, 1, 13), (3, 1, 0), (2, 2, 9)]
+#: (ranks, threads) of each leg of a run: after a leg it is stopped, and the next resumes it
+LAYOUTS = [((1, 1),), ((1, 2),), ((2, 1),), ((1, 1), (1, 2)), ((3, 1),), ((2, 2), (3, 1))]
 
-#: seconds that a scene may take, mpirun on a busy machine included
+#: seconds that a leg may take, mpirun on a busy machine included
 PATIENCE = 180
 
-#: summary keys that depend on the machine, the clock or the layout
-VOLATILE = {
-    "version", "revision", "compiler", "flags", "ranks", "threads", "wall_time_s", "time_by_phase", "command_line",
-    "folder", "memory_bytes", "hostname", "date", "ns_per_floe_step", "phases_s", "dealt_imbalance", "divisions",
-    "edge_cut", "halo_share", "imbalance", "moved_floes", "worst_imbalance", "worst_dealt_imbalance"
-}
+#: keys of the summary and attributes of result.h5 that depend on machine, clock or layout: they must be there
+VOLATILE = {"version", "ranks", "threads", "sweep_bytes_per_contact",
+            "wall_time_s", "phases_s", "ns_per_floe_step", "memory_per_floe_b",
+            "divisions", "moved_floes", "imbalance", "worst_imbalance", "dealt_imbalance", "worst_dealt_imbalance",
+            "edge_cut", "halo_share", "command_line", "compiler", "flags", "host", "libraries", "revision",
+            "start_time", "wall_time"}
 
 SHORT = changed(TOW, run__duration=4)
 DENSE = changed(TOW, run__duration=4, ice__concentration=0.75, ice__size=0.9)
 LINE = changed(SHORT, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4)
-SHIP = {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 3}
+SHIP = {"mass": 800, "bollard_pull": 600, "free_speed": 3, "lookahead": 2}
 GEO = {
     "run": {"dt": 0.1, "duration": 5},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic", "ahead": 14},
@@ -54,49 +55,46 @@ GEO = {
 }
 SQUARES = [{"shape": "square", "length": 0.8, "x": 6 + 0.95 * (k % 6), "y": -2 + 0.95 * (k // 6), "yaw": k % 5,
             "thickness": 0.03 + 0.001 * k} for k in range(24)]
+SHAPES = [{"shape": "disc", "length": 1.1, "x": 5.5, "y": 0.1, "yaw": 50, "vx": -0.37, "vy": -0.11, "yaw_rate": 7},
+          {"shape": "polygon", "vertices": [[0, 0], [1.7, 0], [1, 1.3]], "x": 7, "y": 0.3, "yaw": 31},
+          {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 8.6, "y": 0, "yaw": 80, "vx": -0.5, "vy": 0},
+          {"shape": "ship", "length": 2, "width": 0.7, "x": 5.5, "y": 1.8, "yaw": -50, "vx": 0.1, "vy": -0.5},
+          {"shape": "square", "length": 0.9, "x": 6, "y": -1.6, "yaw": 10, "vx": 0, "vy": 0.3, "yaw_rate": -40}]
+GEO_THRUST = {"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000}
+ORIGIN = {"origin_lon": 18.3, "origin_lat": 76.2}
+PLANE = {"origin_east": 560123.5, "origin_north": 8490321.25}
+DRAG = {"water_form": 0.7, "water_skin": 0.004, "air_form": 0.5, "air_skin": 0.003}
 
 SCENES = {
     "speed": SHORT,
     "speed_dense": DENSE,
-    "speed_direction": changed(SHORT,
-                               tow__direction=25,
-                               body__shape="ship",
-                               body__length=2,
-                               body__width=0.8,
+    "speed_direction": changed(SHORT, tow__direction=25, body__shape="ship", body__length=2, body__width=0.8,
                                body__yaw=10),
-    "speed_programme": changed(SHORT,
-                               tow__ramp=None,
-                               tow__speed=None,
+    "speed_programme": changed(SHORT, tow__ramp=None, tow__speed=None,
                                tow__programme=[[0, 0], [1, 0.4], [3, 0.1], [4, 0.3]]),
-    "speed_waypoints": changed(SHORT,
-                               tow__speed=0.8,
-                               tow__waypoints=[[4, 1], [7, -1]],
-                               tow__turn_radius=0.8,
+    "speed_waypoints": changed(SHORT, tow__speed=0.8, tow__waypoints=[[4, 1], [7, -1]], tow__turn_radius=0.8,
                                tow__ramp=0.2),
     "free_drift": changed(SHORT, tow={"mode": "none"}, body__vx=0.2, body__vy=-0.1, body__yaw_rate=20),
-    "free_drift_start": changed(GEO,
-                                tow={"mode": "none"},
-                                domain__ends="periodic",
-                                domain__ahead=None,
-                                air__wind_x=5,
-                                water__current_y=0.1,
-                                ice__start="drift"),
+    "free_drift_start": changed(GEO, tow={"mode": "none"}, domain__ends="periodic", domain__ahead=None,
+                                air__wind_x=5, water__current_y=0.1, ice__start="drift"),
     "rest_start": changed(GEO, ice__start="rest", air__wind_x=5, water__current_y=0.1),
     "line": changed(LINE, tow__speed=0.6, tow__ramp=0.5),
-    "line_bridle_breaks": changed(LINE,
-                                  tow__speed=0.9,
-                                  tow__ramp=0.2,
-                                  tow__line={"branches": 2, "breaking_load": 0},
+    "line_bridle_breaks": changed(LINE, tow__speed=0.9, tow__ramp=0.2, tow__line={"branches": 2, "breaking_load": 0},
                                   tow__branch2={"breaking_load": 20}),
+    "line_fastened": changed(LINE, tow__speed=0.6, tow__ramp=0.5, tow__line_damping=300, tow__hull_x=0.6,
+                             tow__hull_y=0.5),
+    "bridle_unequal": changed(LINE, tow__speed=0.6, tow__ramp=0.5, tow__line={"branches": 2},
+                              tow__branch2={"hull_x": 0.5, "hull_y": -0.8, "length": 2.8, "stiffness": 1500,
+                                            "damping": 50}),
     "line_named": changed(LINE, tow__line_stiffness=None, tow__line={"type": "polypropylene", "diameter": "8 mm"}),
     "thrust": changed(LINE, tow__mode="thrust", tow__speed=0.5, tow__vessel=SHIP),
-    "thrust_waypoints": changed(GEO,
-                                tow={
-                                    "mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000,
-                                    "waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3, "vessel": SHIP
-                                }),
+    "thrust_waypoints": changed(GEO, tow=GEO_THRUST | {"waypoints": [[12, 0], [30, 4], [90, 4]], "turn_radius": 3,
+                                                       "vessel": SHIP}),
+    "vessel_details": changed(GEO, tow=GEO_THRUST | {
+        "waypoints": [[5, 1], [8, 6], [40, 6]],
+        "vessel": SHIP | {"added_mass": 0.2, "free_resistance": 300, "lateral_drag": 8}}),
     "window": changed(GEO, run__duration=8, tow__speed=1.6),
-    "window_along_y": changed(GEO, tow__direction=0, ice__size_law="lognormal", ice__thickness_law="lognormal"),
+    "window_backwards": changed(GEO, tow__direction=180, ice__size_law="lognormal", ice__thickness_law="lognormal"),
     "current_and_wind": changed(SHORT, water__current_x=0.1, water__current_y=-0.05, air__wind_x=-6, air__wind_y=3),
     "tide": changed(GEO, water__tide={"major": 0.2, "minor": 0.05, "period": 12, "inclination": 30, "phase": 40}),
     "tables": changed(GEO, water__current_table="current.csv", air__wind_table="wind.csv"),
@@ -104,75 +102,71 @@ SCENES = {
     "tilt_dynamic": changed(GEO, water__tilt="dynamic", water__tide={"major": 0.2, "minor": 0.0, "period": 10}),
     "slope": changed(GEO, water__tilt="slope", water__slope_x=1e-5, water__slope_y=-2e-5),
     "walls_closing": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16),
-    "periodic_dense": changed(PRESS,
-                              run__duration=1.5,
-                              domain={"length": 20, "width": 16, "ends": "open", "sides": "periodic"},
-                              water__current_x=0.1),
+    "periodic_dense": changed(PRESS, run__duration=1.5, water__current_x=0.1, domain={
+        "length": 20, "width": 16, "ends": "open", "sides": "periodic"}),
     "open_sides": changed(DENSE, domain__sides="open", domain__ends="open", water__current_y=0.1),
     "plain_sweeps": changed(DENSE, solver__plain=True, solver__max_sweeps=60),
     "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
-    "few_sweeps": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16, solver__max_sweeps=3),
-    "restitution": changed(DENSE,
-                           ice__restitution=0.4,
-                           body__restitution=0.2,
-                           domain__wall_restitution=0.3,
+    "few_sweeps": changed(CLOSING, run__duration=1.5),
+    "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "turn_rows": 50, "slop": 5e-3,
+                                              "position_sweeps": 1, "rest_speed": 0.05},
+                               ice__restitution=0.4, tow__speed=0.5),
+    "guards_wide": changed(CLOSING, run__duration=2, guard={"overlap": 2, "energy": 0, "unconverged": 0,
+                                                            "escape": False}),
+    "restitution": changed(DENSE, ice__restitution=0.4, body__restitution=0.2, domain__wall_restitution=0.3,
                            tow__speed=0.5),
     "crushing": changed(DENSE, ice__crushing={"pressure": "2 kPa", "least_length": 0.5}, tow__speed=0.5),
-    "crushing_press": changed(PRESS,
-                              run__duration=1.5,
-                              domain__length=20,
-                              domain__width=16,
-                              ice__crushing__pressure="20 kPa"),
+    "crushing_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16,
+                              domain__wall_friction=0.4, ice__crushing__pressure="20 kPa"),
     "rafting": changed(DENSE, ice__rafting__kappa=6, ice__concentration=0.85, tow__speed=0.5),
-    "rafting_press": changed(PRESS,
-                             run__duration=1.5,
-                             domain__length=20,
-                             domain__width=16,
-                             ice__rafting__kappa=5,
-                             ice__thickness_law="lognormal",
-                             ice__crushing__pressure="200 Pa"),
-    "impacts_sine": changed(SHORT,
-                            tow__speed=0.6,
-                            impact__conversion="duration",
-                            output__panels=True,
+    "rafting_press": changed(PRESS, run__duration=1.5, domain__length=20, domain__width=16, ice__rafting__kappa=5,
+                             ice__thickness_law="lognormal", ice__crushing__pressure="200 Pa"),
+    "impacts_sine": changed(SHORT, tow__speed=0.6, impact__conversion="duration", output__panels=True,
                             impact__panels=12),
     "impacts_crushing": changed(SHORT, tow__speed=0.6, impact={"conversion": "crushing", "pressure": "20 kPa"}),
-    "lead_channel": changed(SHORT, lead={"mode": "channel", "width": 2.5}, tow__speed=0.4),
+    "impact_duration": changed(SHORT, tow__speed=0.6, impact={"duration": 0.02, "least_speed": 0.1}),
+    "impact_corner": changed(SHORT, tow__speed=0.6, impact={"conversion": "crushing", "corner_angle": 60}),
+    "lead_channel": changed(SHORT, lead={"mode": "channel", "width": 2.5, "length": 4}, tow__speed=0.4),
     "lead_managed": changed(SHORT, lead={"mode": "managed", "width": 3, "floe_size": 0.4}, run__dt=0.05,
                             tow__speed=0.4),
     "rectangles": changed(SHORT, ice__shape="rectangles", ice__aspect=1.6, ice__concentration=0.7),
-    "hexagons_power_law": changed(SHORT,
-                                  ice__shape="polygons",
-                                  ice__sides=6,
-                                  ice__size_law="power",
-                                  ice__size_min=0.4,
-                                  ice__size_max=1.6,
-                                  ice__concentration=0.4),
+    "pentagons_power_law": changed(SHORT, ice__shape="polygons", ice__sides=5, ice__size_law="power", ice__size_min=0.4,
+                                   ice__size_max=1.6, ice__concentration=0.4, ice__size_exponent=1.6),
+    "ice_region": changed(SHORT, domain__x0=-2, domain__y0=-3, ice=SHORT["ice"] | {
+        "x_min": 1, "x_max": 12, "y_min": -2.5, "y_max": 4, "seed": 77, "shake": 5, "size_spread": 0.4,
+        "thickness_law": "lognormal", "thickness_spread": 0.35}, body__y=0.5),
+    "drag_and_mass": changed(SHORT, ice__density=880, ice__added_mass=0.3, ice__added_inertia=0.2, ice__drag=DRAG,
+                             body=SHORT["body"] | {"sail": 0.2, "density": 850, "added_mass": 0.7, "added_inertia": 0.3,
+                                                   "friction": 0.1, "drag": DRAG},
+                             tow={"mode": "none"}, water={"density": 1015, "current_x": 0.1},
+                             air={"density": 1.4, "wind_x": 6, "wind_y": -4}, ice__start="rest", body__vx=0.4,
+                             body__yaw_rate=30),
     "floes_by_hand": changed(SHORT, ice__concentration=0, floes=SQUARES, tow__speed=0.5),
-    "one_fixed_floe": changed(SHORT,
-                              ice__concentration=0.3,
-                              floes=[{"shape": "disc", "length": 2, "x": 10, "y": 1, "fixed": True, "thickness": 0.1}],
-                              tow__speed=1),
-    "heavy_body_against_wall": changed(LINE,
-                                       body__x=10,
-                                       body__mass=2e4,
-                                       tow__speed=0.5,
-                                       tow__ramp=0.2,
+    "floes_of_each_shape": changed(SHORT, ice__concentration=0, floes=SHAPES, tow__speed=0.6),
+    "one_fixed_floe": changed(SHORT, ice__concentration=0.3, floes=[{"shape": "disc", "length": 2, "x": 10, "y": 1,
+                                                                   "fixed": True, "thickness": 0.1}], tow__speed=1),
+    "heavy_body_against_wall": changed(LINE, body__x=10, body__mass=2e4, tow__speed=0.5, tow__ramp=0.2,
                                        ice__concentration=0.6),
     "body_in_parts_outlines": changed(SHORT, ice={"friction": 0.3, "outlines": "bays.geojson", "nonconvex": "split"}),
-    "outlines_hull": changed(SHORT,
-                             ice={"friction": 0.2, "outlines": "bays.geojson", "nonconvex": "hull"},
+    "outlines_hull": changed(SHORT, ice={"friction": 0.2, "outlines": "bays.geojson", "nonconvex": "hull"},
                              tow__speed=0.4),
+    "outlines_degrees": changed(SHORT, ice={"outlines": "degrees.geojson", "outlines_crs": "lonlat",
+                                            "nonconvex": "split", **ORIGIN}, tow__speed=0.4),
+    "outlines_plane": changed(SHORT, ice={"outlines": "plane.geojson", "outlines_crs": "plane", "nonconvex": "split",
+                                          **PLANE}, tow__speed=0.4),
+    "outlines_frame": changed(SHORT, domain={"length": 15, "width": 8, "x0": 0, "y0": -4, "frame": "geographic"}, ice={
+        "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
+    "outlines_metres": changed(SHORT, ice={"outlines": "frame.geojson", "outlines_crs": "metres", "nonconvex": "hull"}),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
-    "square_body": changed(SHORT,
-                           body__shape="square",
-                           body__yaw=20,
+    "output_settings": changed(SHORT, run__title="samples of three steps", output={
+        "sample_every": 3, "window_start": 1, "frame_interval": 0.7, "checkpoint_steps": 7, "checkpoint_wall": 1}),
+    "estimates": changed(SHORT, tow__speed=0.4, reference={"mean_force": 30, "source": "assumed"}, estimate={
+        "p_star": 3e4, "p_s": 1e4, "c_si": 0.8, "kappa": 9, "kappa_low": 4, "kappa_high": 15, "phi_j": 0.85,
+        "length_scale": 20}),
+    "square_body": changed(SHORT, body__shape="square", body__yaw=20,
                            impact={"conversion": "crushing", "corner": "real"}),
     "rectangle_body": changed(SHORT, body__shape="rectangle", body__width=1.2, impact__conversion="none"),
-    "polygon_body": changed(SHORT,
-                            body__shape="polygon",
-                            body__length=None,
-                            tow__speed=0.3,
+    "polygon_body": changed(SHORT, body__shape="polygon", body__length=None, tow__speed=0.3,
                             body__vertices=[[1, -0.6], [1.2, 0.2], [0, 0.9], [-1, 0.4], [-0.8, -0.7]]),
     "steel_wire": changed(LINE, tow__line_stiffness=None, tow__line={"type": "steel-wire", "diameter": "4 mm"}),
     "dyneema": changed(LINE, tow__line_stiffness=None, tow__line={"type": "dyneema", "diameter": "4 mm"}),
@@ -180,19 +174,42 @@ SCENES = {
 }
 
 
-def layout_of(name):
-    return LAYOUTS[list(SCENES).index(name) % len(LAYOUTS)]
+def layouts_of(name):
+    """The layout that is recorded, and another one; over the scenes each meets each."""
+    k, n = list(SCENES).index(name), len(LAYOUTS)
+    return LAYOUTS[k % n], LAYOUTS[(k + 1 + k // n % (n - 1)) % n]
 
 
-def command(binary, ranks, *arguments):
-    start = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    return [*start, str(binary), *map(str, arguments)]
+class Failed(Exception):
+    """A program did not end with exit code 0."""
 
 
-def started(line, folder):
+def started(binary, ranks, folder, *arguments):
+    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
-    done = subprocess.run(line, cwd=folder, env=env, capture_output=True, text=True, timeout=PATIENCE)
-    return done.returncode, done.stdout + done.stderr
+    done = subprocess.run([*mpi, str(binary), *map(str, arguments)], cwd=folder, env=env, capture_output=True,
+                          text=True, timeout=PATIENCE)
+    if done.returncode != 0:
+        raise Failed(f"{' '.join(done.args)}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+
+
+def draw_outlines(folder, name, binary):
+    """The field of a small case as GeoJSON whose shores are drawn in towards the middle."""
+    ice = {"concentration": 0.45, **(ORIGIN if name == "degrees.geojson" else {})}
+    write_case(folder, changed(SHORT, ice=SHORT["ice"] | ice), "grounds.yml")
+    started(binary, 1, folder, "field", "grounds.yml", "-o", name)
+    drawn = json.loads((folder / name).read_text())
+    east, north = (PLANE["origin_east"], PLANE["origin_north"]) if name == "plane.geojson" else (0, 0)
+    if name != "bays.geojson":
+        drawn.pop("crs", None)
+    for k, feature in enumerate(drawn["features"]):
+        ring = [(x + east, y + north) for x, y in feature["geometry"]["coordinates"][0][:-1]]
+        middle, out = [sum(c) / len(ring) for c in zip(*ring)], []
+        for i, (p, q) in enumerate(zip(ring, ring[1:] + ring[:1])):
+            bay = 1 - 0.03 * ((3 * k + 5 * i) % 8)
+            out += [list(p), [m + ((a + b) / 2 - m) * bay for a, b, m in zip(p, q, middle)]]
+        feature["geometry"]["coordinates"] = [out + out[:1]]
+    (folder / name).write_text(json.dumps(drawn))
 
 
 def prepare(folder, case, binary):
@@ -200,144 +217,173 @@ def prepare(folder, case, binary):
     write_case(folder, case)
     (folder / "current.csv").write_text("t,u,v\n0,0.05,0\n2,0.1,-0.05\n20,0,0.1\n")
     (folder / "wind.csv").write_text("t,u,v\n0,-3,1\n20,4,2\n")
-    ice = case.get("ice", {})
-    if "field" in ice or "outlines" in ice:
+    if "field" in case["ice"]:
         write_case(folder, changed(SHORT, ice__concentration=0.45), "grounds.yml")
-        for out in ("field.h5", "convex.geojson"):
-            code, said = started(command(binary, 1, "field", "grounds.yml", "-o", out), folder)
-            assert code == 0, said
-        drawn = json.loads((folder / "convex.geojson").read_text())
-        for k, feature in enumerate(drawn["features"]):
-            ring = np.array(feature["geometry"]["coordinates"][0][:-1])
-            middle, out = ring.mean(axis=0), []
-            for i, (p, q) in enumerate(zip(ring, np.roll(ring, -1, axis=0))):
-                out += [p, middle + ((p + q) / 2 - middle) * (1 - 0.03 * ((3 * k + 5 * i) % 8))]
-            feature["geometry"]["coordinates"] = [[list(p) for p in out + out[:1]]]
-        (folder / "bays.geojson").write_text(json.dumps(drawn))
+        started(binary, 1, folder, "field", "grounds.yml", "-o", case["ice"]["field"])
+    if "outlines" in case["ice"]:
+        draw_outlines(folder, case["ice"]["outlines"], binary)
 
 
 def run_scene(folder, name, layout, binary=BERGTOW):
-    """Run a scene in a layout; returns {item: bytes} of everything that it leaves."""
-    ranks, threads, stop = layout
+    """Run a scene in a layout; returns {item: value} of everything that it leaves."""
     folder.mkdir(parents=True, exist_ok=True)
-    prepare(folder, SCENES[name], binary)
-    extra = ["--steps", stop] if stop else []
-    code, said = started(
-        command(binary, ranks, "run", "case.yml", "-o", "out", "--threads", threads, "--quiet", *extra), folder)
-    assert code == 0, f"{name}: exit code {code}\n{said}"
-    if stop:
-        code, said = started(command(binary, ranks, "resume", "out", "--threads", threads, "--quiet"), folder)
-        assert code == 0, f"{name}: exit code {code} of resume\n{said}"
+    case = SCENES[name]
+    prepare(folder, case, binary)
+    steps = round(case["run"]["duration"] / case["run"]["dt"])
+    for leg, (ranks, threads) in enumerate(layout):
+        what = ["resume", "out"] if leg else ["run", "case.yml", "-o", "out"]
+        stop = ["--steps", steps * (leg + 1) // len(layout)] if leg + 1 < len(layout) else []
+        started(binary, ranks, folder, *what, "--threads", threads, "--quiet", *stop)
     return items_of(folder / "out")
 
 
+def leaves(path, value):
+    """(path, text) of all that a value of the summary holds: each key by itself, in a list of maps, too."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from leaves(f"{path}.{key}", inner)
+    elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
+        yield path, f"{len(value)} entries"
+        for key in dict.fromkeys(k for v in value for k in v):
+            yield f"{path}[].{key}", json.dumps([v.get(key) for v in value])
+    else:
+        yield path, json.dumps(value) if value != [] else "0 entries"
+
+
 def items_of(folder):
-    """Everything that a run has left as {item: bytes}; wall times, versions and the layout are left out."""
+    """Everything that a run has left as {item: array or text}; of what is volatile, only that it is there."""
     items = {}
 
+    def attributes(at, holder):
+        for key, value in holder.attrs.items():
+            if key != "description":
+                items[f"{at}@{key}"] = "there" if key in VOLATILE else repr(value)
+
     def take(name, item):
-        if isinstance(item, h5py.Dataset) and not name.startswith(("case", "provenance")):
-            value = item[()]
-            items["/" + name] = value.tobytes() if item.dtype.kind != "O" else repr(value).encode()
+        if isinstance(item, h5py.Group):
+            attributes("/" + name, item)
+        elif name.startswith("case"):
+            items["/" + name] = "there"
+        else:
+            items["/" + name] = repr(item[()].tolist()) if item.dtype.kind == "O" else np.asarray(item[()])
 
     with h5py.File(folder / "result.h5") as f:
+        attributes("/", f)
         f.visititems(take)
     for key, value in json.loads((folder / "summary.json").read_text()).items():
-        if key not in VOLATILE and "wall" not in key and "memory" not in key:
-            items["summary." + key] = json.dumps(value).encode()
+        items.update(leaves("summary." + key, "there" if key in VOLATILE else value))
     return items
+
+
+def raw(value):
+    return value.encode() if isinstance(value, str) else f"{value.dtype} {value.shape} ".encode() + value.tobytes()
+
+
+def differing(a, b):
+    """Items that are not in both, or not the same to the bit."""
+    return sorted(n for n in a.keys() | b.keys() if n not in a or n not in b or raw(a[n]) != raw(b[n]))
 
 
 def fingerprint(binary=BERGTOW):
     """What the bits depend on beside the program: elementary functions of libm on this processor, and the compiler."""
     h = hashlib.sha256()
-    for k in range(1, 2000):
-        x = k * 0.7310585786300049
-        for v in (math.sin(x), math.cos(x), math.exp(-x / 99), math.log(x), math.pow(x, 0.37), math.atan2(x, 3.3),
-                  math.hypot(x, 1.7)):
-            h.update(np.float64(v).tobytes())
-    said = subprocess.run([binary, "--version"], capture_output=True, text=True, check=True).stdout
-    h.update(said.partition(", ")[2].encode())  # bergtow 0.1.0 (REVISION, COMPILER)
+    for k in range(1, 20000):
+        x = k * 0.07310585786300049
+        h.update(np.array([math.sin(x), math.cos(x), math.tan(x), math.exp(-x / 99), math.log(x), math.log1p(x),
+                           math.log2(x), math.pow(x, 0.37), math.pow(2, -x / 99), math.atan2(x, 3.3),
+                           math.hypot(x, 1.7)]).tobytes())
+    h.update(version(binary).partition(", ")[2].encode())  # bergtow 0.1.0 (REVISION, COMPILER)
     return h.hexdigest()[:16]
 
 
-def groups(names):
-    """Items by what they belong to: each series and each number of the summary by itself, all frames as one, and so
-    on."""
-    found = {}
-    for name in sorted(names):
-        first = name.strip("/").split("/")[0]
-        found.setdefault(name if first == "series" or name.startswith("summary.") else "/" + first, []).append(name)
-    return found
-
-
-def digest(items, names):
-    h = hashlib.sha256()
-    for name in names:
-        h.update(name.encode() + b"\0" + items[name])
-    return h.hexdigest()[:8]
+def version(binary):
+    return subprocess.run([binary, "--version"], capture_output=True, text=True, check=True).stdout.strip()
 
 
 def digests(items):
-    return {group: digest(items, names) for group, names in groups(items).items()}
+    """{item: digest}; the frames of /xdmf are one item for each quantity."""
+    hashes = {}
+    for name in sorted(items):
+        h = hashes.setdefault(re.sub(r"/\d+(?=/)", "/*", name), hashlib.sha256())
+        h.update(name.encode() + b"\0" + raw(items[name]))
+    return {name: h.hexdigest()[:6] for name, h in hashes.items()}
+
+
+def stored():
+    """scenes.json as (fingerprint, binary of the last record of all scenes, {scene: {item: digest}})."""
+    j = json.loads(STORED.read_text())
+    return j["fingerprint"], j["recorded_with"], {
+        n: {i: d for i, d in zip(j["items"], s.split()) if d != "-"} for n, s in j["scenes"].items()}
+
+
+def store(binary, scenes):
+    # One line for each scene: the digests in the order of `items`, "-" for those that it has not.
+    items = sorted({i for s in scenes.values() for i in s})
+    lines = [f'  "{n}": "{" ".join(scenes[n].get(i, "-") for i in items)}"' for n in SCENES if n in scenes]
+    STORED.write_text(f'{{\n"fingerprint": "{fingerprint()}",\n"recorded_with": "{binary}",\n'
+                      f'"items": {json.dumps(items, indent=0)},\n"scenes": {{\n' + ",\n".join(lines) + "\n}\n}\n")
+
+
+def record(names):
+    mark, binary, scenes = stored() if names else (fingerprint(), version(BERGTOW), {})
+    if mark != fingerprint():
+        sys.exit(f"{STORED} was recorded with another libm or compiler: record all scenes, not some")
+    for name in names or SCENES:
+        with tempfile.TemporaryDirectory() as folder:
+            scenes[name] = digests(run_scene(pathlib.Path(folder), name, layouts_of(name)[0]))
+    store(binary, scenes)
 
 
 def first_difference(a, b):
-    x, y = (np.frombuffer(v, np.uint8) for v in (a, b))
-    if len(x) != len(y):
-        return f"{len(x)} and {len(y)} bytes"
-    at = int(np.flatnonzero(x != y)[0])
-    if len(x) % 8 == 0 and len(x) > 8:
-        p, q = np.frombuffer(a), np.frombuffer(b)
-        return f"number {at // 8}: {p[at // 8]!r} and {q[at // 8]!r}"
-    return f"{a[:120]!r} and {b[:120]!r}"
+    """(row, words): where two values of an item first differ, and what they are there, mine before theirs."""
+    if isinstance(a, str) or isinstance(b, str):
+        return math.inf, f"{a!s:.200} and {b!s:.200}"
+    if (a.dtype, a.shape) != (b.dtype, b.shape):
+        return -1, f"{a.dtype} {list(a.shape)} and {b.dtype} {list(b.shape)}"
+    p, q = (np.frombuffer(v.tobytes(), np.uint8).reshape(-1, v.itemsize) for v in (a, b))
+    at = np.unravel_index(int(np.flatnonzero((p != q).any(axis=1))[0]), a.shape)
+    return at[0] if at else 0, f"[{', '.join(map(str, at))}] {a[at].item()!r} and {b[at].item()!r}"
+
+
+def moved(mine, theirs):
+    """(what is new, what is gone or changed) in words; of the latter series come first, by row."""
+    apart = differing(mine, theirs)
+    found = [(False, -1, f"{n} is gone") for n in apart if n not in mine]
+    for n in set(apart) & mine.keys() & theirs.keys():
+        row, words = first_difference(mine[n], theirs[n])
+        found.append((not n.startswith("/series/"), row, f"{n} {words}"))
+    return [n for n in apart if n not in theirs], [words for *_, words in sorted(found)]
 
 
 def compare(other, names):
+    """How many scenes differ, or do not run with both binaries."""
     different = 0
     for name in names or SCENES:
+        layout = layouts_of(name)[0]
         with tempfile.TemporaryDirectory() as folder:
-            mine = run_scene(pathlib.Path(folder) / "a", name, layout_of(name))
-            theirs = run_scene(pathlib.Path(folder) / "b", name, (1, 1, 0), other)
-        found = []
-        for item in sorted(mine.keys() | theirs.keys()):
-            if item not in theirs:
-                print(f"{name}: {item} is new")
-            elif item not in mine:
-                found.append(f"{item} is gone")
-            elif mine[item] != theirs[item]:
-                found.append(f"{item}: {first_difference(mine[item], theirs[item])}")
-        print(f"{name} {layout_of(name)}: {'same' if not found else '; '.join(found[:6])}", flush=True)
+            try:
+                new, found = moved(run_scene(pathlib.Path(folder) / "mine", name, layout),
+                                   run_scene(pathlib.Path(folder) / "other", name, LAYOUTS[0], other))
+            except Failed as e:
+                new, found = [], [str(e)]
+        print(f"{name} {layout}: {f'{len(found)} items differ' if found else 'same'}"
+              + (f"; new: {', '.join(new)}" if new else ""))
+        print("".join(f"    {words}\n" for words in found[:6]), end="", flush=True)
         different += bool(found)
     return different
-
-
-def record():
-    scenes = {}
-    for name in SCENES:
-        with tempfile.TemporaryDirectory() as folder:
-            scenes[name] = digests(run_scene(pathlib.Path(folder), name, layout_of(name)))
-    common = sorted({g for s in scenes.values() for g in s})
-    # One line a scene: the digests in the order of `items`, "-" for those that it has not.
-    lines = [f'  "{n}": "{" ".join(s.get(g, "-") for g in common)}"' for n, s in scenes.items()]
-    STORED.write_text("{\n" +
-                      f'"fingerprint": "{fingerprint()}",\n"items": {json.dumps(common, indent=0)},\n"scenes": {{\n' +
-                      ",\n".join(lines) + "\n}\n}\n")
 
 
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("--record", action="store_true")
     p.add_argument("--compare", metavar="OTHER", type=os.path.abspath)
-    p.add_argument("names", nargs="*", choices=[*SCENES, []])
+    p.add_argument("names", metavar="NAME", nargs="*", choices=[*SCENES, []])
     o = p.parse_args()
-    if o.record:
-        record()
-    elif o.compare:
-        return 1 if compare(o.compare, o.names) else 0
-    else:
+    if o.record == bool(o.compare):
         p.error("--record or --compare OTHER")
-    return 0
+    if o.record:
+        record(o.names)
+    return 1 if o.compare and compare(o.compare, o.names) else 0
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Scenes with every mode and option leave what is stored of them, bit for bit, and the same in another layout.
 
-The digests in scenes.json hold for one libm and one compiler. Where this machine has others, the comparison is between
-two layouts alone, and a warning says so. `tests/scenes.py --compare OLD_BINARY` shows what has moved; after a change
-that is meant to move results, `tests/scenes.py --record` renews the file.
+The digests in scenes.json hold for one libm and one compiler. Where this machine has others, layouts are compared with
+each other alone, and a warning says so. `tests/scenes.py --compare OLD_BINARY` shows what has moved. What is new in the
+output, a series or a key of the summary, is let through; what is gone or changed is named.
 """
 import json
 import subprocess
@@ -14,48 +14,76 @@ import pytest
 import scenes
 from harness import BERGTOW, DONE
 
-STORED = json.loads(scenes.STORED.read_text())
-OTHER_LAYOUT = [(2, 1, 0), (3, 1, 0), (1, 2, 11), (1, 2, 0)]
+FINGERPRINT, RECORDED_WITH, STORED = scenes.stored()
+
+# Keys that no scene sets, and why.
+LEFT_OUT = {
+    "run.threads": "said by the layout", "output.progress": "what is printed while a run is on",
+}
 
 
-def stored(name):
-    return {g: d for g, d in zip(STORED["items"], STORED["scenes"][name].split(" ")) if d != "-"}
+@pytest.fixture(scope="module")
+def here():
+    return scenes.fingerprint()
 
 
 @pytest.mark.parametrize("name", scenes.SCENES)
-def test_scene_is_what_it_was(tmp_path, name):
-    items = scenes.run_scene(tmp_path / "own", name, scenes.layout_of(name))
-    if STORED["fingerprint"] == scenes.fingerprint():
-        want, found = stored(name), scenes.digests(items)
-        assert sorted(want.keys() - found.keys()) == [], "no longer there"
-        assert sorted(g for g in want if want[g] != found[g]) == [], "changed; tests/scenes.py --compare shows how"
+def test_scene_is_what_it_was(tmp_path, name, here):
+    first, second = scenes.layouts_of(name)
+    items = scenes.run_scene(tmp_path / "first", name, first)
+    other = scenes.run_scene(tmp_path / "second", name, second)
+    assert scenes.differing(items, other) == [], f"{first} and {second}, as (ranks, threads) of each leg, differ"
+    if here != FINGERPRINT:
+        warnings.warn(f"scenes.json, recorded with {RECORDED_WITH}, is of another libm, processor or compiler: "
+                      "layouts are compared with each other alone")
         return
-    warnings.warn("scenes.json is of another libm or compiler: layouts are compared with each other alone")
-    other = OTHER_LAYOUT[list(scenes.SCENES).index(name) % len(OTHER_LAYOUT)]
-    again = scenes.run_scene(tmp_path / "other", name, other)
-    assert sorted(k for k in items if items[k] != again.get(k)) == [], f"{scenes.layout_of(name)} and {other} differ"
+    assert name in STORED, f"nothing stored: tests/scenes.py --record {name}"
+    want, found = STORED[name], scenes.digests(items)
+    gone, moved = sorted(want.keys() - found.keys()), sorted(i for i in want if i in found and want[i] != found[i])
+    assert (gone, moved) == ([], []), f"gone: {gone}\nchanged: {moved}\ntests/scenes.py --compare shows how"
 
 
-def test_the_scenes_use_every_choice():
-    """Each value of each key with a choice is the default of a scene or set by one; each layout is used."""
-    listed = subprocess.run([BERGTOW, "--list-keys", "--json"], capture_output=True, text=True)
-    assert listed.returncode == DONE
+def test_what_is_stored_is_of_these_scenes():
+    """Each by itself: two scenes that leave the same would be one, with a key that has no effect."""
+    assert sorted(STORED) == sorted(scenes.SCENES)
+    same = {}
+    for name, found in STORED.items():
+        same.setdefault(tuple(sorted(found.items())), []).append(name)
+    assert [names for names in same.values() if len(names) > 1] == []
+
+
+def settings(section, prefix=""):
+    for key, value in section.items():
+        if isinstance(value, dict):
+            yield from settings(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
+
+
+def unused(keys, sections):
+    """Keys that none of the sections sets away from the default, and values of choices that none sets."""
     used = {}
+    for section in sections:
+        for key, value in settings(section):
+            used.setdefault(key, set()).add(str(value).lower())
+    for key in keys:
+        have = used.get(key["name"], set())
+        if key["type"] == "choice":
+            yield from (f"{key['name']}: {c}" for c in key["choices"] if c not in have | {key["default"]})
+        elif not have - {key["default"]}:
+            yield key["name"]
 
-    def take(section, prefix):
-        for key, value in section.items():
-            if isinstance(value, dict):
-                take(value, f"{prefix}{key}.")
-            else:
-                used.setdefault(prefix + key, set()).add(str(value).lower())
 
-    for case in scenes.SCENES.values():
-        take(case, "")
-    missing = []
-    for key in json.loads(listed.stdout)["keys"]:
-        if key["type"] != "choice" or key["name"] == "ice.outlines_crs":  # of a file on the map: cli/test_map.py
-            continue
-        have = used.get(key["name"], set()) | {key["default"]}
-        missing += [f"{key['name']}: {c}" for c in key["choices"] if c not in have]
-    assert missing == []
-    assert {scenes.layout_of(n) for n in scenes.SCENES} == set(scenes.LAYOUTS)
+def test_the_scenes_use_every_key():
+    """Every key away from its default, and every value of a choice; those of floes by hand, too."""
+    p = subprocess.run([BERGTOW, "--list-keys", "--json"], capture_output=True, text=True)
+    assert p.returncode == DONE
+    listed, cases = json.loads(p.stdout), scenes.SCENES.values()
+    assert set(unused(listed["keys"], cases)) == set(LEFT_OUT)
+    assert list(unused(listed["floe_keys"], [floe for case in cases for floe in case.get("floes", ())])) == []
+
+
+def test_the_scenes_use_every_layout():
+    pairs = {scenes.layouts_of(name) for name in scenes.SCENES}
+    assert all(first != second for first, second in pairs)
+    assert {first for first, _ in pairs} == {second for _, second in pairs} == set(scenes.LAYOUTS)
