@@ -14,27 +14,27 @@
 // Edge. To let the overlapped area A grow takes q0 dA. The load on the edges is the gradient of that:
 //     grad = ∂A/∂(displacement of b),   L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L
 //     gap = (A* − A)/L,   0 <= λ <= q0 L Δt,   w < −gap/Δt only where λ is at its bound
-// A*: the largest area so far; below it the edge bears nothing. For two outlines that cross twice, L is the chord between
-// the crossings, n is square to it, and the resultant acts at its middle. Turning is in it, too: a closed line under
-// uniform pressure bears no resultant, so that on the edge of b inside a and that on the chord are the same. So work
-// and area agree whatever the direction in which floes go on overlapping. L is that of the start of the step: first
-// order in Δt, as the area itself. Two points on the chord, L/4 from its middle, take half of the bound each: together
-// they bear a moment of q0 L²/8, which is that of q0 on half of the chord.
+// A*: the largest area so far; below it the edge bears nothing. For two outlines that cross twice, L is the chord
+// between the crossings, n is square to it, and the resultant acts at its middle. Turning is in it, too: a closed line
+// under uniform pressure bears no resultant, so that on the edge of b inside a and that on the chord are the same. So
+// work and area agree whatever the direction in which floes go on overlapping. L is that of the start of the step:
+// first order in Δt, as the area itself. Two points on the chord, L/4 from its middle, take half of the bound each:
+// together they bear a moment of q0 L²/8, which is that of q0 on half of the chord.
 //
 // Rejected: the depth along the axis of least overlap, as in contacts that crush. That axis flips once a floe is more
 // than half under, so the side of entry would have to be remembered; and floes that slide along it would go on
 // overlapping for nothing. The gradient falls to 0 where a floe is wholly under, and it may come out behind.
 //
 // First touch. A pair that has not rafted has the contact points of its outlines, and the same bound with the length
-// that bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h (assumed),
-// or a corner would bear nothing.
+// that bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h
+// (assumed), or a corner would bear nothing.
 //
-// Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they overlap,
-// friction of at most
+// Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they
+// overlap, friction of at most
 //     R = μ (ρ_w − ρ_i) g h A Δt
 // acts against sliding at the centroid of the overlap: two components, |λ| <= R, a disc. It is a contact of its own
-// without contact points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0] of
-// its bounds. Its update is one step of
+// without contact points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0]
+// of its bounds. Its update is one step of
 //     λ <- proj_R(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
 // which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, whose
 // three cache lines all sweeps over rigid ice read.
