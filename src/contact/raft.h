@@ -8,8 +8,8 @@
 // break, rubble that rubs) it needs
 //     q0 = κ ½ ρ_i (1 − ρ_i/ρ_w) g h²   N/m,   κ >= 2
 // with h of the thinner floe. κ is 5 to 17 in the literature (Rothrock 1975, Parmerter 1975, Hopkins 1998); which, is
-// assumed (ice.rafting.kappa). Sheets raft whole up to h ≈ 14.2 (1 − ν²) σ²/(ρ_w g E) (Parmerter 1975; 0.17 m for common
-// values); thicker ones ridge, which a larger κ stands for.
+// assumed (ice.rafting.kappa). Sheets raft whole up to h ≈ 14.2 (1 − ν²) σ²/(ρ_w g E) (Parmerter 1975; 0.17 m for
+// common values); thicker ones ridge, which a larger κ stands for.
 //
 // Edge. To let the overlapped area A grow takes q0 dA. The load on the edges is the gradient of that:
 //     grad = ∂A/∂(displacement of b),   L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L
