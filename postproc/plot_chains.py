@@ -42,8 +42,11 @@ def read(path):
                 raise RunError(path, "does not say where its contacts are", "write it with --dump-contacts of this version")
             places = f["places"]
             dt = float(places.attrs["dt"])
-            return Contacts(float(places.attrs["time"]), places["body"][()], places["normal"][()], places["lever"][()].reshape(-1, 2, 2),
-                            f["solution/r"][()][::2] / dt, places["pose"][()])
+            force = f["solution/r"][()][::2] / dt
+            # Floes that lie over each other rub: a contact of its own, without a normal force.
+            edge = np.isnan(f["disc"][()]) if "disc" in f else np.ones(len(force), bool)
+            return Contacts(float(places.attrs["time"]), places["body"][()][edge], places["normal"][()][edge],
+                            places["lever"][()].reshape(-1, 2, 2)[edge], force[edge], places["pose"][()])
     except FileNotFoundError:
         raise RunError(path, "no such file", "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None
     except (OSError, KeyError, ValueError) as error:

@@ -75,6 +75,11 @@ bt_status bt_h5_end(bt_h5_reader *r)
     return r->status;
 }
 
+bool bt_h5_there(const bt_h5_reader *r, const char *name)
+{
+    return r->status == BT_OK && H5Lexists(r->file, name, H5P_DEFAULT) > 0;
+}
+
 int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k)
 {
     if (r->status != BT_OK) return 0;

@@ -24,6 +24,8 @@ typedef struct bt_h5_reader {
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
 bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
 
+/// Is there a dataset of this name in a group that there is?
+bool bt_h5_there(const bt_h5_reader *r, const char *name);
 /// Size of a dataset's dimension k, 0 = not so many.
 int64_t bt_h5_size(bt_h5_reader *r, const char *name, int k);
 /// Rows first up to first + n along the first dimension, each of `width` numbers in all others together. mem:

@@ -23,7 +23,7 @@ double bt_overlap_area(const bt_overlap *o, double centroid[2]);
 
 /// How the area A changes: grad = ∂A/∂(displacement of b), m; *turn = the moment of that gradient about the centroid of
 /// a, m²: ∂A/∂θ_a = −turn, ∂A/∂θ_b = turn − d × grad with d from a to b. The boundary of the overlap is a closed line,
-///     so with n the outward normal
+/// so with n the outward normal
 ///     grad = ∫_{edges of b} n dl = −∫_{edges of a} n dl = ½ (∫_b − ∫_a) n dl,   turn = ½ (∫_b − ∫_a) r × n dl
 /// Where edges of both lie on each other and face the same way (rectangles in a row) the gradient jumps as one passes
 /// the other. Such edges count for neither; within `blend` of each other in part.

@@ -1,50 +1,51 @@
 // SPDX-License-Identifier: MIT
 // Rafting: floes that are pressed together harder than their edges bear slide over and under each other.
 //
-// Energy. A slab of thickness H that floats has ½ ρ_i (1 − ρ_i/ρ_w) g H² of potential energy per area, so where floes
-//     of h_a and h_b lie on each other there is
+// Energy. A slab of thickness H that floats has the potential energy ½ ρ_i (1 − ρ_i/ρ_w) g H² per area. Where floes of
+// thickness h_a and h_b lie on each other there is more of it than side by side, per area
 //     E = ρ_i (1 − ρ_i/ρ_w) g h_a h_b
-// more of it per area. Without any loss an edge that advances would need 2 · ½ ρ_i (1 − ρ_i/ρ_w) g h²; with losses
-//     (edges that break, rubble that rubs) it needs
+// Without any loss an edge that advances would need 2 · ½ ρ_i (1 − ρ_i/ρ_w) g h² per length. With losses (edges that
+// break, rubble that rubs) it needs
 //     q0 = κ ½ ρ_i (1 − ρ_i/ρ_w) g h²   N/m,   κ >= 2
-// h: thickness of the thinner floe. κ is 5 to 17 in the literature (Rothrock 1975, Parmerter 1975, Hopkins 1998),
-// assumed here: ice.rafting.kappa. Sheets raft whole up to h ≈ 14.2 (1 − ν²) σ²/(ρ_w g E) (Parmerter 1975; 0.17 m for
-// common values); thicker ones ridge, which is meant by a larger κ.
+// with h of the thinner floe. κ is 5 to 17 in the literature (Rothrock 1975, Parmerter 1975, Hopkins 1998); which, is
+// assumed (ice.rafting.kappa). Sheets raft whole up to h ≈ 14.2 (1 − ν²) σ²/(ρ_w g E) (Parmerter 1975; 0.17 m for
+// common values); thicker ones ridge, which a larger κ stands for.
 //
-// Edge. To let the overlapped area A grow takes q0 dA. The load on the edges is the gradient of that: with grad =
-//     ∂A/∂(displacement of b),
-//     L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L,   0 <= λ <= q0 L Δt,   w < −gap/Δt only where λ is at
-//     its bound,   gap = (A* − A)/L
-// A*: the largest area so far. For two outlines that cross twice L is the chord between the crossings and n is square
-// to it, the resultant acts at its middle, and turning is in it, too: uniform pressure on the edge of b inside a and
-// uniform pressure on the chord have the same resultant, since a closed line under uniform pressure bears none. So
-// whatever the direction in which floes go on overlapping, work and area agree; below A* the edge bears nothing. Two
-// points at n's sides, L/4 from the middle, take half of the bound each: together they bear a moment of q0 L²/8, which
-// is that of q0 on half of the chord.
+// Edge. To let the overlapped area A grow takes q0 dA. The load on the edges is the gradient of that:
+//     grad = ∂A/∂(displacement of b),   L = |grad|,   n = −grad/L (from a to b),   w = −(dA/dt)/L
+//     gap = (A* − A)/L,   0 <= λ <= q0 L Δt,   w < −gap/Δt only where λ is at its bound
+// A*: the largest area so far; below it the edge bears nothing. For two outlines that cross twice, L is the chord
+// between the crossings, n is square to it, and the resultant acts at its middle. Turning is in it, too: a closed line
+// under uniform pressure bears no resultant, so that on the edge of b inside a and that on the chord are the same. So
+// work and area agree whatever the direction in which floes go on overlapping. L is that of the start of the step:
+// first order in Δt, as the area itself. Two points on the chord, L/4 from its middle, take half of the bound each:
+// together they bear a moment of q0 L²/8, which is that of q0 on half of the chord.
+//
 // Rejected: the depth along the axis of least overlap, as in contacts that crush. That axis flips once a floe is more
 // than half under, so the side of entry would have to be remembered; and floes that slide along it would go on
 // overlapping for nothing. The gradient falls to 0 where a floe is wholly under, and it may come out behind.
 //
-// First touch. A pair that has not rafted has the contact of its outlines, and the same bound with the length that
-// bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h (assumed), or
-// a corner would bear nothing.
+// First touch. A pair that has not rafted has the contact points of its outlines, and the same bound with the length
+// that bears: of two edges, the part whose gaps differ by no more than the slop. No contact is shorter than h
+// (assumed), or a corner would bear nothing.
 //
 // Sheets. The lower sheet presses with its buoyancy, (ρ_w − ρ_i) g h per area, h of the thinner floe. Where they
-//     overlap friction of at most
+// overlap, friction of at most
 //     R = μ (ρ_w − ρ_i) g h A Δt
 // acts against sliding at the centroid of the overlap: two components, |λ| <= R, a disc. It is a contact of its own
 // without contact points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0]
-//     of its bounds. Its update is one step of
+// of its bounds. Its update is one step of
 //     λ <- proj_R(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
 // which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, whose
 // three cache lines all sweeps over rigid ice read.
 //
-// The conservative part of the load pushes sheets apart; friction holds them from an overlap of (ρ_i/ρ_w) h/μ (2.5 h)
-// on. So an edge that retreats without load is fair.
+// The conservative part of the edge load pushes sheets apart; friction holds them from an overlap of (ρ_i/ρ_w) h/μ on,
+// some 2.5 h. So that an edge bears nothing when it retreats is a fair simplification.
 //
-// Memory. While two floes overlap a pair keeps A*, A when it was last looked at, and the friction (as the start of the
-// next solve). At the end of a step A is what it is: second-order terms of the step belong to A*, and the position
-// projection leaves rafted overlap alone.
+// Memory. While two floes overlap, a pair keeps A*, A when it was last looked at, and the friction as the start of the
+// next solve. At the end of a step A is what it is: second-order terms of the step belong to A*, and the position
+// projection leaves rafted overlap alone. Where ice crushes as well the smaller bound holds. A pair that has rafted
+// gives way in its area whichever law sets the bound; crushed depths are kept by pairs that have not.
 //
 // Between which bodies: floes of the field and by hand, also fixed ones, whose outlines are both convex. Not the towed
 // body (a deep hull does not raft), not walls, nothing without ice; a floe in convex parts stays rigid. Three floes on

@@ -32,8 +32,8 @@ typedef struct bt_json_key {
 
 /// The kind of a member of a struct.
 #define BT_JSON_KIND(x)                                                                                                \
-    _Generic((x), double: BT_JSON_REAL, int64_t: BT_JSON_INT, int: BT_JSON_INT32, bool: BT_JSON_BOOL, char *: BT_JSON_TEXT, \
-             const char *: BT_JSON_TEXT)
+    _Generic((x), double: BT_JSON_REAL, int64_t: BT_JSON_INT, int: BT_JSON_INT32, bool: BT_JSON_BOOL,                  \
+             char *: BT_JSON_TEXT, const char *: BT_JSON_TEXT)
 /// The parts of a row for a member of a source.
 #define BT_JSON_AT(from_, type, key_, member, units_, text_) \
     .key = key_, .units = units_, .description = text_, .kind = BT_JSON_KIND(((type *)0)->member), .from = from_, \

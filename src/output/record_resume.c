@@ -81,13 +81,14 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
     if (s->faulty) h->n = 0;
 }
 
-/// Entries 0 up to n of all series.
-static void load_series(bt_record *r, bt_h5_reader *old, int64_t n)
+/// Entries 0 up to n of all series. before: of a program whose floes did not raft; series that it had not are 0.
+static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
-        bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
+        if (before && !bt_h5_there(old, name)) memset(x, 0, (size_t)n * sizeof *x);
+        else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);
     }
@@ -176,7 +177,7 @@ bt_status bt_record_load(bt_record *r, bt_snapshot *s, const bt_events *e, bt_er
         if (!s->faulty) bt_h5_open(&old, path, BT_CHECKSUM_RESULT, err);
         if (!s->faulty) check_counts(&old, entries, frames, r->frames.n_floes);
         if (!s->faulty && old.status == BT_OK) bt_impact_store_load(&r->impacts, s, &old);
-        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries);
+        if (!s->faulty && old.status == BT_OK) load_series(r, &old, entries, !bt_snapshot_find(s, "history/rafting"));
         bt_record_events(r, e, err);
     }
     bt_status status = bt_comm_agree(r->comm, s->faulty                      ? BT_ERR_CASE

@@ -34,7 +34,7 @@ static double overlap_relative(const view *v)
 
 static double rafted_share(const view *v)
 {
-    return number_or_nan(v->t->ice_area > 0, v->h->rafted_area / v->t->ice_area);
+    return v->t->ice_area > 0 ? v->h->rafted_area / v->t->ice_area : 0;
 }
 
 static const bt_lead_stats *lead(const view *v) { return &v->t->lead; }

@@ -137,10 +137,9 @@ void bt_summary_print(const bt_summary *s, const bt_history *h, const bt_case *c
                h->crushed_work, (long long)h->crushing_steps, h->max_crushing, h->max_crushed_depth);
     if (c->ice.rafting_kappa > 0)
         printf("  rafted              %.4g m2 at the end, %.3g %% of the ice, in %.0f pairs; edges took %.4g J, %.4g J "
-               "of it in the sheets' height, "
-               "friction between sheets %.4g J\n",
-               h->rafted_area, 100 * h->rafted_area / t->ice_area, h->rafting, h->raft_edge_work, h->rafted_energy,
-               h->raft_friction_work);
+               "of it in the sheets' height, friction between sheets %.4g J\n",
+               h->rafted_area, t->ice_area > 0 ? 100 * h->rafted_area / t->ice_area : 0.0, h->rafting,
+               h->raft_edge_work, h->rafted_energy, h->raft_friction_work);
     bt_summary_window_print(t->window);
     printf("  wall time           %.4g s on %d x %d (ranks x threads)", t->wall_time, t->ranks, t->threads);
     if (isfinite(s->ns_per_floe_step)) printf(", %.4g ns per floe and step", s->ns_per_floe_step);

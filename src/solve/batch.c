@@ -269,13 +269,12 @@ INLINE vec update_sheets(bt_batch *o, bt_vel *v)
 }
 
 /// As bt_update_contact; the largest corrections, m/s.
-INLINE vec update(bt_batch *o, bt_vel *v)
+INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
 {
-    if (o->kind == SHEETS) return update_sheets(o, v);
     motion a = load(v, o->a), b = load(v, o->b);
     vec l1, l2;
     solve_normals(o, &a, &b, &l1, &l2);
-    if (o->kind == BOUNDED) bound_normals(o, &a, &b, &l1, &l2);
+    if (bounded) bound_normals(o, &a, &b, &l1, &l2);
     const vec d1 = l1 - o->x[0], d2 = l2 - o->x[1], jn = d1 + d2, jx = jn * o->nx, jy = jn * o->ny;
     a.x -= o->ma * jx;
     a.y -= o->ma * jy;
@@ -304,7 +303,19 @@ FOR_EACH_CPU
 static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
 {
     vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = larger(most, update(&batch[k], v));
+    for (bt_idx k = 0; k < n; k++) most = larger(most, update(&batch[k], v, false));
+    return largest_lane(most);
+}
+
+/// The same where contacts have bounds; apart, or rigid ice would pay for the registers that this takes.
+FOR_EACH_CPU
+static double pass_bounded(bt_batch *batch, bt_idx n, bt_vel *v)
+{
+    vec most = {0};
+    for (bt_idx k = 0; k < n; k++) {
+        bt_batch *o = &batch[k];
+        most = larger(most, o->kind == SHEETS ? update_sheets(o, v) : update(o, v, true));
+    }
     return largest_lane(most);
 }
 
@@ -340,7 +351,7 @@ double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_swee
     if (s->moves) move(cell->batch, cell->n_batches, s->beta);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
-        last = pass(cell->batch, cell->n_batches, v);
+        last = (cell->limits ? pass_bounded : pass)(cell->batch, cell->n_batches, v);
         if (n == 0) *most = last;
         *done += cell->n_list;
     }

@@ -82,7 +82,7 @@ static inline double bt_update_sheets(bt_contact *u, const bt_limit *k, bt_vel *
 /// Gauss–Seidel update of a manifold: its normals together, then its friction. k: its bounds, NULL = none.
 static inline double bt_update_contact(bt_contact *u, const bt_limit *k, bt_vel *v, const bt_inv *inv)
 {
-    if (u->n == 0) return bt_update_sheets(u, k, v, inv);
+    if (k && u->n == 0) return bt_update_sheets(u, k, v, inv);
     const bt_vel va = v[u->a], vb = v[u->b];
     double l[2];
     bt_solve_normals(u, &va, &vb, &l[0], &l[1]);
@@ -110,7 +110,7 @@ static inline double bt_sheets_residual(const bt_contact *u, const bt_limit *k, 
 /// two of sheets).
 static inline double bt_contact_residual(const bt_contact *u, const bt_limit *k, const bt_vel *v, double *sum)
 {
-    if (u->n == 0) return bt_sheets_residual(u, k, v, sum);
+    if (k && u->n == 0) return bt_sheets_residual(u, k, v, sum);
     const bt_vel *va = &v[u->a], *vb = &v[u->b];
     double worst = 0, total = 0;
     for (int i = 0; i < u->n; i++) {

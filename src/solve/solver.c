@@ -98,15 +98,16 @@ static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *u = &cell->contacts[i];
-        const double r = bt_contact_residual(u, cell->limits ? &cell->limits[i] : NULL, v, &sum);
+        const bt_limit *limit = cell->limits ? &cell->limits[i] : NULL;
+        const double r = limit ? bt_contact_residual(u, limit, v, &sum) : bt_contact_residual(u, NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
-        rows += u->n > 0 ? u->n + 1 : 2;
+        rows += u->n + 1 + (u->n == 0);
         const double *x = cell->before[i];
         // or did before the last sweep
         bool on =
             p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
-        if (u->n == 0) on = on || r > 0;
+        if (limit && u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
         if (on) cell->list[cell->n_list++] = i;
     }
@@ -160,7 +161,8 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
     for (bt_idx j = 0; j < cell->n_list; j++) {
         const bt_idx i = cell->list[j];
         fetch_ahead(cell, j + AHEAD);
-        most = bt_max(most, bt_update_contact(&cell->contacts[i], cell->limits ? &cell->limits[i] : NULL, v, inv));
+        const bt_limit *k = cell->limits ? &cell->limits[i] : NULL;
+        most = bt_max(most, bt_update_contact(&cell->contacts[i], k, v, inv));
     }
     return most;
 }

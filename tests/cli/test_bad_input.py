@@ -59,6 +59,8 @@ TEXTS = {
     "overflow": (GOOD + "tow: {speed: 1e999}\n", "bad.yml:5: tow.speed: 1e999 is too large"),
     "negative thickness": (GOOD.replace("size: 1", "thickness: -0.1 m"),
                            "bad.yml:3: ice.thickness: -0.1 m is out of range", "(0, 100] m"),
+    "rafting that gives energy": (GOOD.replace("size: 1", "rafting: {kappa: 1.5}"),
+                                  "bad.yml:3: ice.rafting.kappa: 1.5 is less than 2", "0 = they do not"),
     "ice that sinks": (GOOD.replace("size: 1", "density: 1000") + "water: {density: 900}\n",
                        "bad.yml:3: ice.density: 1000 kg/m3 is more than water.density, 900 kg/m3", "correct one"),
     "concentration above one": (GOOD.replace("0.3",

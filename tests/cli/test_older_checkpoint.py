@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: MIT
+"""A checkpoint from before contact laws had a table goes on to the same bits: its contacts, history and series are laid
+out as they were then.
+
+Red when depths are taken for impulses, or friction is lost.
+"""
+import h5py
+import numpy as np
+
+from harness import DONE, CASE, Run, call, changed, differing, run
+from made_up_ensemble import seal
+
+CRUSHING = {
+    "run": {"dt": 0.1, "duration": 12},
+    "domain": {"length": 12, "width": 6, "ends_closing": 0.1},
+    "ice": {"concentration": 0.8, "size": 0.8, "friction": 0.3, "crushing": {"pressure": "2 kPa"}},
+    "body": {"length": 1.5, "x": 3},
+    "tow": {"speed": 0.3, "ramp": 0.5},
+}
+NEW = ("rafting", "rafted_area", "rafted_largest", "rafted_energy", "raft_edge_work", "raft_friction_work")
+
+
+def as_it_was(folder, damage=None):
+    """Checkpoint and result without what came with the table of laws."""
+    with h5py.File(folder / "checkpoint.h5", "r+") as f:
+        value, law = f["contacts/value"][:], f["contacts/law"][:]
+        assert set(law.ravel()) == {0, 1}
+        f["contacts/impulse"], f["contacts/friction"], f["contacts/crushed"] = value[:, :2], value[:, 2], law.astype(
+            np.uint8)
+        for name in [n for n in f["history"] if "raft" in n]:
+            del f["history"][name]
+        del f["contacts/value"], f["contacts/law"]
+        if damage:
+            del f[damage]
+    with h5py.File(folder / "result.h5", "r+") as f:
+        for name in NEW:
+            del f["series"][name]
+    seal(folder / "checkpoint.h5", "checkpoint 2")
+    seal(folder / "result.h5", "result 1")
+
+
+def test_it_goes_on_to_the_same_bits(tmp_path):
+    whole = run(tmp_path, CRUSHING, name="whole")
+    assert whole.summary["crushing_steps"] > 10
+    run(tmp_path, CRUSHING, "--steps", 70, name="cut")
+    as_it_was(tmp_path / "cut")
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == DONE, result.stderr
+    assert Run(tmp_path / "cut", result).hash == whole.hash
+    assert differing(whole.dir / "result.h5", tmp_path / "cut/result.h5") == []
+
+
+def test_what_is_missing_in_it_is_told(tmp_path):
+    run(tmp_path, changed(CRUSHING, run__duration=6), "--steps", 30, name="cut")
+    as_it_was(tmp_path / "cut", "contacts/friction")
+    (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == CASE and "/contacts/friction is missing" in result.stderr, result.stderr
