@@ -52,6 +52,8 @@ HARNESS_OBJ := $(patsubst %.c,$(BUILD)/%.o,tests/fuzz/fuzz.c $(wildcard tests/fu
 TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
+# The program with what tests/examples/ adds to it.
+EXTENDED := $(BUILD)/tests/examples/extended
 
 .PHONY: all help deps demo report test test-long validate bench fullscale clean install tests lint tidy asan tsan valgrind coverage fuzz deps-lint deps-dev partition-study FORCE
 .DEFAULT_GOAL := all
@@ -108,7 +110,12 @@ $(HARNESS:%=$(BUILD)/fuzz_%): $(BUILD)/fuzz_%: tests/fuzz/entry.c $(HARNESS_OBJ)
 	@echo '  FUZZ $@'
 	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
 
-tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
+$(EXTENDED): tests/examples/extended.c $(BIN_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  TEST $@'
+	@$(CC) $(CFLAGS) -Itests $< $(BIN_OBJ) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
+
+tests: $(TEST_BIN) $(RANK_BIN) $(EXTENDED) $(BUILD)/triad ## build the test programs
 
 $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 	@mkdir -p $(@D)
@@ -227,4 +234,4 @@ install: all ## install the program into DESTDIR PREFIX
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(LIB_OBJ:.o=.d) $(HARNESS_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(LIB_OBJ:.o=.d) $(HARNESS_OBJ:.o=.d) $(BIN_OBJ:.o=.d) $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d

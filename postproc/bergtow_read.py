@@ -41,6 +41,47 @@ class RunError(Exception):
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """An estimate of the resistance as a file tells of it."""
+
+    name: str
+    label: str
+    on_top: bool         #: no resistance of ice: it comes on top of the others, and no run is held against it
+    uses_floe_size: bool  #: its curve differs between fields of one case
+    numbers: dict        #: what summary.json says: force_n, low_n, high_n, valid, compares, note, ...
+
+    @property
+    def force(self):
+        """N, NaN where the formula has no value."""
+        force = self.numbers.get("force_n")
+        return np.nan if force is None else force
+
+    @property
+    def valid(self):
+        """It is meant for the conditions."""
+        return bool(self.numbers.get("valid"))
+
+    @property
+    def compares(self):
+        """A run is held against it: it is valid, and knows the concentration. Results of earlier versions do not say the second."""
+        return bool(self.numbers.get("compares", self.valid and not self.on_top)) and self.force > 0
+
+
+def estimates_of(summary):
+    """{name: Estimate} of a summary, in the order of the program's registry; {} where there are none."""
+    found, labels = summary.get("estimates"), summary.get("estimate_labels") or {}
+    found = found if isinstance(found, dict) else {}
+    out = {}
+    for name, numbers in found.items():
+        if not (isinstance(numbers, dict) and "force_n" in numbers):
+            continue  # a condition, or the curves
+        # An earlier version gives no labels; what comes on top has no ratio there, though it has a force.
+        told = labels.get(name) or {"kind": "on top" if numbers["force_n"] and numbers.get("simulated_over_estimate") is None else ""}
+        out[name] = Estimate(name, told.get("label") or name.replace("_", " "), told.get("kind") == "on top", bool(told.get("uses_floe_size")), numbers)
+    return out
+
+
+@dataclass(frozen=True)
 class Body:
     """A body that is not a floe: the towed body, a wall, or a fixed body given by hand."""
 
@@ -197,7 +238,27 @@ class Run:
 
     def description(self, name):
         """One sentence on a series."""
-        return str(_plain(self._dataset(f"series/{name}").attrs.get("description", "")))
+        return self.told(name, "description")
+
+    def told(self, name, what):
+        """What the file tells of a series: role, label, summary, merge, ...; "" where it does not."""
+        return str(_plain(self._dataset(f"series/{name}").attrs.get(what, "")))
+
+    def label(self, name):
+        """What pictures and tables call a series."""
+        return self.told(name, "label") or name.replace("_", " ")
+
+    def by_role(self, *roles):
+        """Names of the series with one of these roles ("balance", "force", "load", "diagnostic"), in the order of the program's registry."""
+        told = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
+        if not any("role" in attributes for attributes in told.values()):  # of an earlier version: the forces go by their names
+            return sorted((n for n in told if n.endswith("_force") or n == "ice_resistance"), key=lambda n: (n != "tow_force", n != "ice_resistance", n)) if "balance" in roles else []
+        return sorted((n for n in told if _plain(told[n].get("role", "")) in roles), key=lambda n: int(told[n]["order"]))
+
+    @property
+    def estimates(self):
+        """{name: Estimate}."""
+        return estimates_of(self.summary)
 
     @property
     def window(self):

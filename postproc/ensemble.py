@@ -22,7 +22,6 @@ from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
 
 import numpy as np
 
-ESTIMATES = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
 LEAST_DRIFT = 5  # fields
 MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/output/steady.h
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
@@ -50,13 +49,17 @@ def samples(e, rows, members):
 
 
 def estimates(e, rows, mean):
-    """Force of each estimate, mean of the condition's fields, and simulated / estimate."""
+    """Force of each estimate, mean of the condition's fields, and simulated / estimate where all of them are held against it (bergtow/estimate.h)."""
     out = {}
-    for name in ESTIMATES:
-        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[rows] for what in ("force_n", "valid"))
-        force = float(np.mean(force)) if len(rows) else np.nan
-        out[name] = {"force": force, "valid": bool(len(rows) and np.all(valid == 1)),
-                     "ratio": mean / force if force > 0 and name != "open_water_drag" else np.nan}
+    for name, told in e.estimates.items():
+        def column(what, default=None):
+            values = e.summary.get(f"estimates_{name}_{what}")
+            return np.full(len(rows), np.nan) if values is None and default is None else default if values is None else values[rows]
+        valid = column("valid")
+        force, compares = float(np.mean(column("force_n"))) if len(rows) else np.nan, column("compares", valid)
+        held = len(rows) and not told["on_top"] and np.all(compares == 1) and force > 0
+        out[name] = {"label": told["label"], "on_top": told["on_top"], "force": force, "valid": bool(len(rows) and np.all(valid == 1)), "compares": bool(held),
+                     "ratio": mean / force if held else np.nan}
     return out
 
 
@@ -188,7 +191,7 @@ def csv_row(c):
         row[f"{key}_low"], row[f"{key}_high"] = r.get(key, (None, None))
     for name, estimate in c["estimates"].items():
         row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
-        if name != "open_water_drag":
+        if not estimate["on_top"]:
             row[f"simulated_over_{name}"] = estimate["ratio"]
     return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
 

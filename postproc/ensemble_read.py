@@ -101,6 +101,7 @@ class Ensemble:
                 unit = data.attrs.get("units", "1")
                 self.units[key] = unit.decode() if isinstance(unit, bytes) else str(unit)
             self.summary = {key: data[()] for key, data in f["summary"].items()}
+            self.meaning = {key: {k: v.decode() if isinstance(v, bytes) else v for k, v in data.attrs.items()} for key, data in f["summary"].items()}
             self._series = {key: f[f"series/{key}"][()] for key in ("time", "ice_resistance")}
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
         self.study = self.study.decode() if isinstance(self.study, bytes) else str(self.study)
@@ -121,6 +122,20 @@ class Ensemble:
     def number(self, key, m):
         """A number of a member's summary, NaN where there is none."""
         return float(self.summary[key][m]) if key in self.summary else np.nan
+
+    @cached_property
+    def estimates(self):
+        """{name: {"label", "on_top"}} of the estimates in the members' summaries, in the order of the program's registry.
+
+        The file says of each force which estimate it is of; of an earlier version the names of the columns do, and what comes on top has no ratio there.
+        """
+        forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
+        out = {}
+        for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
+            told, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
+            on_top = told["kind"] == "on top" if "kind" in told else f"estimates_{name}_simulated_over_estimate" not in self.summary
+            out[told.get("estimate", name)] = {"label": told.get("label", name.replace("_", " ")), "on_top": on_top}
+        return out
 
     @property
     def complete(self):

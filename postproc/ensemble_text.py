@@ -5,8 +5,6 @@ import numpy as np
 import style
 from ensemble_read import listed
 
-SHORT = {"lichey_hellmer": "Lichey–Hellmer", "marchenko_compaction": "compaction", "marchenko_rafting": "rafting", "marchenko_momentum": "momentum",
-         "dilute_limit": "dilute", "open_water_drag": "open water"}
 DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
 
 
@@ -73,16 +71,20 @@ def means(s, markdown):
 
 def estimates(s, markdown):
     factor, unit = unit_of(s)
-    head = ["condition", f"simulated, {unit}", *SHORT.values()]
+    labels = {name: e["label"] for c in s["conditions"] for name, e in c["estimates"].items()}
+    head = ["condition", f"simulated, {unit}", *labels.values()]
     rows = []
     for c in s["conditions"]:
         cells = [c["label"], number(c["resistance"].get("mean", np.nan) / factor)]
-        for name in SHORT:
+        for name in labels:
             e = c["estimates"][name]
             text = number(e["force"] / factor) + ("" if e["valid"] or not np.isfinite(e["force"]) else "*")
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
-    return table(head, rows, markdown) + "\n\nIn brackets: simulated / estimate. * outside the range the estimate is meant for. Open water: drag without ice, which comes on top."
+    on_top = [f"{label}: no resistance of ice, comes on top." for name, label in labels.items() if s["conditions"][0]["estimates"][name]["on_top"]]
+    note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
+            "* outside the range the estimate is meant for.")
+    return table(head, rows, markdown) + "\n\n" + " ".join([note, *on_top])
 
 
 def fits(s, markdown):

@@ -122,9 +122,10 @@ def force_limits(e, some_groups, log):
     tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
     seen += [v for v in tops if np.isfinite(v)]
     low = min((v for v in seen if v > 0), default=1.0)
-    for name in ("lichey_hellmer", "dilute_limit"):
+    high = max(seen, default=1.0)
+    for name in (name for name, told in e.estimates.items() if not told["on_top"]):
         force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used] for what in ("force_n", "valid"))
-        seen += [v for v in force[(valid == 1) & (force > low / 30)]]
+        seen += [v for v in force[(valid == 1) & (force > low / 30) & (force < 30 * high)]]
     seen = np.array([v for v in seen if np.isfinite(v)])
     if log:
         return seen[seen > 0].min() / 2, 2 * seen.max()

@@ -93,26 +93,21 @@ def mark_window(axes, run):
 
 
 def draw_balance(axes, run, factor, unit):
-    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + inertia.
+    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + ... + inertia.
 
-    Coriolis force and tilt are drawn where they reach a hundredth of the tow.
+    Which they are, and in which order, the file says. Beside the first two, the tow and the ice, a force is drawn where it reaches a hundredth of the tow.
     """
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    for name, label, colour, width, dashes in (("tow_force", "tow force", style.TOW, 2.8, None),
-                                               ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
-                                               ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
-                                               ("coriolis_force", "Coriolis", style.CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
-                                               ("tilt_force", "tilt", style.TILT, 1.6, (1, 1)),
-                                               ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))):
-        if name in run:
-            mean = running_mean(run[name], samples)
-            if name in ("coriolis_force", "tilt_force") and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
-                continue
-            line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=label)
-            if dashes:
-                line.set_dashes(dashes)
+    for k, name in enumerate(run.by_role("balance", "force")):
+        mean = running_mean(run[name], samples)
+        if k > 1 and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
+            continue
+        colour, width, dashes = style.BALANCE[k] if k < len(style.BALANCE) else style.BALANCE[-1 - k % 3]
+        line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=run.label(name))
+        if dashes:
+            line.set_dashes(dashes)
     axes.set_ylabel(f"running mean ({unit})")
     axes.grid(axis="y")
     axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
@@ -184,10 +179,8 @@ def draw(run, top=None):
 
 
 def draw_diagnostics(run):
-    """Contacts, sweeps, residual and overlap of every sample."""
-    rows = [("contacts", "contact points", style.ICE), ("sweeps", "sweeps", style.TOW),
-            ("residual", "residual", style.DRAG), ("overlap", "deepest overlap", style.INERTIA)]
-    rows = [row for row in rows if row[0] in run]
+    """The solver in every sample: contacts, sweeps, residual, overlap, and what has been registered beside them."""
+    rows = [(name, run.label(name), style.PANELS[k % len(style.PANELS)]) for k, name in enumerate(run.by_role("diagnostic"))]
     if not rows:
         raise RunError(run.result, "holds no series of the solver", "run the case again with this version")
     figure, all_axes = plt.subplots(len(rows), 1, sharex=True, squeeze=False, figsize=(11, 1.1 + 1.75 * len(rows)))
@@ -199,10 +192,10 @@ def draw_diagnostics(run):
         axes.set_ylabel(label + (f" ({unit})" if unit not in ("", "1") else ""))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
-        if name in ("residual", "overlap") and len(positive):
+        if run.told(name, "merge") == "largest of the steps" and len(positive):  # of residual and overlap decades are of interest
             axes.set_yscale("log")
             axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)
-        else:
+        elif not np.any(values < 0):
             axes.set_ylim(bottom=0)
         tolerance = run.number("tolerance_m_s")
         if name == "residual" and np.isfinite(tolerance):

@@ -31,7 +31,6 @@ UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
 #: keys of the tow that mean nothing in some modes
 ONLY = {"tow.line": ("line", "thrust"), "tow.vessel": ("thrust",), "tow.speed": ("speed", "line", "thrust"), "tow.ramp": ("speed", "line", "thrust")}
 
-ESTIMATES = {**{name: label for name, (label, _) in plot_resistance.ESTIMATES.items()}, "open_water_drag": "open-water drag"}
 PICTURE_DPI = 120
 
 
@@ -117,18 +116,17 @@ def forces(run):
     if run.towed is None:
         return []
     n, rows = run.number, []
-    for label, key, remark in (("ice resistance", "ice_resistance", "contact force of ice and walls on the body against the tow"), ("tow force", "tow_force", "along the tow"),
-                               ("line tension", "line_tension", ""), ("tension of the second branch", "line_tension_2", ""), ("vessel thrust", "vessel_thrust", "along its course")):
-        if np.isfinite(n(f"mean_{key}_n")) or key in ("ice_resistance", "tow_force"):
-            value, interval = with_interval(*run.interval(key))
-            rows.append((f"{label}, {run.mean_name}", value, interval, remark))
+    for name in run.by_role("balance", "force", "load"):
+        key = run.told(name, "summary") or f"mean_{name}_n"
+        mean = n(key)
+        if not np.isfinite(mean) and name not in ("ice_resistance", "tow_force"):
+            continue
+        known = re.fullmatch(r"mean_(.*)_n", key)
+        value, interval = with_interval(*run.interval(known[1])) if known else (force(mean), "–")
+        rows.append((f"{run.label(name)}, {run.mean_name}", value, interval if interval != "–" else "", run.description(name)))
     quarters = ((run.summary.get("window") or {}).get("series") or {}).get("ice_resistance", {}).get("quarters_n")
     if quarters:
         rows.append(("ice resistance by quarters of the window", ", ".join(force(q) for q in quarters), "", ""))
-    rows.append(("open-water and air drag, mean", force(n("mean_drag_force_n")), "", "of water and air on the body"))
-    for label, key in (("Coriolis force", "coriolis"), ("force of the sea-surface tilt", "tilt"), ("inertia", "inertia")):
-        if n(f"mean_{key}_force_n", 0.0):
-            rows.append((f"mean {label}", force(n(f"mean_{key}_force_n")), "", ""))
     conversion = run.summary.get("peak_conversion") or ""
     rows += [("standard deviation of the ice resistance", force(n("sd_ice_resistance_n")), "", conversion), ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
              ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion), ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion)]
@@ -142,16 +140,13 @@ def forces(run):
 
 def estimates(run):
     """Rows of the published and derived estimates."""
-    found, rows = run.summary.get("estimates"), []
-    for name, label in ESTIMATES.items() if isinstance(found, dict) else ():
-        e = found.get(name)
-        if not isinstance(e, dict):
-            continue
-        value = force(e["force_n"])
-        spread = e["force_n"] is not None and e["high_n"] is not None and e["high_n"] > e["low_n"]
-        ratio = e["simulated_over_estimate"]
-        rows.append({"label": label, "force": value, "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "", "ratio": style.short(ratio) if ratio is not None else "–",
-                     "valid": bool(e["valid"]), "note": e["note"], "formula": e["formula"], "source": e["source"]})
+    rows = []
+    for estimate in run.estimates.values():
+        e = estimate.numbers
+        spread = None not in (e["force_n"], e["high_n"], e["low_n"]) and e["high_n"] > e["low_n"]
+        ratio = e["simulated_over_estimate"] if estimate.compares else None
+        rows.append({"label": estimate.label, "force": force(e["force_n"]), "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "",
+                     "ratio": style.short(ratio) if ratio is not None else "–", "valid": estimate.valid, "note": e["note"], "formula": e["formula"], "source": e["source"]})
     return rows
 
 
