@@ -55,6 +55,8 @@ HARNESS_OBJ := $(patsubst %.c,$(BUILD)/%.o,tests/fuzz/fuzz.c $(wildcard tests/fu
 TEST_BIN += $(BUILD)/tests/fuzz/test_corpus
 # Started under mpirun by the Python tests, not by themselves.
 RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
+# The program with what tests/examples/ adds to it.
+EXTENDED := $(BUILD)/tests/examples/extended
 
 .PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
         test test-long lint tidy validate asan tsan valgrind coverage fuzz
@@ -114,7 +116,12 @@ $(HARNESS:%=$(BUILD)/fuzz_%): $(BUILD)/fuzz_%: tests/fuzz/entry.c $(HARNESS_OBJ)
 	@$(CC) $(CFLAGS) -fsanitize=fuzzer -DBT_FUZZ=bt_fuzz_$* $(filter %.c %.o,$^) $(BUILD)/libbergtow.a $(LDLIBS) \
 	  -o $@
 
-tests: $(TEST_BIN) $(RANK_BIN) $(BUILD)/triad ## build the test programs
+$(EXTENDED): tests/examples/extended.c $(BIN_OBJ) $(BUILD)/libbergtow.a $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  TEST $@'
+	@$(CC) $(CFLAGS) -Itests $< $(BIN_OBJ) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
+
+tests: $(TEST_BIN) $(RANK_BIN) $(EXTENDED) $(BUILD)/triad ## build the test programs
 
 $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 	@mkdir -p $(@D)
@@ -240,4 +247,4 @@ clean: ## remove build/ and out/
 	rm -rf build out
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
--include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(STUDY).d $(BUILD)/triad.d
+-include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d

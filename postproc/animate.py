@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A film of a run: the ice field above, the ice resistance up to the moment below. MP4 through ffmpeg, GIF through Pillow.
+"""A film of a run: the ice field above, the ice resistance up to the moment below. MP4 through ffmpeg, GIF through
+Pillow.
 
 What stands still is drawn once; per frame only floes, bodies and the moving parts of the curve are drawn over it
 (a full redraw spends most of its time on text and ticks).
@@ -29,7 +30,8 @@ class Film:
         if follow and run.towed is None:
             raise RunError(run.result, "has no towed body", "use --window whole")
         view = view_body(run) if follow else view_whole(run)
-        wide, high = (view[3] - view[2], view[1] - view[0]) if run.geographic else (view[1] - view[0], view[3] - view[2])
+        wide, high = (view[3] - view[2], view[1] - view[0]) if run.geographic else (view[1] - view[0],
+                                                                                    view[3] - view[2])
         left, right, head, between, curve, foot = 0.85, 1.15, 0.85, 0.95, 1.75, 0.58
         if wide >= high:
             field_w = 10.0
@@ -56,7 +58,8 @@ class Film:
         self.scene = Scene(field, run, colouring, view, follow, animated=True)
         if run.n_floes:
             bar_h = min(field_h, 3.2)
-            cax = self.figure.add_axes(box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h))
+            cax = self.figure.add_axes(
+                box(left + (panel_w + field_w) / 2 + 0.2, base + (field_h - bar_h) / 2, 0.14, bar_h))
             colouring.bar(self.figure, self.scene.mappable, cax)
         style.headline(self.figure, run, "ice field and ice resistance" if run.towed is not None else "ice field",
                        0.2 / size[0])
@@ -147,29 +150,47 @@ def write_gif(film, frames, fps, path):
 
     Pixels that stay as they are carry the 256th index, transparent: their long runs take next to no room.
     """
-    picked = [film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0, len(frames) - 1, min(4, len(frames)))]
+    picked = [
+        film.pixels(frames[int(i)])[:, :, :3].copy() for i in np.linspace(0,
+                                                                          len(frames) - 1, min(4, len(frames)))
+    ]
     palette = Image.fromarray(np.concatenate(picked)).quantize(255, method=Image.Quantize.MEDIANCUT)
     colours = palette.getpalette()[:765] + [0, 0, 0]
 
     def pictures():
         before = None
         for frame in frames:
-            now = np.asarray(Image.fromarray(film.pixels(frame)[:, :, :3]).quantize(palette=palette, dither=Image.Dither.NONE))
+            now = np.asarray(
+                Image.fromarray(film.pixels(frame)[:, :, :3]).quantize(palette=palette, dither=Image.Dither.NONE))
             picture = Image.fromarray(now if before is None else np.where(now == before, np.uint8(255), now))
             picture.putpalette(colours)
             before = now
             yield picture
 
     film_of = pictures()
-    next(film_of).save(path, format="GIF", save_all=True, append_images=film_of, duration=max(20, round(1000 / fps)), loop=0,
-                       optimize=False, transparency=255, disposal=1)
+    next(film_of).save(path,
+                       format="GIF",
+                       save_all=True,
+                       append_images=film_of,
+                       duration=max(20, round(1000 / fps)),
+                       loop=0,
+                       optimize=False,
+                       transparency=255,
+                       disposal=1)
 
 
 def main(argv=None):
     p = command.parser("Make a film of a run.", "film.mp4")
-    p.add_argument("--colour", "--color", choices=COLOURS, default="speed", help="what colours the floes (default: speed)")
+    p.add_argument("--colour",
+                   "--color",
+                   choices=COLOURS,
+                   default="speed",
+                   help="what colours the floes (default: speed)")
     p.add_argument("--fps", type=float, default=20, help="frames per second (default: 20)")
-    p.add_argument("--frames", metavar="N", type=int, help="at most N frames, evenly spaced (default: all, 120 for a GIF)")
+    p.add_argument("--frames",
+                   metavar="N",
+                   type=int,
+                   help="at most N frames, evenly spaced (default: all, 120 for a GIF)")
     p.add_argument("--width", metavar="PX", type=int, help="width in pixels (default: 1280, 900 for a GIF)")
     p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",
                    help="the whole domain, or a window that moves with the body (default: auto)")

@@ -41,6 +41,52 @@ class RunError(Exception):
 
 
 @dataclass(frozen=True)
+class Estimate:
+    """An estimate of the resistance as a file tells of it."""
+
+    name: str
+    label: str
+    on_top: bool         #: no resistance of ice: it comes on top of the others, and no run is held against it
+    uses_floe_size: bool  #: its curve differs between fields of one case
+    numbers: dict        #: what summary.json says: force_n, low_n, high_n, valid, compares, note, ...
+
+    @property
+    def force(self):
+        """N, NaN where the formula has no value."""
+        force = self.numbers.get("force_n")
+        return np.nan if force is None else force
+
+    @property
+    def valid(self):
+        """It is meant for the conditions."""
+        return bool(self.numbers.get("valid"))
+
+    @property
+    def compares(self):
+        """A run is held against it: it is valid, and knows the concentration. Results of earlier versions do not say
+        the second."""
+        return bool(self.numbers.get("compares", self.valid and not self.on_top)) and self.force > 0
+
+
+def estimates_of(summary):
+    """{name: Estimate} of a summary, in the order of the program's registry; {} where there are none."""
+    found, labels = summary.get("estimates"), summary.get("estimate_labels") or {}
+    found = found if isinstance(found, dict) else {}
+    out = {}
+    for name, numbers in found.items():
+        if not (isinstance(numbers, dict) and "force_n" in numbers):
+            continue  # a condition, or the curves
+        # An earlier version gives no labels; what comes on top has no ratio there, though it has a force.
+        told = labels.get(name) or {
+            "kind": "on top" if numbers["force_n"] and numbers.get("simulated_over_estimate") is None else ""
+        }
+        out[name] = Estimate(name,
+                             told.get("label") or name.replace("_", " "),
+                             told.get("kind") == "on top", bool(told.get("uses_floe_size")), numbers)
+    return out
+
+
+@dataclass(frozen=True)
 class Body:
     """A body that is not a floe: the towed body, a wall, or a fixed body given by hand."""
 
@@ -197,7 +243,31 @@ class Run:
 
     def description(self, name):
         """One sentence on a series."""
-        return str(_plain(self._dataset(f"series/{name}").attrs.get("description", "")))
+        return self.told(name, "description")
+
+    def told(self, name, what):
+        """What the file tells of a series: role, label, summary, merge, ...; "" where it does not."""
+        return str(_plain(self._dataset(f"series/{name}").attrs.get(what, "")))
+
+    def label(self, name):
+        """What pictures and tables call a series."""
+        return self.told(name, "label") or name.replace("_", " ")
+
+    def by_role(self, *roles):
+        """Names of the series with one of these roles ("balance", "force", "load", "diagnostic"), in the order of the
+        program's registry."""
+        told = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
+        # of an earlier version: the forces go by their names
+        if not any("role" in attributes for attributes in told.values()):
+            return sorted((n for n in told if n.endswith("_force") or n == "ice_resistance"),
+                          key=lambda n: (n != "tow_force", n != "ice_resistance", n)) if "balance" in roles else []
+        return sorted((n for n in told if _plain(told[n].get("role", "")) in roles),
+                      key=lambda n: int(told[n]["order"]))
+
+    @property
+    def estimates(self):
+        """{name: Estimate}."""
+        return estimates_of(self.summary)
 
     @property
     def window(self):
@@ -207,7 +277,8 @@ class Run:
 
     @property
     def verdict(self):
-        """("steady", "not steady" or "too short", the reason); "not judged" of a result that names no verdict: an older one, or without a towed body."""
+        """("steady", "not steady" or "too short", the reason); "not judged" of a result that names no verdict: an older
+        one, or without a towed body."""
         window = self.summary.get("window")
         window = window if isinstance(window, dict) else {}
         return str(window.get("verdict") or "not judged"), str(window.get("reason") or window.get("warning") or "")
@@ -223,12 +294,14 @@ class Run:
         return "mean" if self.verdict[0] == "steady" else "mean over the window"
 
     def interval(self, key):
-        """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval; NaN where it is not known.
+        """(mean, low, high) in N of "ice_resistance", "tow_force", ...: the mean over the window and its 95 % interval;
+        NaN where it is not known.
 
         Results of earlier versions have a standard error and no interval: there low and high are 1.96 of them off.
         """
         mean, se = self.number(f"mean_{key}_n"), self.number(f"mean_{key}_se_n")
-        return mean, self.number(f"mean_{key}_low_n", mean - 1.96 * se), self.number(f"mean_{key}_high_n", mean + 1.96 * se)
+        return mean, self.number(f"mean_{key}_low_n",
+                                 mean - 1.96 * se), self.number(f"mean_{key}_high_n", mean + 1.96 * se)
 
     def number(self, key, default=np.nan):
         """A number of summary.json, "window.start_s" for one in a group; default where it is missing or null."""
@@ -359,17 +432,20 @@ class Run:
         """Attributes and data sets of a group as one dict."""
         node = self._file.get(name)
         if not isinstance(node, h5py.Group):
-            raise RunError(self.result, f"has no /{name}", f"{meaning}: run a case with a towed body and impact.conversion other than none")
+            raise RunError(self.result, f"has no /{name}",
+                           f"{meaning}: run a case with a towed body and impact.conversion other than none")
         return {**{k: _plain(v) for k, v in node.attrs.items()}, **{k: self._read(f"{name}/{k}") for k in node}}
 
     @property
     def impacts(self):
-        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", what a peak means."""
+        """Collisions with the towed body: dict of columns [n] ("time", "floe", "peak", ...) and "conversion", what a
+        peak means."""
         return self._once("impacts", lambda: self._group("impacts", "collisions were not told apart"))
 
     @property
     def panels(self):
-        """Panels of the hull: dict of "ends" [P+1, 2], "middle" and "normal" [P, 2], body frame, m; loads "mean_load", "max_load", ... [P] N."""
+        """Panels of the hull: dict of "ends" [P+1, 2], "middle" and "normal" [P, 2], body frame, m; loads "mean_load",
+        "max_load", ... [P] N."""
         return self._once("panels", lambda: self._group("panels", "loads by panel were not kept"))
 
     # ---- frames
@@ -452,8 +528,8 @@ class Run:
     def polygon_array(self, frame, centre=None):
         """Floes of a frame for a PolyCollection: (outlines [K, M, 2] m, index [K]).
 
-        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. The first N rows are the floes in
-        order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
+        Outlines with fewer than M vertices repeat their last one. Row k is floe index[k]. The first N rows are the
+        floes in order; in a periodic domain, images follow of those that reach over the edge of the wrapped domain.
         """
         pose = self.pose(frame)
         pose[:, :2] = self.wrap(pose[:, :2], centre)

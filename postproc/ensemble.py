@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Statistics of an ensemble: means with intervals, estimates beside them, distributions, extreme peaks, sensitivity; as text, CSV and JSON.
+"""Statistics of an ensemble: means with intervals, estimates beside them, distributions, extreme peaks, sensitivity; as
+text, CSV and JSON.
 
-Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder. Where members of the study are in no number
-(they wait, failed, are not sound, or have no mean), all is written, they are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
+Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder.
+Where members of the study are in no number (they wait, failed, are not sound, or have no mean), all is written, they
+are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
 """
 import argparse
 import csv
@@ -22,7 +24,6 @@ from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
 
 import numpy as np
 
-ESTIMATES = ("lichey_hellmer", "marchenko_compaction", "marchenko_rafting", "marchenko_momentum", "dilute_limit", "open_water_drag")
 LEAST_DRIFT = 5  # fields
 MATERIAL = 0.02  # of the mean: a drift below it does not matter, as in src/output/steady.h
 MOST_SAMPLES = 300  # of the series of a condition that distributions are fitted to
@@ -33,12 +34,16 @@ def member(e, m):
     within = stat_mean.series_mean(e.steady(m))
     mean = e.number("mean_ice_resistance_n", m)
     low, high = within.interval() if within.n > 1 else (np.nan, np.nan)
-    return {"name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean, "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
-            "independent": within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))}
+    return {
+        "name": e.name[m], "condition": int(e.condition[m]), "seed": int(e.seed[m]), "mean": mean,
+        "se_within": within.se, "within_95": (mean + low - within.mean, mean + high - within.mean),
+        "independent": within.n_eff, "tau_samples": within.tau, "dof": within.dof, "doubts": sorted(e.doubts(m))
+    }
 
 
 def samples(e, rows, members):
-    """Every 2 tau-th sample of the steady windows of a condition: (values above zero, at most MOST_SAMPLES; share that is not; all values)."""
+    """Every 2 tau-th sample of the steady windows of a condition: (values above zero, at most MOST_SAMPLES; share that
+    is not; all values)."""
     every = []
     for m in rows:
         x, tau = e.steady(m), members[m]["tau_samples"]
@@ -50,13 +55,23 @@ def samples(e, rows, members):
 
 
 def estimates(e, rows, mean):
-    """Force of each estimate, mean of the condition's fields, and simulated / estimate."""
+    """Force of each estimate, mean of the condition's fields, and simulated / estimate where all of them are held
+    against it (bergtow/estimate.h)."""
     out = {}
-    for name in ESTIMATES:
-        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.full(e.n, np.nan))[rows] for what in ("force_n", "valid"))
-        force = float(np.mean(force)) if len(rows) else np.nan
-        out[name] = {"force": force, "valid": bool(len(rows) and np.all(valid == 1)),
-                     "ratio": mean / force if force > 0 and name != "open_water_drag" else np.nan}
+    for name, told in e.estimates.items():
+        def column(what, default=None):
+            values = e.summary.get(f"estimates_{name}_{what}")
+            return np.full(
+                len(rows),
+                np.nan) if values is None and default is None else default if values is None else values[rows]
+        valid = column("valid")
+        force, compares = float(np.mean(column("force_n"))) if len(rows) else np.nan, column("compares", valid)
+        held = len(rows) and not told["on_top"] and np.all(compares == 1) and force > 0
+        out[name] = {
+            "label": told["label"], "on_top": told["on_top"], "force": force,
+            "valid": bool(len(rows)
+                          and np.all(valid == 1)), "compares": bool(held), "ratio": mean / force if held else np.nan
+        }
     return out
 
 
@@ -67,7 +82,10 @@ def extremes(e, rows, options):
         hits = e.impacts(m)
         if hits:
             time, peak, start, hours, conversion = hits
-            fields.append({"time": time, "peak": peak, "start": start, "hours": hours, "gap": 2 * e.number("window_correlation_time_s", m)})
+            fields.append({
+                "time": time, "peak": peak, "start": start, "hours": hours,
+                "gap": 2 * e.number("window_correlation_time_s", m)
+            })
             conversions.add(conversion)
     if not fields:
         return {"refused": "no collisions: the members' folders are not there, or impact.conversion was none"}
@@ -78,14 +96,18 @@ def extremes(e, rows, options):
     peaks, rate = stat_extreme.exceedance(fields)
     hours = sum(f["hours"] for f in fields)
     ranks = [k for k in (1, 3, 10, 30, 100, 300, 1000) if k <= len(peaks)]
-    return {"conversion": conversions.pop(), "fields": len(fields), "hours": hours, "collisions": len(peaks), "collisions_per_hour": len(peaks) / hours,
-            "exceedance": [{"per_hour": rate[k - 1], "peak": peaks[k - 1]} for k in ranks],
-            "block_maxima": stat_extreme.by_blocks(fields, options.hours, options.blocks, options.resamples),
-            "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)}
+    return {
+        "conversion": conversions.pop(), "fields": len(fields), "hours": hours, "collisions": len(peaks),
+        "collisions_per_hour": len(peaks) / hours, "exceedance": [{"per_hour": rate[k - 1], "peak": peaks[k - 1]}
+                                                                  for k in ranks],
+        "block_maxima": stat_extreme.by_blocks(fields, options.hours, options.blocks, options.resamples),
+        "over_threshold": stat_extreme.over_threshold(fields, options.hours, gap, options.threshold, options.resamples)
+    }
 
 
 def drift(e, rows, mean):
-    """Does the mean of all fields change over the window? From the line through each member's ice resistance, which one run alone may not tell from its noise."""
+    """Does the mean of all fields change over the window? From the line through each member's ice resistance, which one
+    run alone may not tell from its noise."""
     change = e.summary.get("window_series_ice_resistance_change_n", np.full(e.n, np.nan))[rows]
     change = change[np.isfinite(change)]
     if len(change) < LEAST_DRIFT:
@@ -93,9 +115,14 @@ def drift(e, rows, mean):
     low, high = stat_mean.t_interval(change)
     factor, unit = style.scale([abs(change.mean())], "N")
     moved = (low > 0 or high < 0) and abs(change.mean()) > MATERIAL * abs(mean)
-    words = (f"{'rises' if change.mean() > 0 else 'falls'} by {style.short(abs(change.mean()) / factor)} {unit} "
-             f"(95 %: {style.short(min(abs(low), abs(high)) / factor)} to {style.short(max(abs(low), abs(high)) / factor)})") if moved else "no drift"
-    return {"verdict": "not steady" if moved else "steady", "change": change.mean(), "change_95": (low, high), "words": words}
+    words = (
+        f"{'rises' if change.mean() > 0 else 'falls'} by {style.short(abs(change.mean()) / factor)} {unit} "
+        f"(95 %: {style.short(min(abs(low), abs(high)) / factor)} to {style.short(max(abs(low), abs(high)) / factor)})"
+    ) if moved else "no drift"
+    return {
+        "verdict": "not steady" if moved else "steady", "change": change.mean(), "change_95": (low, high),
+        "words": words
+    }
 
 
 def condition(e, c, members, options):
@@ -105,28 +132,38 @@ def condition(e, c, members, options):
     fields = stat_mean.between_fields(means, errors, options.error)
     values, none, pooled = samples(e, rows, members)
     quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
-    return {"index": c.index, "label": c.label, "values": c.values, "units": c.units,
-            "members": {"all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
-                        "doubts": {kind: sum(kind in e.doubts(m) for m in rows) for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)},
-            "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)), "estimates": estimates(e, rows, fields.get("mean", np.nan)),
-            "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)],
-            "samples": {"independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
-                        "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]},
-            "extremes": extremes(e, rows, options)}
+    return {
+        "index": c.index, "label": c.label, "values": c.values, "units": c.units, "members": {
+            "all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
+            "doubts": {kind: sum(kind in e.doubts(m) for m in rows)
+                       for kind in DOUBTS}, "doubtful": sum(bool(e.doubts(m)) for m in rows)
+        }, "resistance": fields, "drift": drift(e, rows, fields.get("mean", np.nan)),
+        "estimates": estimates(e, rows, fields.get("mean", np.nan)),
+        "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
+            "independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
+            "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
+        }, "extremes": extremes(e, rows, options)
+    }
 
 
 def sensitivity(e, members):
-    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was varied.
+    """Rank correlations and Sobol indices of the members' means, and Sobol indices of their logarithms, over what was
+    varied.
 
-    Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be predicted.
+    Where a few jams make up the variance of the mean no smooth function predicts it; its logarithm may still be
+    predicted.
     """
     rows = e.used
     varied = {k: v[rows] for k, v in e.parameters.items() if len(set(v[rows].tolist())) > 1}
     y = np.array([members[m]["mean"] for m in rows])
     if not varied or len(rows) < 8:
         return {"refused": "nothing is varied" if not varied else f"{len(rows)} members, needs 8"}
-    logs = stat_sensitivity.sobol(varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
-    return {"members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y), "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs}
+    logs = stat_sensitivity.sobol(
+        varied, np.log(y)) if y.min() > 0 else {"refused": f"{np.sum(y <= 0)} means are not positive"}
+    return {
+        "members": len(rows), "ranks": stat_sensitivity.rank_correlations(varied, y),
+        "sobol": stat_sensitivity.sobol(varied, y), "sobol_of_logarithm": logs
+    }
 
 
 def nothing_to_count(e, dropped):
@@ -134,15 +171,19 @@ def nothing_to_count(e, dropped):
     if dropped:
         return RunError(e.file, "has no member with a mean ice resistance left", "exclude less")
     if e.behind:
-        return RunError(e.file, f"knows of none of the {len(e.behind)} members that have finished", "run `bergtow ensemble` again: it takes them in")
+        return RunError(e.file, f"knows of none of the {len(e.behind)} members that have finished",
+                        "run `bergtow ensemble` again: it takes them in")
     failed = e.reasons(FAILED)
     name, why = next(iter(failed.items()), (None, None))
     told = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
     if e.unsound:
-        return RunError(e.file, f"has no sound member{told}; {e.holes()}", "run `bergtow ensemble` again: it runs them anew")
+        return RunError(e.file, f"has no sound member{told}; {e.holes()}",
+                        "run `bergtow ensemble` again: it runs them anew")
     if np.any(e.status == FINISHED):
-        return RunError(e.file, f"has no member with a mean ice resistance{told}", "tow a body, for longer than output.window_start")
-    return RunError(e.file, f"has no member that has finished{told}", "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
+        return RunError(e.file, f"has no member with a mean ice resistance{told}",
+                        "tow a body, for longer than output.window_start")
+    return RunError(e.file, f"has no member that has finished{told}",
+                    "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
 
 
 def waiting(e):
@@ -157,9 +198,14 @@ def statistics(e, options):
         raise nothing_to_count(e, dropped)
     members = {int(m): member(e, m) for m in e.used}
     conditions = [condition(e, c, members, options) for c in e.conditions()]
-    return {"title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error, "excluded": dropped, "exclude": sorted(options.exclude),
-            "failed": e.reasons(FAILED), "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder, "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(), "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions, "sensitivity": sensitivity(e, members),
-            "members": list(members.values())}
+    return {
+        "title": e.title, "folder": str(e.path), "complete": e.complete, "wanted_error": options.error,
+        "excluded": dropped, "exclude": sorted(options.exclude), "failed": e.reasons(FAILED),
+        "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
+        "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
+        "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions,
+        "sensitivity": sensitivity(e, members), "members": list(members.values())
+    }
 
 
 def plain(value):
@@ -180,15 +226,20 @@ def plain(value):
 def csv_row(c):
     """Flat columns of a condition; forces in N."""
     r = c["resistance"]
-    row = {"condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"], **{k: c["members"][k] for k in ("failed", "waiting", "excluded")},
-           **{f"doubt_{k}": n for k, n in c["members"]["doubts"].items()}}
-    for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max", "largest_share", "fields_needed"):
+    row = {
+        "condition": c["index"] + 1, **c["values"], "fields": c["members"]["used"],
+        **{k: c["members"][k]
+           for k in ("failed", "waiting", "excluded")}, **{f"doubt_{k}": n
+                                                           for k, n in c["members"]["doubts"].items()}
+    }
+    for key in ("mean", "se_between", "se_within", "sd_between", "sd_of_fields", "median", "trimmed_mean", "min", "max",
+                "largest_share", "fields_needed"):
         row[key] = r.get(key)
     for key in ("t_95", "bootstrap_95", "median_95"):
         row[f"{key}_low"], row[f"{key}_high"] = r.get(key, (None, None))
     for name, estimate in c["estimates"].items():
         row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
-        if name != "open_water_drag":
+        if not estimate["on_top"]:
             row[f"simulated_over_{name}"] = estimate["ratio"]
     return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
 
@@ -197,14 +248,16 @@ def write(s, folder):
     """statistics.json and statistics.csv in the folder. Errors: RunError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "statistics.json").write_text(json.dumps(plain(s), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        (folder / "statistics.json").write_text(json.dumps(plain(s), indent=1, allow_nan=False) + "\n",
+                                                encoding="utf-8")
         rows = [csv_row(c) for c in s["conditions"]]
         with open(folder / "statistics.csv", "w", newline="", encoding="utf-8") as f:
             table = csv.DictWriter(f, list(rows[0]))
             table.writeheader()
             table.writerows(rows)
     except OSError as error:
-        raise RunError(folder, f"cannot be written ({error.strerror or error})", "choose another folder with -o") from None
+        raise RunError(folder, f"cannot be written ({error.strerror or error})",
+                       "choose another folder with -o") from None
 
 
 def positive(text):
@@ -224,16 +277,48 @@ def whole(text):
 def main(argv=None):
     p = argparse.ArgumentParser(description="Statistics of an ensemble: tables, statistics.csv and statistics.json.")
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
-    p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to write statistics.csv and .json (default: DIR)")
+    p.add_argument("-o",
+                   "--output",
+                   metavar="FOLDER",
+                   type=Path,
+                   help="where to write statistics.csv and .json (default: DIR)")
     p.add_argument("--markdown", action="store_true", help="print the tables as Markdown")
-    p.add_argument("--error", type=positive, default=0.05, metavar="E", help="relative error of the mean that the number of fields needed is for (default 0.05)")
-    p.add_argument("--exclude", action="append", choices=sorted(DOUBTS), default=[], help="leave out members with this doubt, and name them; may be repeated")
-    p.add_argument("--hours", type=positive, nargs="+", default=[1.0, 10.0, 100.0], metavar="T", help="return times of peaks, hours of tow (default 1 10 100)")
-    p.add_argument("--threshold", type=float, metavar="N", help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
-    p.add_argument("--gap", type=float, metavar="S", help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
-    p.add_argument("--blocks", type=whole, metavar="K", help="blocks a field for block maxima (default: so many that there are 20)")
-    p.add_argument("--resamples", type=whole, default=stat_fit.RESAMPLES, metavar="B", help="resamples for p-values and return levels (default %(default)s)")
-    p.add_argument("--partial", action="store_true", help="exit with 0 even where members of the study are in no number")
+    p.add_argument("--error",
+                   type=positive,
+                   default=0.05,
+                   metavar="E",
+                   help="relative error of the mean that the number of fields needed is for (default 0.05)")
+    p.add_argument("--exclude",
+                   action="append",
+                   choices=sorted(DOUBTS),
+                   default=[],
+                   help="leave out members with this doubt, and name them; may be repeated")
+    p.add_argument("--hours",
+                   type=positive,
+                   nargs="+",
+                   default=[1.0, 10.0, 100.0],
+                   metavar="T",
+                   help="return times of peaks, hours of tow (default 1 10 100)")
+    p.add_argument("--threshold",
+                   type=float,
+                   metavar="N",
+                   help="threshold of peaks over a threshold, N (default: a tenth of all peaks are above)")
+    p.add_argument("--gap",
+                   type=float,
+                   metavar="S",
+                   help="peaks closer than this are one cluster, s (default: 2 correlation times of the resistance)")
+    p.add_argument("--blocks",
+                   type=whole,
+                   metavar="K",
+                   help="blocks a field for block maxima (default: so many that there are 20)")
+    p.add_argument("--resamples",
+                   type=whole,
+                   default=stat_fit.RESAMPLES,
+                   metavar="B",
+                   help="resamples for p-values and return levels (default %(default)s)")
+    p.add_argument("--partial",
+                   action="store_true",
+                   help="exit with 0 even where members of the study are in no number")
     a = p.parse_args(argv)
     e = Ensemble(a.folder)
     s = statistics(e, a)
@@ -242,7 +327,11 @@ def main(argv=None):
     print(ensemble_text.report(s, a.markdown))
     print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
     if s["holes"] and not a.partial:
-        raise RunError(e.path, s["holes"], "run `bergtow ensemble` again, with --retry-failed for those that failed, or take what there is with --partial")
+        raise RunError(
+            e.path, s["holes"],
+            "run `bergtow ensemble` again, with --retry-failed for those that failed, or take what there is with "
+            "--partial"
+        )
 
 
 if __name__ == "__main__":

@@ -7,8 +7,9 @@
     time, ice = e.series(m)                        # of member m, all of its run
     e.doubts(m)                                    # {"unconverged", "jammed", ...}
 
-ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. It is read only under a sound seal, and a member whose files do not
-fit the record of its end (soundness.py) counts as waiting: it is in no number until `bergtow ensemble` has run it again. Errors: RunError.
+ensemble.h5 holds all but collisions and the texts of warnings; those are in the members' folders. It is read only under
+a sound seal, and a member whose files do not fit the record of its end (soundness.py) counts as waiting: it is in no
+number until `bergtow ensemble` has run it again. Errors: RunError.
 """
 import json
 from dataclasses import dataclass
@@ -28,7 +29,8 @@ MIN_INDEPENDENT = 20  # samples below which the program itself calls a window sh
 DOUBTS = {
     "unconverged": "steps met the sweep limit before the tolerance",
     "jammed": "the towed body stood still while the tow asked for motion",
-    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not solved",
+    "unsteady": "its window is not that of a steady tow: a trend, a jam, a change of speed, or steps that were not "
+                "solved",
     "short": "no window, or fewer than 20 independent samples in it",
     "stopped": "the run stopped early",
     "other": "a warning of another kind",
@@ -53,7 +55,8 @@ class Condition:
         words = []
         for key, value in self.values.items():
             unit = self.units[key]
-            words.append(f"{short_key(key)} " + (value if isinstance(value, str) else f"{value:.4g}" + (f" {unit}" if unit not in ("", "1") else "")))
+            words.append(f"{short_key(key)} " + (value if isinstance(value, str) else f"{value:.4g}" +
+                                                 (f" {unit}" if unit not in ("", "1") else "")))
         return ", ".join(words) or "the case"
 
 
@@ -70,7 +73,8 @@ def listed(names, most=8):
 
 
 class Ensemble:
-    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M]; unsound: {name: why}."""
+    """An ensemble's folder. parameters, summary: {name: array [M]}; name, condition, repeat, seed, status, reason: [M];
+    unsound: {name: why}."""
 
     def __init__(self, path):
         self.path = Path(path)
@@ -78,12 +82,14 @@ class Ensemble:
         if not self.path.is_dir():
             raise RunError(self.path, "no such folder", "give the folder that `bergtow ensemble -o` wrote")
         if not self.file.exists():
-            raise RunError(self.path, "holds no ensemble.h5", "give the folder that `bergtow ensemble -o` wrote, or run it again")
+            raise RunError(self.path, "holds no ensemble.h5",
+                           "give the folder that `bergtow ensemble -o` wrote, or run it again")
         try:
             self._read()
             self.unsound = self._unsound()
         except (OSError, KeyError, ValueError, RuntimeError) as error:
-            raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})", "run `bergtow ensemble` again: it makes the file anew") from None
+            raise RunError(self.file, f"is no ensemble ({str(error).splitlines()[0]})",
+                           "run `bergtow ensemble` again: it makes the file anew") from None
         self._dropped = {}
 
     def _read(self):
@@ -101,6 +107,11 @@ class Ensemble:
                 unit = data.attrs.get("units", "1")
                 self.units[key] = unit.decode() if isinstance(unit, bytes) else str(unit)
             self.summary = {key: data[()] for key, data in f["summary"].items()}
+            self.meaning = {
+                key: {k: v.decode() if isinstance(v, bytes) else v
+                      for k, v in data.attrs.items()}
+                for key, data in f["summary"].items()
+            }
             self._series = {key: f[f"series/{key}"][()] for key in ("time", "ice_resistance")}
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
         self.study = self.study.decode() if isinstance(self.study, bytes) else str(self.study)
@@ -110,9 +121,14 @@ class Ensemble:
 
     def _unsound(self):
         """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
-        out = {self.name[m]: self.reason[m].strip() for m in np.flatnonzero(self.status == WAITING) if self.reason[m].startswith("its result")}
+        out = {
+            self.name[m]: self.reason[m].strip()
+            for m in np.flatnonzero(self.status == WAITING)
+            if self.reason[m].startswith("its result")
+        }
         for m in np.flatnonzero(self.status == FINISHED) if soundness.available() else ():
-            why = soundness.fault_of_member(self.folder(m), self.name[m], self.study.encode()) if self.folder(m).is_dir() else None
+            why = soundness.fault_of_member(self.folder(m), self.name[m],
+                                            self.study.encode()) if self.folder(m).is_dir() else None
             if why:
                 out[self.name[m]] = why
                 self.status[m], self.reason[m] = WAITING, f"its result is not sound: {why}"
@@ -121,6 +137,23 @@ class Ensemble:
     def number(self, key, m):
         """A number of a member's summary, NaN where there is none."""
         return float(self.summary[key][m]) if key in self.summary else np.nan
+
+    @cached_property
+    def estimates(self):
+        """{name: {"label", "on_top"}} of the estimates in the members' summaries, in the order of the program's
+        registry.
+
+        The file says of each force which estimate it is of; of an earlier version the names of the columns do, and what
+        comes on top has no ratio there.
+        """
+        forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
+        out = {}
+        for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
+            told, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
+            on_top = told[
+                "kind"] == "on top" if "kind" in told else f"estimates_{name}_simulated_over_estimate" not in self.summary
+            out[told.get("estimate", name)] = {"label": told.get("label", name.replace("_", " ")), "on_top": on_top}
+        return out
 
     @property
     def complete(self):
@@ -166,9 +199,12 @@ class Ensemble:
             texts, found = self._texts(m), set()
             window = texts.get("window") or {}
             verdict, independent = window.get("verdict"), self.number("window_n_independent", m)
-            short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(window.get("warning"))
-            checks = {"unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
-                      "unsteady": verdict == "not steady", "short": short, "stopped": bool(texts.get("stopped"))}
+            short = verdict == "too short" if verdict else not independent >= MIN_INDEPENDENT or bool(
+                window.get("warning"))
+            checks = {
+                "unconverged": self.number("unconverged_steps", m) > 0, "jammed": self.number("stalled_windows", m) > 0,
+                "unsteady": verdict == "not steady", "short": short, "stopped": bool(texts.get("stopped"))
+            }
             found |= {kind for kind, there in checks.items() if there}
             told = len(texts.get("warnings") or [])
             if told > sum(checks.values()):
@@ -183,12 +219,19 @@ class Ensemble:
     @cached_property
     def behind(self):
         """Members that have finished since ensemble.h5 was made."""
-        return [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()]
+        return [
+            self.name[m]
+            for m in np.flatnonzero(self.status == WAITING)
+            if self.name[m] not in self.unsound and (self.folder(m) / "finished").exists()
+        ]
 
     def reasons(self, status):
         """{name: why} of the members that failed, or of the waiting ones whose process died."""
-        return {self.name[m]: self.reason[m].strip() or "no reason recorded" for m in np.flatnonzero(self.status == status)
-                if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound}
+        return {
+            self.name[m]: self.reason[m].strip() or "no reason recorded"
+            for m in np.flatnonzero(self.status == status)
+            if (self.reason[m] or status == FAILED) and self.name[m] not in self.unsound
+        }
 
     @cached_property
     def without_folder(self):
@@ -202,11 +245,15 @@ class Ensemble:
         return [self.name[m] for m in np.flatnonzero((self.status == FINISHED) & ~np.isfinite(mean))]
 
     def holes(self):
-        """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where nothing is missing."""
+        """What is in no number though the study asks for it, and nobody asked to leave it out: a sentence, "" where
+        nothing is missing."""
         waiting = [self.name[m] for m in np.flatnonzero(self.status == WAITING) if self.name[m] not in self.unsound]
-        kinds = (("not sound", list(self.unsound)), ("waiting", waiting), ("failed", [self.name[m] for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
+        kinds = (("not sound", list(self.unsound)), ("waiting", waiting),
+                 ("failed", [self.name[m]
+                             for m in np.flatnonzero(self.status == FAILED)]), ("without a mean", self.without_mean))
         parts = [f"{len(names)} {kind} ({listed(names)})" for kind, names in kinds if names]
-        return f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}" if parts else ""
+        return (f"{sum(len(names) for _, names in kinds)} of {self.n} members are in no number: {', '.join(parts)}"
+                if parts else "")
 
     def exclude(self, kinds):
         """Leave members with these doubts out from here on; returns {name: kinds} of those dropped."""
@@ -220,7 +267,9 @@ class Ensemble:
     def used(self):
         """Rows of members that finished with a mean and are not excluded."""
         mean = self.summary.get("mean_ice_resistance_n", np.full(self.n, np.nan))
-        return np.array([m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean)) if int(m) not in self._dropped], dtype=int)
+        return np.array(
+            [m for m in np.flatnonzero((self.status == FINISHED) & np.isfinite(mean)) if int(m) not in self._dropped],
+            dtype=int)
 
     def conditions(self):
         """Every Condition, in the order of the study."""
@@ -228,13 +277,19 @@ class Ensemble:
         for index in np.unique(self.condition):
             rows = np.flatnonzero(self.condition == index)
             first = rows[0]
-            values = {key: (str(column[first]) if column.dtype == object else float(column[first])) for key, column in self.parameters.items()}
-            out.append(Condition(int(index), values, self.units, rows, np.array([m for m in rows if m in used], dtype=int),
-                                 int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)), sum(int(m) in self._dropped for m in rows)))
+            values = {
+                key: (str(column[first]) if column.dtype == object else float(column[first]))
+                for key, column in self.parameters.items()
+            }
+            out.append(
+                Condition(int(index), values, self.units, rows, np.array([m for m in rows if m in used], dtype=int),
+                          int(np.sum(self.status[rows] == FAILED)), int(np.sum(self.status[rows] == WAITING)),
+                          sum(int(m) in self._dropped for m in rows)))
         return out
 
     def impacts(self, m):
-        """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they were not told apart, or without a window."""
+        """Collisions of a member in its window: (time s, peak N, its start s, hours, conversion), or None where they
+        were not told apart, or without a window."""
         hours, start = self.number("impacts_hours", m), self.number("impacts_from_s", m)
         if not hours > 0 or not self.folder(m).is_dir():
             return None

@@ -5,15 +5,14 @@ import numpy as np
 import style
 from ensemble_read import listed
 
-SHORT = {"lichey_hellmer": "Lichey–Hellmer", "marchenko_compaction": "compaction", "marchenko_rafting": "rafting", "marchenko_momentum": "momentum",
-         "dilute_limit": "dilute", "open_water_drag": "open water"}
 DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
 
 
 def table(head, rows, markdown):
     """Columns of a head and rows of texts; the first is left-aligned, the others right."""
     if markdown:
-        return "\n".join("| " + " | ".join(cells) + " |" for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows))
+        return "\n".join("| " + " | ".join(cells) + " |"
+                         for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows))
     width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
     def line(cells):
         return "  ".join([cells[0].ljust(width[0])] + [c.rjust(w) for c, w in zip(cells[1:], width[1:])]).rstrip()
@@ -21,7 +20,8 @@ def table(head, rows, markdown):
 
 
 def number(value, digits=3):
-    return "–" if value is None or not np.isfinite(value) else style.short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+    return "–" if value is None or not np.isfinite(value) else style.short(
+        value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
 
 
 def pair(values, factor=1.0):
@@ -51,42 +51,75 @@ def unit_of(s):
 
 def means(s, markdown):
     factor, unit = unit_of(s)
-    head = ["condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields", "standard error in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"]
+    head = [
+        "condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
+        "standard error in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"
+    ]
     rows = []
     for c in s["conditions"]:
         r = c["resistance"]
         if not r["n"]:
             rows.append([c["label"], fields_cell(c)] + ["–"] * (len(head) - 3) + [doubts(c)])
             continue
-        rows.append([c["label"], fields_cell(c), number(r["mean"] / factor), pair(r["t_95"], factor), pair(r["bootstrap_95"], factor), number(r["median"] / factor),
-                     number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–", number(r["sd_between"] / factor), number(r["se_within"] / factor),
-                     f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–", f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–", doubts(c)])
-    note = ("95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth of the fields at each end (from 8 fields on). "
-            "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by its correlation time. "
-            "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body stood still, N window not steady, S short window, X stopped early, O other warning.")
-    drifting = [f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"]
+        rows.append([
+            c["label"],
+            fields_cell(c),
+            number(r["mean"] / factor),
+            pair(r["t_95"], factor),
+            pair(r["bootstrap_95"], factor),
+            number(r["median"] / factor),
+            number(r["trimmed_mean"] / factor) if r["trimmed_each_end"] else "–",
+            number(r["sd_between"] / factor),
+            number(r["se_within"] / factor),
+            f"{100 * r['largest_share']:.0f} %" if np.isfinite(r["largest_share"]) else "–",
+            f"{r['fields_needed']:.0f}" if np.isfinite(r["fields_needed"]) else "–",
+            doubts(c)
+        ])
+    note = (
+        "95 %: of the mean of all fields, by Student's t and by the studentised bootstrap. Trimmed: without an eighth "
+        "of the fields at each end (from 8 fields on). "
+        "Sd of fields: standard deviation between the means of runs; standard error in a run: of one run's mean, by "
+        "its correlation time. "
+        "Largest: share of the field with the largest mean in the sum of all. Doubts: U unconverged steps, J body "
+        "stood still, N window not steady, S short window, X stopped early, O other warning."
+    )
+    drifting = [
+        f"{c['label']}: {c['drift']['words']}" for c in s["conditions"] if c["drift"]["verdict"] == "not steady"
+    ]
     if drifting:
-        note += ("\n\nNOT STEADY over all fields: the mean of the fields still changes within the window, by more than one run can see. " + "; ".join(drifting)
-                 + ". Begin the window later, or run longer.")
+        note += (
+            "\n\nNOT STEADY over all fields: the mean of the fields still changes within the window, by more than one "
+            "run can see. "
+            + "; ".join(drifting) + ". Begin the window later, or run longer.")
     return table(head, rows, markdown) + "\n\n" + note
 
 
 def estimates(s, markdown):
     factor, unit = unit_of(s)
-    head = ["condition", f"simulated, {unit}", *SHORT.values()]
+    labels = {name: e["label"] for c in s["conditions"] for name, e in c["estimates"].items()}
+    head = ["condition", f"simulated, {unit}", *labels.values()]
     rows = []
     for c in s["conditions"]:
         cells = [c["label"], number(c["resistance"].get("mean", np.nan) / factor)]
-        for name in SHORT:
+        for name in labels:
             e = c["estimates"][name]
             text = number(e["force"] / factor) + ("" if e["valid"] or not np.isfinite(e["force"]) else "*")
             cells.append(text + (f" ({number(e['ratio'])})" if np.isfinite(e["ratio"]) else ""))
         rows.append(cells)
-    return table(head, rows, markdown) + "\n\nIn brackets: simulated / estimate. * outside the range the estimate is meant for. Open water: drag without ice, which comes on top."
+    on_top = [
+        f"{label}: no resistance of ice, comes on top." for name, label in labels.items()
+        if s["conditions"][0]["estimates"][name]["on_top"]
+    ]
+    note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
+            "* outside the range the estimate is meant for.")
+    return table(head, rows, markdown) + "\n\n" + " ".join([note, *on_top])
 
 
 def fits(s, markdown):
-    head = ["condition", "means: best fit", "p", "second", "p", "samples: best fit", "p", "second", "p", "samples", "at or below 0"]
+    head = [
+        "condition", "means: best fit", "p", "second", "p", "samples: best fit", "p", "second", "p", "samples",
+        "at or below 0"
+    ]
     rows = []
     for c in s["conditions"]:
         cells = [c["label"]]
@@ -95,34 +128,61 @@ def fits(s, markdown):
                 cells += ["–", "–"] if "refused" in f else [f["name"], number(f["p_value"], 2)]
         share = c["samples"]["not_above_zero"]
         rows.append(cells + [str(c["samples"]["independent"]), f"{100 * share:.0f} %" if np.isfinite(share) else "–"])
-    return (table(head, rows, markdown) + "\n\nBest two by AICc of normal, lognormal, Weibull, gamma and GEV. p: Anderson–Darling with parametric bootstrap, small = does not fit. "
-            "Samples: step means of the resistance, two correlation times apart; those above 0 are fitted.")
+    return (
+        table(head, rows, markdown) +
+        "\n\nBest two by AICc of normal, lognormal, Weibull, gamma and GEV. p: Anderson–Darling with parametric "
+        "bootstrap, small = does not fit. "
+        "Samples: step means of the resistance, two correlation times apart; those above 0 are fitted.")
 
 
 def extremes(s, markdown):
     some = [c for c in s["conditions"] if "refused" not in c["extremes"]]
     if not some:
         return "No peaks: " + s["conditions"][0]["extremes"]["refused"] + "."
-    hours = [level["hours"] for c in some for kind in ("over_threshold", "block_maxima") for level in c["extremes"][kind].get("levels", [])]
+    hours = [
+        level["hours"] for c in some for kind in ("over_threshold", "block_maxima")
+        for level in c["extremes"][kind].get("levels", [])
+    ]
     hours = sorted(set(hours))
-    factor, unit = style.scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]], "N")
-    head = ["condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p", *(f"once in {T:g} h" for T in hours)]
+    factor, unit = style.scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]],
+                               "N")
+    head = [
+        "condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",
+        *(f"once in {T:g} h" for T in hours)
+    ]
     rows = []
     for c in some:
         x = c["extremes"]
-        first = [f"{x['hours']:.3g}", number(x["collisions_per_hour"]), number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"]
+        first = [
+            f"{x['hours']:.3g}",
+            number(x["collisions_per_hour"]),
+            number(x["exceedance"][0]["peak"] / factor) if x["exceedance"] else "–"
+        ]
         for kind, label in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
             f = x[kind]
             if "refused" in f:
                 rows.append([c["label"], label, *first, "–", "–", *["–"] * len(hours)])
                 continue
             at = {level["hours"]: level for level in f["levels"]}
-            rows.append([c["label"], label, *first, f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})", number(f["p_value"], 2),
-                         *(f"{number(at[T]['level'] / factor)}{'*' if at[T]['beyond_data'] else ''} ({pair(at[T]['level_95'], factor)})" if T in at else "–" for T in hours)])
-    refused = {f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}" for c in some for kind in ("over_threshold", "block_maxima") if "refused" in c["extremes"][kind]}
+            rows.append([
+                c["label"], label, *first,
+                f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+                number(f["p_value"], 2),
+                *(f"{number(at[T]['level'] / factor)}{'*' if at[T]['beyond_data'] else ''} "
+                  f"({pair(at[T]['level_95'], factor)})"
+                  if T in at else "–" for T in hours)
+            ])
+    refused = {
+        f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}"
+        for c in some
+        for kind in ("over_threshold", "block_maxima")
+        if "refused" in c["extremes"][kind]
+    }
     conversions = sorted({c["extremes"]["conversion"] for c in some})
-    text = (f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. GPD: peaks over a threshold; GEV: block maxima. "
-            "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest peak seen.")
+    text = (
+        f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. GPD: peaks over a threshold; GEV: block maxima. "
+        "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest peak seen."
+    )
     return table(head, rows, markdown) + "\n\n" + "\n".join([text, *(f"No fit for {r}." for r in sorted(refused))])
 
 
@@ -134,21 +194,30 @@ def sensitivity(s, markdown):
     given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
     names = set(x["ranks"]).union(*(i for _, i in given))
     def weight(name):
-        return -max([i[name]["total"] for _, i in given if name in i], default=0.0), -abs(np.nan_to_num(x["ranks"].get(name, {}).get("prcc", 0.0)))
+        return -max([i[name]["total"] for _, i in given if name in i], default=0.0), -abs(
+            np.nan_to_num(x["ranks"].get(name, {}).get("prcc", 0.0)))
     rows = []
     for name in sorted(names, key=weight):
         r = x["ranks"].get(name)
-        cells = [name, *([number(r["spearman"], 2), f"{number(r['prcc'], 2)} ({pair(r['prcc_95'])})"] if r else ["–", "–"])]
+        cells = [
+            name, *([number(r["spearman"], 2), f"{number(r['prcc'], 2)} ({pair(r['prcc_95'])})"] if r else ["–", "–"])
+        ]
         for _, indices in given:
             i = indices.get(name)
-            cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first", "total")] if i else ["–", "–"]
+            cells += [f"{number(i[what], 2)} ({pair(i[f'{what}_95'])})" for what in ("first",
+                                                                                     "total")] if i else ["–", "–"]
         rows.append(cells)
-    head = ["parameter", "Spearman", "PRCC", *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))]
+    head = [
+        "parameter", "Spearman", "PRCC",
+        *(f"Sobol {what}, of the {of}" for of, _ in given for what in ("first", "total"))
+    ]
     notes = [f"{x['members']} members. Brackets: 95 %."]
     for of, k in kinds:
-        notes.append(f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
-                     f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, {k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
-                     f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields and what it misses.")
+        notes.append(
+            f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
+            f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, {k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
+            f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields and what it misses."
+        )
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
 
@@ -160,32 +229,55 @@ def report(s, markdown=False):
     """Everything, section by section."""
     mark = "## " if markdown else ""
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
-    lines = [f"{mark}{s['title']}", "", (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."]
+    lines = [
+        f"{mark}{s['title']}", "",
+        (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."
+    ]
     if s["waiting"]:
-        lines.append(f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number ({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields.")
+        lines.append(
+            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number ({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields."
+        )
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
-        lines.append(f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: {name}: {why}. `bergtow ensemble` again runs what is damaged anew.")
+        lines.append(
+            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: {name}: {why}. `bergtow ensemble` again runs what is damaged anew."
+        )
     if s["without_mean"]:
-        lines.append(f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no steady window, or no body.")
+        lines.append(
+            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no steady window, or no body."
+        )
     if not s["checked"]:
-        lines.append("Whether the files are as they were written was not checked: this machine has neither libxxhash nor the Python package xxhash.")
+        lines.append(
+            "Whether the files are as they were written was not checked: this machine has neither libxxhash nor the Python package xxhash."
+        )
     if s["behind"]:
-        lines.append(f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in.")
+        lines.append(
+            f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in."
+        )
     for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
-            lines.append(f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the first: {name}: {why}")
+            lines.append(
+                f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the first: {name}: {why}"
+            )
     if s["excluded"]:
-        lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " + ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
+        lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
+                     ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
     if s["members_without_folder"]:
-        lines.append(f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their peaks not at all.")
-    heavy = [c["label"] for c in s["conditions"] if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5]
+        lines.append(
+            f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their peaks not at all."
+        )
+    heavy = [
+        c["label"]
+        for c in s["conditions"]
+        if c["resistance"].get("n", 0) > 3 and c["resistance"]["largest_share"] > 0.5
+    ]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
-    for title, part in (("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits), ("Extreme peaks", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
+    for title, part in (("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
+                        ("Extreme peaks", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
         lines += ["", f"#{mark}{title}" if markdown else title, "", part(s, markdown)]
     return "\n".join(lines)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Force chains: the contact forces of one step as lines through the ice, as wide as they are strong.
 
-The contacts come from `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`. A line goes from the centroid of one floe over the contact point to
-that of the other, or ends at the contact point on a large body or a wall. Force = normal impulse / time step, the points of one pair of floes together.
+The contacts come from `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`. A line goes from the centroid of one floe
+over the contact point to that of the other, or ends at the contact point on a large body or a wall. Force = normal
+impulse / time step, the points of one pair of floes together.
 """
 import argparse
 from dataclasses import dataclass
@@ -39,7 +40,8 @@ def read(path):
     try:
         with h5py.File(path, "r") as f:
             if "places" not in f or "solution" not in f:
-                raise RunError(path, "does not say where its contacts are", "write it with --dump-contacts of this version")
+                raise RunError(path, "does not say where its contacts are",
+                               "write it with --dump-contacts of this version")
             places = f["places"]
             dt = float(places.attrs["dt"])
             force = f["solution/r"][()][::2] / dt
@@ -48,13 +50,16 @@ def read(path):
             return Contacts(float(places.attrs["time"]), places["body"][()][edge], places["normal"][()][edge],
                             places["lever"][()].reshape(-1, 2, 2)[edge], force[edge], places["pose"][()])
     except FileNotFoundError:
-        raise RunError(path, "no such file", "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None
+        raise RunError(path, "no such file",
+                       "write it with `bergtow run CASE -o RUN --dump-contacts STEP:FILE.h5`") from None
     except (OSError, KeyError, ValueError) as error:
-        raise RunError(path, f"is no dumped contact problem ({str(error).splitlines()[0]})", "write it with --dump-contacts") from None
+        raise RunError(path, f"is no dumped contact problem ({str(error).splitlines()[0]})",
+                       "write it with --dump-contacts") from None
 
 
 def pairs(c):
-    """Contacts of one pair of bodies taken together: (body [m, 2], lever [m, 2, 2] at the pressure centre, force [m]); those without force are left out."""
+    """Contacts of one pair of bodies taken together: (body [m, 2], lever [m, 2, 2] at the pressure centre, force [m]);
+    those without force are left out."""
     some = c.force > 0
     body, lever, force = c.body[some], c.lever[some], c.force[some]
     unique, which = np.unique(body, axis=0, return_inverse=True)
@@ -66,7 +71,8 @@ def pairs(c):
 
 
 def segments(run, c):
-    """(lines [k, 2, 2] m, force [k] N): from a floe's centroid to the contact; none on the side of a body that is no floe."""
+    """(lines [k, 2, 2] m, force [k] N): from a floe's centroid to the contact; none on the side of a body that is no
+    floe."""
     body, lever, force = pairs(c)
     lines, values = [], []
     for side in (0, 1):
@@ -87,7 +93,8 @@ def outlines(run, c):
 
 
 def view(run, lines, bodies, whole):
-    """(x0, x1, y0, y1) m: the domain, or as much of it as the towed body and the forces need, a tenth of its shorter side around them."""
+    """(x0, x1, y0, y1) m: the domain, or as much of it as the towed body and the forces need, a tenth of its shorter
+    side around them."""
     x0, x1, y0, y1 = run.box
     points = [lines.reshape(-1, 2)] + ([bodies[run.towed]] if run.towed is not None else [])
     points = np.concatenate(points)
@@ -101,7 +108,8 @@ def view(run, lines, bodies, whole):
 def draw(run, c, whole=False):
     """The figure."""
     if len(c.pose) != run.n_floes + len(run.bodies):
-        raise RunError(run.path, f"has {run.n_floes + len(run.bodies)} bodies, the contacts are of {len(c.pose)}", "give the file that this run dumped")
+        raise RunError(run.path, f"has {run.n_floes + len(run.bodies)} bodies, the contacts are of {len(c.pose)}",
+                       "give the file that this run dumped")
     lines, force = segments(run, c)
     floes, bodies = outlines(run, c)
     turn = (lambda p: np.asarray(p)[..., ::-1]) if run.geographic else np.asarray
@@ -112,10 +120,16 @@ def draw(run, c, whole=False):
     figure = plt.figure(figsize=(width, height))
     axes = figure.add_axes((0.7 / width, 0.6 / height, (width - 2.1) / width, (height - 1.5) / height))
     axes.set_facecolor(style.WATER)
-    axes.add_collection(PolyCollection([turn(p) for p in floes], facecolor="#dfe9ef", edgecolor="#8fa3b3", linewidth=0.5))
+    axes.add_collection(
+        PolyCollection([turn(p) for p in floes], facecolor="#dfe9ef", edgecolor="#8fa3b3", linewidth=0.5))
     for body, shape in zip(run.bodies, bodies):
         colour = style.BODY if body.towed else style.WALL if body.wall else style.FIXED
-        axes.add_collection(PolyCollection([turn(shape)], facecolor=colour, edgecolor=style.BODY_EDGE if body.towed else colour, linewidth=0.8, zorder=2))
+        axes.add_collection(
+            PolyCollection([turn(shape)],
+                           facecolor=colour,
+                           edgecolor=style.BODY_EDGE if body.towed else colour,
+                           linewidth=0.8,
+                           zorder=2))
     top = force.max(initial=0.0)
     if top > 0:
         order = np.argsort(force)
@@ -123,10 +137,18 @@ def draw(run, c, whole=False):
         least = top * 10 ** -DECADES
         seen = force >= least
         widths = WIDEST * np.maximum(force[seen] / top, 1e-12) ** 0.5
-        drawn = LineCollection(turn(lines[seen]), array=force[seen], cmap=style.FORCE_MAP, norm=LogNorm(least, top), linewidths=np.maximum(widths, 0.4), capstyle="round", zorder=3)
+        drawn = LineCollection(turn(lines[seen]),
+                               array=force[seen],
+                               cmap=style.FORCE_MAP,
+                               norm=LogNorm(least, top),
+                               linewidths=np.maximum(widths, 0.4),
+                               capstyle="round",
+                               zorder=3)
         axes.add_collection(drawn)
         factor, unit = style.scale([top], "N")
-        bar = figure.colorbar(drawn, cax=figure.add_axes(((width - 1.15) / width, 0.6 / height, 0.16 / width, (height - 1.5) / height)),
+        bar = figure.colorbar(drawn,
+                              cax=figure.add_axes(
+                                  ((width - 1.15) / width, 0.6 / height, 0.16 / width, (height - 1.5) / height)),
                               format=lambda v, _: f"{v / factor:g}")
         bar.set_label(f"impulse / time step ({unit})")
     axes.set_aspect("equal")
@@ -135,9 +157,16 @@ def draw(run, c, whole=False):
     axes.set_ylim(low[1], high[1])
     axes.set_xlabel("y, east (m)" if run.geographic else "x (m)")
     axes.set_ylabel("x, north (m)" if run.geographic else "y (m)")
-    words = (f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, none below {10 ** -DECADES:.1g} of the largest" if top > 0
-             else "no contact bears a force")
-    figure.text(0.02, 1 - 0.14 / height, f"{style.title(run)}: force chains at {c.time:g} s", va="top", fontsize=13.5, fontweight="bold")
+    words = (
+        f"{len(pairs(c)[2])} pairs with a force, largest {style.quantity(top, 'N')}; width by the root of the force, "
+        f"none below {10 ** -DECADES:.1g} of the largest"
+        if top > 0 else "no contact bears a force")
+    figure.text(0.02,
+                1 - 0.14 / height,
+                f"{style.title(run)}: force chains at {c.time:g} s",
+                va="top",
+                fontsize=13.5,
+                fontweight="bold")
     figure.text(0.02, 1 - 0.42 / height, f"{style.conditions(run)}\n{words}", va="top", fontsize=10, color=style.FAINT)
     return figure
 
@@ -145,9 +174,18 @@ def draw(run, c, whole=False):
 def main(argv=None):
     p = argparse.ArgumentParser(description="Draw the force chains of one step.")
     p.add_argument("run", metavar="RUN", help="output folder of a run")
-    p.add_argument("contacts", metavar="FILE.h5", type=Path, help="what --dump-contacts STEP:FILE.h5 of that run wrote; without one, plot_field.py --colour force shows the largest force on each floe")
+    p.add_argument(
+        "contacts",
+        metavar="FILE.h5",
+        type=Path,
+        help=
+        "what --dump-contacts STEP:FILE.h5 of that run wrote; without one, plot_field.py --colour force shows the "
+        "largest force on each floe"
+    )
     p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: RUN/chains.png)")
-    p.add_argument("--whole", action="store_true", help="draw the whole domain (default: what holds the towed body and the forces)")
+    p.add_argument("--whole",
+                   action="store_true",
+                   help="draw the whole domain (default: what holds the towed body and the forces)")
     a = p.parse_args(argv)
     path = command.output(p, a, "chains.png", command.PICTURES)
     with Run(a.run) as run:

@@ -2,7 +2,8 @@
 """Pictures of an ensemble, those that its study supports.
 
     sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the others: every field, mean with
-                      95 %, median, jams; the estimates beside concentration, the law V^2 beside speed. A Latin hypercube: one panel, every member
+                      95 %, median, jams; the estimates beside concentration, the law V^2 beside speed. A Latin
+                      hypercube: one panel, every member
     exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
     map.png           mean and its relative uncertainty over two numbers of a grid
     sensitivity.png   Sobol indices and partial rank correlations
@@ -49,7 +50,8 @@ def groups(e, key):
             found.setdefault(tuple((k, v) for k, v in c.values.items() if k != key), []).append(c)
     def words(others):
         varied = [(k, v) for k, v in others if len(set(e.parameters[k].tolist())) > 1]
-        return ", ".join(f"{short_key(k)} {v}" if isinstance(v, str) else f"{short_key(k)} {v:.3g}" + (f" {e.units[k]}" if e.units[k] not in ("", "1") else "") for k, v in varied)
+        return ", ".join(f"{short_key(k)} {v}" if isinstance(v, str) else f"{short_key(k)} {v:.3g}" +
+                         (f" {e.units[k]}" if e.units[k] not in ("", "1") else "") for k, v in varied)
     return [(words(others), sorted(some, key=lambda c: c.values[key])) for others, some in found.items()]
 
 
@@ -91,24 +93,54 @@ def draw_fields(axes, e, some, key, factor, log_x):
     for c, y in zip(some, means):
         at, order = spread(c.values[key], len(y), half, log_x), np.argsort(y)
         jam = np.array(["jammed" in e.doubts(m) for m in c.finished])[order]
-        axes.plot(at[~jam], y[order][~jam] / factor, "o", color=style.ICE, alpha=0.35, markersize=3.6, markeredgewidth=0, zorder=3)
+        axes.plot(at[~jam],
+                  y[order][~jam] / factor,
+                  "o",
+                  color=style.ICE,
+                  alpha=0.35,
+                  markersize=3.6,
+                  markeredgewidth=0,
+                  zorder=3)
         axes.plot(at[jam], y[order][jam] / factor, "x", color=JAM, markersize=5, markeredgewidth=1.2, zorder=3.5)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
-        axes.fill_between(x, band[:, 0] / factor, band[:, 1] / factor, color=style.ICE, alpha=0.13, linewidth=0, zorder=2)
+        axes.fill_between(x,
+                          band[:, 0] / factor,
+                          band[:, 1] / factor,
+                          color=style.ICE,
+                          alpha=0.13,
+                          linewidth=0,
+                          zorder=2)
     axes.plot(x, centre / factor, color=style.ICE, linewidth=1.4, zorder=4)
     half_bar = np.nan_to_num(np.abs(band - centre[:, None])).T / factor
-    axes.errorbar(x, centre / factor, yerr=half_bar, fmt="s", color=style.ICE, markersize=5, capsize=3, linewidth=1.3, zorder=5)
-    axes.plot(x, [np.median(y) / factor for y in means], marker="_", markersize=13, markeredgewidth=2, color=style.INK, linestyle="none", zorder=6)
+    axes.errorbar(x,
+                  centre / factor,
+                  yerr=half_bar,
+                  fmt="s",
+                  color=style.ICE,
+                  markersize=5,
+                  capsize=3,
+                  linewidth=1.3,
+                  zorder=5)
+    axes.plot(x, [np.median(y) / factor for y in means],
+              marker="_",
+              markersize=13,
+              markeredgewidth=2,
+              color=style.INK,
+              linestyle="none",
+              zorder=6)
 
 
 def fields_legend(jams):
     """Handles and labels of draw_fields."""
     line = plt.Line2D
-    out = [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"), (line([], [], marker="o", color=style.ICE, alpha=0.35, linestyle="none", markersize=4), "a field"),
-           (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12, markeredgewidth=2), "median of the fields")]
+    out = [(line([], [], marker="s", color=style.ICE, markersize=5), "mean of the fields, 95 % (t)"),
+           (line([], [], marker="o", color=style.ICE, alpha=0.35, linestyle="none", markersize=4), "a field"),
+           (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
+                 markeredgewidth=2), "median of the fields")]
     if jams:
-        out.append((line([], [], marker="x", color=JAM, linestyle="none", markersize=5), "a field where the body stood still"))
+        out.append((line([], [], marker="x", color=JAM, linestyle="none",
+                         markersize=5), "a field where the body stood still"))
     return out
 
 
@@ -122,9 +154,11 @@ def force_limits(e, some_groups, log):
     tops = [stat_mean.t_interval(of(e, c.finished))[1] for _, some in some_groups for c in some]
     seen += [v for v in tops if np.isfinite(v)]
     low = min((v for v in seen if v > 0), default=1.0)
-    for name in ("lichey_hellmer", "dilute_limit"):
-        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used] for what in ("force_n", "valid"))
-        seen += [v for v in force[(valid == 1) & (force > low / 30)]]
+    high = max(seen, default=1.0)
+    for name in (name for name, told in e.estimates.items() if not told["on_top"]):
+        force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used]
+                        for what in ("force_n", "valid"))
+        seen += [v for v in force[(valid == 1) & (force > low / 30) & (force < 30 * high)]]
     seen = np.array([v for v in seen if np.isfinite(v)])
     if log:
         return seen[seen > 0].min() / 2, 2 * seen.max()
@@ -139,7 +173,8 @@ def wants_log(values):
 
 
 def power_law(x, means):
-    """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None where it makes no sense."""
+    """(exponent, low, high, factor) of mean = factor x^exponent over fields: regression of ln mean on ln x, 95 %; None
+    where it makes no sense."""
     lx = np.concatenate([np.full(len(y), np.log(v)) for v, y in zip(x, means)])
     y = np.concatenate(means)
     if len(set(lx)) < 2 or len(y) < 4 or y.min() <= 0:
@@ -163,8 +198,17 @@ def draw_speed(axes, e, some, key, factor):
     exponent, low, high, scale = law
     weights = np.array([len(y) for y in means], dtype=float)
     centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
-    axes.plot(v, scale * centre ** exponent * (v / centre) ** 2 / factor, color=style.TOW, linewidth=1.2, dashes=(5, 2), zorder=2.5)
-    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03), xycoords="axes fraction", ha="right", fontsize=9, color=style.FAINT)
+    axes.plot(v,
+              scale * centre**exponent * (v / centre)**2 / factor,
+              color=style.TOW,
+              linewidth=1.2,
+              dashes=(5, 2),
+              zorder=2.5)
+    axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03),
+                  xycoords="axes fraction",
+                  ha="right",
+                  fontsize=9,
+                  color=style.FAINT)
 
 
 def estimate_point(e, c):
@@ -190,7 +234,12 @@ def draw_sweep(e, key):
     log_y = wants_log([v for _, some in shown for c in some for v in of(e, c.finished)]) or log_x
     low, high = force_limits(e, shown, log_y)
     factor, unit = style.scale([np.sqrt(low * high) if log_y and low > 0 else high], "N")
-    figure, grid = plt.subplots(rows, columns, figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2), squeeze=False, sharex=True, sharey=True)
+    figure, grid = plt.subplots(rows,
+                                columns,
+                                figsize=(max(9.5, 4.4 * columns + 1), 3.9 * rows + 2.2),
+                                squeeze=False,
+                                sharex=True,
+                                sharey=True)
     extra = {}
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
@@ -200,7 +249,10 @@ def draw_sweep(e, key):
                 plot_resistance.draw_estimates(axes, [point], factor)
         elif key == "tow.speed":
             draw_speed(axes, e, some, key, factor)
-            extra["∝ V², through the middle of the fields"] = plt.Line2D([], [], color=style.TOW, linewidth=1.2, dashes=(5, 2))
+            extra["∝ V², through the middle of the fields"] = plt.Line2D([], [],
+                                                                         color=style.TOW,
+                                                                         linewidth=1.2,
+                                                                         dashes=(5, 2))
         for handle, label in zip(*axes.get_legend_handles_labels()):
             extra.setdefault(label, handle)
         axes.set_title(words, fontsize=10)
@@ -215,7 +267,10 @@ def draw_sweep(e, key):
     grid.flat[0].set_ylim(low / factor, high / factor)
     if not log_x:
         margin = 0.06 * (values.max() - values.min())
-        grid.flat[0].set_xlim(max(0.0, values.min() - margin), min(1.0, values.max() + margin) if key == "ice.concentration" else values.max() + margin)
+        grid.flat[0].set_xlim(max(0.0,
+                                  values.min() - margin),
+                              min(1.0,
+                                  values.max() + margin) if key == "ice.concentration" else values.max() + margin)
     for axes in grid.flat[len(shown):]:
         axes.set_visible(False)
     for k, axes in enumerate(grid.flat[:len(shown)]):
@@ -225,20 +280,32 @@ def draw_sweep(e, key):
             axes.set_xlabel(axis_label(e, key))
             axes.tick_params(labelbottom=True)
     pairs = fields_legend(jammed(e)) + [(handle, label) for label, handle in extra.items()]
-    note = " ".join(([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else [])
-                    + (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else [])
-                    + (["A bar down to the lower edge includes zero."] if log_y and any(stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
+    note = " ".join(
+        ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
+        (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else []) +
+        (["A bar down to the lower edge includes zero."] if log_y and any(
+            stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
     height = figure.get_size_inches()[1]
     lines = -(-len(pairs) // 3)
-    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0], right=0.98, top=1 - 0.95 / height, bottom=(0.95 + 0.24 * lines) / height, wspace=0.08, hspace=0.28)
-    figure.legend([h for h, _ in pairs], [t for _, t in pairs], loc="lower left", bbox_to_anchor=(0.02, 0.22 / height), ncol=3, fontsize=9)
+    figure.subplots_adjust(left=0.85 / figure.get_size_inches()[0],
+                           right=0.98,
+                           top=1 - 0.95 / height,
+                           bottom=(0.95 + 0.24 * lines) / height,
+                           wspace=0.08,
+                           hspace=0.28)
+    figure.legend([h for h, _ in pairs], [t for _, t in pairs],
+                  loc="lower left",
+                  bbox_to_anchor=(0.02, 0.22 / height),
+                  ncol=3,
+                  fontsize=9)
     figure.text(0.025, 0.08 / height, note, fontsize=9, color=style.FAINT)
     headline(figure, e, f"resistance against {short_key(key)}")
     return figure
 
 
 def draw_scatter(e, key):
-    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of equal number with 95 %."""
+    """Figure of a Latin hypercube: every member against one parameter, and the mean in bins of equal number with 95
+    %."""
     rows = e.used
     x, y = e.parameters[key][rows], of(e, rows)
     log_y = wants_log(y)
@@ -246,15 +313,35 @@ def draw_scatter(e, key):
     figure, axes = plt.subplots(figsize=(9.5, 5.8))
     figure.subplots_adjust(left=0.09, right=0.98, top=0.85, bottom=0.12)
     jam = np.array(["jammed" in e.doubts(m) for m in rows])
-    axes.plot(x[~jam], y[~jam] / factor, "o", color=style.ICE, alpha=0.45, markersize=4, markeredgewidth=0, label="a member")
+    axes.plot(x[~jam],
+              y[~jam] / factor,
+              "o",
+              color=style.ICE,
+              alpha=0.45,
+              markersize=4,
+              markeredgewidth=0,
+              label="a member")
     if jam.any():
         axes.plot(x[jam], y[jam] / factor, "x", color=JAM, markersize=5, label="a member whose body stood still")
     bins = np.array_split(np.argsort(x), min(8, len(x) // 8)) if len(x) >= 24 else []
     if bins:
         centre = np.array([y[b].mean() for b in bins])
         bars = np.abs(np.array([stat_mean.t_interval(y[b]) for b in bins]) - centre[:, None]).T
-        axes.errorbar([x[b].mean() for b in bins], centre / factor, yerr=bars / factor, fmt="s-", color=style.INK, markersize=5, capsize=3, linewidth=1.2, label="mean of a bin, 95 % (t)")
-        axes.plot([x[b].mean() for b in bins], [np.median(y[b]) / factor for b in bins], "_", color=style.TOW, markersize=14, markeredgewidth=2, label="median of a bin")
+        axes.errorbar([x[b].mean() for b in bins],
+                      centre / factor,
+                      yerr=bars / factor,
+                      fmt="s-",
+                      color=style.INK,
+                      markersize=5,
+                      capsize=3,
+                      linewidth=1.2,
+                      label="mean of a bin, 95 % (t)")
+        axes.plot([x[b].mean() for b in bins], [np.median(y[b]) / factor for b in bins],
+                  "_",
+                  color=style.TOW,
+                  markersize=14,
+                  markeredgewidth=2,
+                  label="median of a bin")
     if log_y:
         axes.set_yscale("log")
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
@@ -282,13 +369,23 @@ def draw_exceedance(e, options):
         if not some_above.any():
             continue
         conversion, top, least = hits[0][4], max(top, peaks[0]), min(least, peaks[some_above][-1])
-        axes.loglog(peaks[some_above], rate[some_above], color=colour, drawstyle="steps-post", linewidth=1.4, label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
+        axes.loglog(peaks[some_above],
+                    rate[some_above],
+                    color=colour,
+                    drawstyle="steps-post",
+                    linewidth=1.4,
+                    label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
         tail = extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
             z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
             beyond = np.maximum(1 + tail["shape"] * (z - tail["threshold"]) / tail["scale"], 0)
-            fitted = tail["rate_per_hour"] * (np.exp(-(z - tail["threshold"]) / tail["scale"]) if abs(tail["shape"]) < 1e-8 else beyond ** (-1 / tail["shape"]))
-            axes.plot(z, np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan), color=colour, linewidth=1, dashes=(4, 2))
+            fitted = tail["rate_per_hour"] * (np.exp(-(z - tail["threshold"]) / tail["scale"])
+                                              if abs(tail["shape"]) < 1e-8 else beyond**(-1 / tail["shape"]))
+            axes.plot(z,
+                      np.where(fitted > 0.1 / sum(h[3] for h in hits), fitted, np.nan),
+                      color=colour,
+                      linewidth=1,
+                      dashes=(4, 2))
     if conversion is None:
         plt.close(figure)
         return None
@@ -306,7 +403,8 @@ def draw_exceedance(e, options):
 
 
 def draw_map(e, first, second):
-    """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 % interval over it."""
+    """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 %
+    interval over it."""
     conditions = [c for c in e.conditions() if len(c.finished)]
     xs, ys = (sorted({c.values[k] for c in conditions}) for k in (first, second))
     mean, width, count = (np.full((len(ys), len(xs)), np.nan) for _ in range(3))
@@ -316,19 +414,28 @@ def draw_map(e, first, second):
             if rows:
                 sample = of(e, np.array(rows))
                 low, high = stat_mean.t_interval(sample)
-                mean[i, j], width[i, j], count[i, j] = sample.mean(), (high - low) / 2 / abs(sample.mean()) if sample.mean() else np.nan, len(rows)
+                mean[i, j], width[i, j], count[i, j] = sample.mean(), (high - low) / 2 / abs(
+                    sample.mean()) if sample.mean() else np.nan, len(rows)
     factor, unit = style.scale([np.nanmedian(mean)], "N")
     figure, axes = plt.subplots(1, 2, figsize=(12, 2.6 + 0.62 * len(ys)))
     height = figure.get_size_inches()[1]
     figure.subplots_adjust(left=0.08, right=0.98, top=1 - 1.15 / height, bottom=0.75 / height, wspace=0.2)
     log = wants_log(mean / factor)
-    for ax, values, label, texts, colours in ((axes[0], mean / factor, f"mean ice resistance ({unit})", lambda v: style.short(v), style.SPEED_MAP),
-                                              (axes[1], 100 * width, "half the 95 % interval of the mean (%)", lambda v: f"{v:.0f} %", style.FORCE_MAP)):
+    for ax, values, label, texts, colours in ((axes[0], mean / factor, f"mean ice resistance ({unit})",
+                                               lambda v: style.short(v), style.SPEED_MAP),
+                                              (axes[1], 100 * width, "half the 95 % interval of the mean (%)",
+                                               lambda v: f"{v:.0f} %", style.FORCE_MAP)):
         norm = LogNorm() if log and ax is axes[0] else None
         image = ax.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=norm)
         for (i, j), v in np.ndenumerate(values):
             shade = image.norm(v) if np.isfinite(v) else 0
-            ax.text(j, i, texts(v) if np.isfinite(v) else "–", ha="center", va="center", fontsize=9.5, color=style.PAPER if shade > 0.5 else style.INK)
+            ax.text(j,
+                    i,
+                    texts(v) if np.isfinite(v) else "–",
+                    ha="center",
+                    va="center",
+                    fontsize=9.5,
+                    color=style.PAPER if shade > 0.5 else style.INK)
         ax.set_xticks(range(len(xs)), [f"{v:.3g}" for v in xs])
         ax.set_yticks(range(len(ys)), [f"{v:.3g}" for v in ys])
         ax.tick_params(length=0)
@@ -344,7 +451,8 @@ def draw_map(e, first, second):
 def draw_indices(axes, names, indices):
     """Bars of first-order and total Sobol indices."""
     for k, name in enumerate(names):
-        for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"), ("total", -0.17, style.TOW, "total")) if name in indices else ():
+        for what, shift, colour, label in (("first", 0.17, style.ICE, "first order"),
+                                           ("total", -0.17, style.TOW, "total")) if name in indices else ():
             axes.barh(k + shift, indices[name][what], height=0.3, color=colour, label=label if k == 0 else None)
             axes.plot(indices[name][f"{what}_95"], [k + shift] * 2, color=style.INK, linewidth=1.2)
     axes.set_xlabel("share of the explained variance")
@@ -353,11 +461,16 @@ def draw_indices(axes, names, indices):
 
 
 def draw_sensitivity(e, x):
-    """Figure of Sobol indices, of the mean and of its logarithm where they are given, beside partial rank correlations; None where there is neither."""
+    """Figure of Sobol indices, of the mean and of its logarithm where they are given, beside partial rank correlations;
+    None where there is neither."""
     ranks = x.get("ranks", {})
-    given = [(words, x[key]) for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "indices" in x.get(key, {})]
-    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)), key=lambda k: (max([s["indices"][k]["total"] for _, s in given if k in s["indices"]], default=0),
-                                                                                      abs(ranks.get(k, {}).get("prcc", 0))))
+    given = [(words, x[key])
+             for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm"))
+             if "indices" in x.get(key, {})]
+    names = sorted(set(ranks).union(*(s["indices"] for _, s in given)),
+                   key=lambda k: (max([s["indices"][k]["total"]
+                                       for _, s in given
+                                       if k in s["indices"]], default=0), abs(ranks.get(k, {}).get("prcc", 0))))
     if not names:
         return None
     n = len(given) + 1
@@ -378,7 +491,11 @@ def draw_sensitivity(e, x):
     grid[0, 0].set_yticks(np.arange(len(names)), [short_key(k) for k in names])
     for ax in grid[0]:
         ax.grid(True, axis="x")
-    missing = [f"no Sobol indices of the {words}: {x[key]['refused']}" for words, key in (("mean", "sobol"), ("logarithm", "sobol_of_logarithm")) if "refused" in x.get(key, {})]
+    missing = [
+        f"no Sobol indices of the {words}: {x[key]['refused']}" for words, key in (("mean", "sobol"),
+                                                                                   ("logarithm", "sobol_of_logarithm"))
+        if "refused" in x.get(key, {})
+    ]
     figure.text(0.3 / width, 0.08 / height, "; ".join(["black: 95 %", *missing]), fontsize=9, color=style.FAINT)
     headline(figure, e, "what the resistance depends on")
     return figure
@@ -387,7 +504,8 @@ def draw_sensitivity(e, x):
 def pictures(e, options):
     """(name, function that draws it) of the pictures that the study supports."""
     keys = numeric(e)
-    out = [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key)) for key in keys]
+    out = [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key))
+           for key in keys]
     if not e.sampled and len(keys) >= 2:
         out.append(("map", lambda: draw_map(e, keys[0], keys[1])))
     if len(keys) >= 2:
@@ -401,8 +519,15 @@ def main(argv=None):
     p = argparse.ArgumentParser(description="Draw the pictures of an ensemble that its study supports.")
     p.add_argument("folder", metavar="DIR", help="folder of `bergtow ensemble`")
     p.add_argument("-o", "--output", metavar="FOLDER", type=Path, help="where to put the pictures (default: DIR)")
-    p.add_argument("--format", choices=[s[1:] for s in command.PICTURES], default="png", help="kind of the files (default png)")
-    p.add_argument("--exclude", action="append", choices=sorted(DOUBTS), default=[], help="leave out members with this doubt; may be repeated")
+    p.add_argument("--format",
+                   choices=[s[1:] for s in command.PICTURES],
+                   default="png",
+                   help="kind of the files (default png)")
+    p.add_argument("--exclude",
+                   action="append",
+                   choices=sorted(DOUBTS),
+                   default=[],
+                   help="leave out members with this doubt; may be repeated")
     a = p.parse_args(argv)
     a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0], None, None, None, 1
     e = Ensemble(a.folder)

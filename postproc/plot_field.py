@@ -46,7 +46,8 @@ def panel_words(run, label, frame, follow):
 
 
 def layout(n, view, turned, lines):
-    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation); lines: of a title between narrow panels.
+    """(figure size in inches, [axes rectangle, in inches], colour bar rectangle, orientation); lines: of a title
+    between narrow panels.
 
     Wide views stand one below the other, others side by side; sizes follow from the view, so nothing is left blank.
     """
@@ -114,7 +115,11 @@ def draw(run, kind="speed", times=(), window="auto"):
 
 def main(argv=None):
     p = command.parser("Draw the ice field before, during and after the tow.", "field.png")
-    p.add_argument("--colour", "--color", choices=COLOURS, default="speed", help="what colours the floes (default: speed)")
+    p.add_argument("--colour",
+                   "--color",
+                   choices=COLOURS,
+                   default="speed",
+                   help="what colours the floes (default: speed)")
     p.add_argument("--times", metavar="T", type=float, nargs="+", default=(),
                    help="draw the frames nearest to these times, s, in place of first, middle and last")
     p.add_argument("--window", choices=("auto", "whole", "body"), default="auto",

@@ -25,7 +25,8 @@ def running_mean(x, width):
 
 
 def smoothing(run):
-    """(samples, s) of the running mean: the time to tow one body length, at least 10 samples, at most 1/20 of the run."""
+    """(samples, s) of the running mean: the time to tow one body length, at least 10 samples, at most 1/20 of the
+    run."""
     time = run["time"]
     if len(time) < 3:
         return 1, 0.0
@@ -70,11 +71,26 @@ def draw_ice(axes, run, factor, unit, top=None):
         start, end = run.window
         steady = run.verdict[0] == "steady"
         if np.isfinite(bottom):
-            axes.fill_between([start, end], bottom / factor, ceiling / factor, color=style.TOW, alpha=0.28, linewidth=0, zorder=1.5)
-        axes.plot([start, end], [mean / factor] * 2, color=style.TOW, linewidth=1.8, linestyle="-" if steady else ":", zorder=4,
+            axes.fill_between([start, end],
+                              bottom / factor,
+                              ceiling / factor,
+                              color=style.TOW,
+                              alpha=0.28,
+                              linewidth=0,
+                              zorder=1.5)
+        axes.plot([start, end], [mean / factor] * 2,
+                  color=style.TOW,
+                  linewidth=1.8,
+                  linestyle="-" if steady else ":",
+                  zorder=4,
                   label=run.mean_name + (", 95 % interval" if np.isfinite(bottom) else ""))
     if np.isfinite(reference):
-        axes.axhline(reference / factor, color=style.REFERENCE, linewidth=1.3, dashes=(5, 3), zorder=4, label="reference")
+        axes.axhline(reference / factor,
+                     color=style.REFERENCE,
+                     linewidth=1.3,
+                     dashes=(5, 3),
+                     zorder=4,
+                     label="reference")
     marks = [m for m in (reference, bottom, ceiling) if np.isfinite(m)]
     _clip_peaks(axes, ice, smooth, marks, factor, top)
     axes.set_ylabel(f"ice resistance ({unit})")
@@ -88,34 +104,32 @@ def mark_window(axes, run):
     """Shade the window of the means; hatched where the tow is not steady in it."""
     if run.window:
         steady = run.verdict[0] in ("steady", "not judged")
-        axes.axvspan(*run.window, facecolor=style.WINDOW, edgecolor=style.PAPER if steady else style.FAINT, hatch=None if steady else "///",
-                     alpha=1 if steady else 0.35, linewidth=0, zorder=0)
+        axes.axvspan(*run.window,
+                     facecolor=style.WINDOW,
+                     edgecolor=style.PAPER if steady else style.FAINT,
+                     hatch=None if steady else "///",
+                     alpha=1 if steady else 0.35,
+                     linewidth=0,
+                     zorder=0)
 
 
 def draw_balance(axes, run, factor, unit):
-    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + other laws + inertia.
+    """Running means of the forces on the towed body along the tow: tow = ice + drag + Coriolis + tilt + ... + inertia.
 
-    Of the force laws beside drag, those are drawn that reach a hundredth of the tow.
+    Which they are, and in which order, the file says. Beside the first two, the tow and the ice, a force is drawn where
+    it reaches a hundredth of the tow.
     """
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    lines = [("tow_force", "tow force", style.TOW, 2.8, None),
-             ("ice_resistance", "ice resistance", style.ICE, 1.3, None),
-             ("drag_force", "drag", style.DRAG, 1.6, (6, 2)),
-             ("coriolis_force", "Coriolis", style.CORIOLIS, 1.6, (5, 1.5, 1, 1.5)),
-             ("tilt_force", "tilt", style.TILT, 1.6, (1, 1)),
-             ("inertia_force", "inertia", style.INERTIA, 1.6, (2, 1.5))]
-    laws = [name for name in run.series_names if name.endswith("_force") and name not in [line[0] for line in lines]]
-    lines += [(name, name[:-6].replace("_", " "), style.LAWS[k % len(style.LAWS)], 1.6, (4, 1)) for k, name in enumerate(laws)]
-    for name, label, colour, width, dashes in lines:
-        if name in run:
-            mean = running_mean(run[name], samples)
-            if name in ("coriolis_force", "tilt_force", *laws) and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
-                continue
-            line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=label)
-            if dashes:
-                line.set_dashes(dashes)
+    for k, name in enumerate(run.by_role("balance", "force")):
+        mean = running_mean(run[name], samples)
+        if k > 1 and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
+            continue
+        colour, width, dashes = style.BALANCE[k] if k < len(style.BALANCE) else style.BALANCE[-1 - k % 3]
+        line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=run.label(name))
+        if dashes:
+            line.set_dashes(dashes)
     axes.set_ylabel(f"running mean ({unit})")
     axes.grid(axis="y")
     axes.set_xlim(min(0.0, run["time"][0]), run["time"][-1])
@@ -131,7 +145,10 @@ def findings(run):
         factor, unit = style.scale([mean], "N")
         if np.isfinite(low) and high > low:  # all with the two digits that the interval leaves
             decimals = len(style.short((high - low) / 2 / factor, 2).partition(".")[2])
-            words.append(f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: {low / factor:.{decimals}f} to {high / factor:.{decimals}f})")
+            words.append(
+                f"{run.mean_name}: ice resistance {mean / factor:.{decimals}f} {unit} (95 %: "
+                f"{low / factor:.{decimals}f} to {high / factor:.{decimals}f})"
+            )
         else:
             words.append(f"{run.mean_name}: ice resistance {style.short(mean / factor)} {unit}")
     tow, low, high = run.interval("tow_force")
@@ -163,7 +180,14 @@ def draw(run, top=None):
     if not len(run["time"]):
         raise RunError(run.result, "holds no samples", "the run ended before its first sample: run the case for longer")
     figure = plt.figure(figsize=(11, 7.2))
-    grid = figure.add_gridspec(2, 1, height_ratios=(1.55, 1), hspace=0.30, left=0.085, right=0.975, top=0.79 if doubts(run) else 0.825, bottom=0.115)
+    grid = figure.add_gridspec(2,
+                               1,
+                               height_ratios=(1.55, 1),
+                               hspace=0.30,
+                               left=0.085,
+                               right=0.975,
+                               top=0.79 if doubts(run) else 0.825,
+                               bottom=0.115)
     upper = figure.add_subplot(grid[0])
     lower = figure.add_subplot(grid[1], sharex=upper)
     smooth = running_mean(run["ice_resistance"], smoothing(run)[0])
@@ -187,10 +211,9 @@ def draw(run, top=None):
 
 
 def draw_diagnostics(run):
-    """Contacts, sweeps, residual and overlap of every sample."""
-    rows = [("contacts", "contact points", style.ICE), ("sweeps", "sweeps", style.TOW),
-            ("residual", "residual", style.DRAG), ("overlap", "deepest overlap", style.INERTIA)]
-    rows = [row for row in rows if row[0] in run]
+    """The solver in every sample: contacts, sweeps, residual, overlap, and what has been registered beside them."""
+    rows = [(name, run.label(name), style.PANELS[k % len(style.PANELS)])
+            for k, name in enumerate(run.by_role("diagnostic"))]
     if not rows:
         raise RunError(run.result, "holds no series of the solver", "run the case again with this version")
     figure, all_axes = plt.subplots(len(rows), 1, sharex=True, squeeze=False, figsize=(11, 1.1 + 1.75 * len(rows)))
@@ -202,10 +225,11 @@ def draw_diagnostics(run):
         axes.set_ylabel(label + (f" ({unit})" if unit not in ("", "1") else ""))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
-        if name in ("residual", "overlap") and len(positive):
+        # of residual and overlap decades are of interest
+        if run.told(name, "merge") == "largest of the steps" and len(positive):
             axes.set_yscale("log")
             axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)
-        else:
+        elif not np.any(values < 0):
             axes.set_ylim(bottom=0)
         tolerance = run.number("tolerance_m_s")
         if name == "residual" and np.isfinite(tolerance):

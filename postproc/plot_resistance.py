@@ -15,14 +15,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-#: name in summary.json: label, colour
-ESTIMATES = {
-    "lichey_hellmer": ("Lichey–Hellmer 2001", style.TOW),
-    "marchenko_compaction": ("Marchenko, compaction", style.DRAG),
-    "marchenko_rafting": ("Marchenko, rafting", style.INERTIA),
-    "marchenko_momentum": ("Marchenko, momentum", "#56b4e9"),
-    "dilute_limit": ("dilute limit", "#e69f00"),
-}
 SAME = 0.02  # share by which the curves of runs in one picture may differ
 
 
@@ -42,12 +34,13 @@ class Point:
     reference: float      #: N, measured, NaN without one
     unconverged: float    #: share of the steps
     warnings: int
-    estimates: dict
+    estimates: dict       #: {name: Estimate}
+    conditions: dict      #: of the estimates: thickness_m, width_m, ..., and "curves"
 
-    def estimate(self, name):
-        """Force in N, NaN where the formula has no value."""
-        force = self.estimates[name]["force_n"]
-        return np.nan if force is None else force
+    @property
+    def of_ice(self):
+        """Estimates of the ice resistance."""
+        return {name: e for name, e in self.estimates.items() if not e.on_top}
 
 
 def read(path):
@@ -55,38 +48,54 @@ def read(path):
     with Run(path) as run:
         estimates = run.summary.get("estimates")
         if not isinstance(estimates, dict) or "curves" not in estimates:
-            raise RunError(run.path / "summary.json", "holds no estimates", "run a case with a towed body, with this version")
-        if estimates["lichey_hellmer"]["force_n"] is None:
+            raise RunError(run.path / "summary.json", "holds no estimates",
+                           "run a case with a towed body, with this version")
+        if estimates.get("speed_along_m_s") is None:
             raise RunError(run.path / "summary.json", "is of a body that is not towed", "run a case with a tow")
         made, (mean, low, high) = run.number("concentration"), run.interval("ice_resistance")
         if not np.isfinite(mean):
             raise RunError(run.path / "summary.json", "has no mean ice resistance", "run longer: there was no window")
         from_file = any(run.case.get(key, "none") != "none" for key in ("ice.field", "ice.outlines"))
-        return Point(path=run.path, title=style.title(run), asked=made if from_file else run.value("ice.concentration", made), concentration=made,
-                     mean=mean, se=run.number("mean_ice_resistance_se_n"), low=low, high=high, steady=run.verdict[0] == "steady", reference=run.number("reference.mean_force_n"),
+        return Point(path=run.path,
+                     title=style.title(run),
+                     asked=made if from_file else run.value("ice.concentration", made),
+                     concentration=made,
+                     mean=mean,
+                     se=run.number("mean_ice_resistance_se_n"),
+                     low=low,
+                     high=high,
+                     steady=run.verdict[0] == "steady",
+                     reference=run.number("reference.mean_force_n"),
                      unconverged=run.number("unconverged_steps", 0.0) / max(run.number("n_steps", 1.0), 1.0),
-                     warnings=len(run.summary.get("warnings") or []), estimates=estimates)
+                     warnings=len(run.summary.get("warnings") or []),
+                     estimates=run.estimates,
+                     conditions=estimates)
 
 
 def curve(point, name):
     """(concentration [n], force [n] N, NaN where there is none) of an estimate, for the conditions of a run."""
-    curves = point.estimates["curves"]
-    return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]], dtype=float)
+    curves = point.conditions["curves"]
+    return np.array(curves["concentration"], dtype=float), np.array([np.nan if f is None else f for f in curves[name]],
+                                                                    dtype=float)
 
 
 def check_alike(points):
     """One set of curves must do for all runs. Errors: RunError naming the first two that differ."""
     first = points[0]
     for other in points[1:]:
-        for name in (n for n in ESTIMATES if n != "dilute_limit"):  # the size of floes as made varies
+        # the size of floes as made varies
+        for name in (n for n, e in first.of_ice.items() if not e.uses_floe_size and n in other.of_ice):
             a, b = curve(first, name)[1], curve(other, name)[1]
             if not np.array_equal(np.isnan(a), np.isnan(b)) or not np.allclose(a, b, rtol=SAME, atol=0, equal_nan=True):
-                raise RunError(other.path, f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
-                               "draw them in pictures of their own")
+                raise RunError(
+                    other.path,
+                    f"has other conditions than {first.path} (thickness, width, speed or a key of estimate)",
+                    "draw them in pictures of their own")
 
 
 def rows(points):
-    """One row a concentration: (asked, number of runs, mean, standard error, ratio and force of each estimate, worst share of steps missed).
+    """One row a concentration: (asked, number of runs, mean, standard error, ratio and force of each estimate, worst
+    share of steps missed).
 
     Of several runs: mean of the means, standard error from their scatter. Of one: its own.
     """
@@ -95,57 +104,84 @@ def rows(points):
         some = [p for p in points if p.asked == asked]
         means = np.array([p.mean for p in some])
         se = means.std(ddof=1) / np.sqrt(len(some)) if len(some) > 1 else some[0].se
-        forces = {name: float(np.mean([p.estimate(name) for p in some])) for name in (*ESTIMATES, "open_water_drag")}
-        valid = {name: all(p.estimates[name]["valid"] for p in some) for name in ESTIMATES}
-        out.append({"concentration": asked, "runs": len(some), "mean": means.mean(), "se": se, "forces": forces, "valid": valid,
-                    "unconverged": max(p.unconverged for p in some), "warnings": sum(p.warnings for p in some)})
+        names = [name for name in some[0].estimates if all(name in p.estimates for p in some)]
+        forces = {name: float(np.mean([p.estimates[name].force for p in some])) for name in names}
+        valid, compares = ({name: all(getattr(p.estimates[name], what)
+                                      for p in some)
+                            for name in names}
+                           for what in ("valid", "compares"))
+        out.append({
+            "concentration": asked, "runs": len(some), "mean": means.mean(), "se": se, "forces": forces, "valid": valid,
+            "compares": compares, "unconverged": max(p.unconverged for p in some),
+            "warnings": sum(p.warnings for p in some)
+        })
     return out
 
 
 def table(points):
-    """The rows as a Markdown table: forces in N; in brackets simulated / estimate; * where the estimate is not meant for the conditions."""
-    head = ["ice, %", "runs", "simulated, N", "standard error, N", *(label for label, _ in ESTIMATES.values()), "steps not converged", "warnings"]
+    """The rows as a Markdown table: forces in N; in brackets simulated / estimate, where the run is held
+    against it (it is meant for the conditions and knows the concentration); * where the estimate is not meant for the
+    conditions."""
+    names = points[0].of_ice
+    head = [
+        "ice, %", "runs", "simulated, N", "standard error, N", *(e.label for e in names.values()),
+        "steps not converged", "warnings"
+    ]
     lines = ["| " + " | ".join(head) + " |", "|" + " ---: |" * len(head)]
     for row in rows(points):
-        cells = [f"{100 * row['concentration']:.3g}", str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"]
-        for name in ESTIMATES:
-            force = row["forces"][name]
+        cells = [
+            f"{100 * row['concentration']:.3g}",
+            str(row["runs"]), f"{row['mean']:.4g}", f"{row['se']:.2g}" if np.isfinite(row["se"]) else "–"
+        ]
+        for name in names:
+            force = row["forces"].get(name, np.nan)
             text = "–" if np.isnan(force) else f"{force:.3g}" + ("" if row["valid"][name] else "*")
-            cells.append(text + (f" ({row['mean'] / force:.3g})" if force > 0 else ""))
+            cells.append(text + (f" ({row['mean'] / force:.3g})" if row["compares"].get(name) else ""))
         cells += [f"{100 * row['unconverged']:.2g} %", str(row["warnings"])]
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def draw_estimates(axes, points, factor):
-    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for the range of rafting."""
+    """Curves: solid where an estimate is valid, thin and dotted elsewhere; a band for the range of one that gives a
+    range."""
     first = points[0]
-    valid = first.estimates["curves"]["valid_range"]
-    for name, (label, colour) in ESTIMATES.items():
+    valid = first.conditions["curves"]["valid_range"]
+    for k, (name, estimate) in enumerate(first.of_ice.items()):
+        label, colour = estimate.label, style.ESTIMATES[k % len(style.ESTIMATES)]
         a, force = curve(first, name)
         low, high = (np.nan if v is None else v for v in valid[name])
         inside = (a >= low) & (a <= high)
         with_force = np.where(force > 0, force, np.nan) / factor
         axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
         axes.plot(a, with_force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5)
-        spans = [p.estimates[name] for p in points if p.estimates[name]["force_n"]]
+        spans = [p.estimates[name].numbers for p in points if name in p.estimates and p.estimates[name].force]
+        spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
         if spans and spans[0]["high_n"] > spans[0]["low_n"]:
             down, up = (spans[0][k] / spans[0]["force_n"] for k in ("low_n", "high_n"))
-            axes.fill_between(a, np.where(inside, with_force * down, np.nan), np.where(inside, with_force * up, np.nan), color=colour, alpha=0.18,
-                              linewidth=0, zorder=1.2)
-    drag = first.estimate("open_water_drag") / factor
-    if drag > 0:
-        axes.axhline(drag, color=style.FAINT, linewidth=1, dashes=(6, 3), label="open-water drag (comes on top)")
+            axes.fill_between(a,
+                              np.where(inside, with_force * down, np.nan),
+                              np.where(inside, with_force * up, np.nan),
+                              color=colour,
+                              alpha=0.18,
+                              linewidth=0,
+                              zorder=1.2)
+    for estimate in first.estimates.values():
+        if estimate.on_top and estimate.force > 0:
+            axes.axhline(estimate.force / factor,
+                         color=style.FAINT,
+                         linewidth=1,
+                         dashes=(6, 3),
+                         label=f"{estimate.label} (comes on top)")
 
 
 def limits(points, log):
     """Lower and upper end of the force axis, N: the runs, and the estimates that are meant for what was run."""
     seen = [x for p in points for x in (p.mean, p.low, p.high, p.reference)]
     for p in points:
-        for name in ESTIMATES:
-            e = p.estimates[name]
-            if e["valid"] and e["force_n"]:
-                seen += [e["low_n"], e["high_n"]]
+        for e in p.of_ice.values():
+            if e.valid and e.force:
+                seen += [e.numbers["low_n"], e.numbers["high_n"]]
     seen = np.array([x for x in seen if np.isfinite(x)])
     if not log:
         return min(0.0, seen.min()), 1.1 * max(seen.max(), 1e-12)
@@ -153,7 +189,8 @@ def limits(points, log):
     if not len(seen):
         return 0.1, 10.0
     floor = min([p.mean for p in points if p.mean > 0], default=seen.max())
-    return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()  # an error bar that reaches zero must not stretch the axis
+    # an error bar that reaches zero must not stretch the axis
+    return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()
 
 
 def draw(points, log=True):
@@ -166,23 +203,44 @@ def draw(points, log=True):
     draw_estimates(axes, points, factor)
     a = np.array([p.concentration for p in points])
     mean = np.array([p.mean for p in points])
-    below, above = (np.nan_to_num(np.array(x)) for x in ([p.mean - p.low for p in points], [p.high - p.mean for p in points]))
+    below, above = (np.nan_to_num(np.array(x))
+                    for x in ([p.mean - p.low for p in points], [p.high - p.mean for p in points]))
     steady = np.array([p.steady for p in points])
     shown = mean > 0 if log else np.full(len(mean), True)
     below = np.minimum(below, mean - low / 2) if log else below
-    for which, face, label in ((steady, style.ICE, "simulated, 95 % of the run's mean"), (~steady, style.PAPER, "simulated, window not steady or too short")):
+    for which, face, label in ((steady, style.ICE, "simulated, 95 % of the run's mean"),
+                               (~steady, style.PAPER, "simulated, window not steady or too short")):
         which = which & shown
         if which.any():
-            axes.errorbar(a[which], mean[which] / factor, yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor, fmt="o", color=style.ICE,
-                          markerfacecolor=face, markersize=6, capsize=3, linewidth=1.4, zorder=5, label=label)
+            axes.errorbar(a[which],
+                          mean[which] / factor,
+                          yerr=np.array([np.maximum(below, 0)[which], above[which]]) / factor,
+                          fmt="o",
+                          color=style.ICE,
+                          markerfacecolor=face,
+                          markersize=6,
+                          capsize=3,
+                          linewidth=1.4,
+                          zorder=5,
+                          label=label)
     averaged = [r for r in rows(points) if r["runs"] > 1]
     if averaged:
-        axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged], marker="_", markersize=22,
-                  markeredgewidth=2.5, linestyle="none", color=style.INK, zorder=6, label="mean of the seeds")
+        axes.plot([r["concentration"] for r in averaged], [r["mean"] / factor for r in averaged],
+                  marker="_",
+                  markersize=22,
+                  markeredgewidth=2.5,
+                  linestyle="none",
+                  color=style.INK,
+                  zorder=6,
+                  label="mean of the seeds")
     measured = [p for p in points if np.isfinite(p.reference)]
     if measured:
-        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured], "D", color=style.REFERENCE,
-                  markersize=6, zorder=6, label="measured")
+        axes.plot([p.concentration for p in measured], [p.reference / factor for p in measured],
+                  "D",
+                  color=style.REFERENCE,
+                  markersize=6,
+                  zorder=6,
+                  label="measured")
     if log:
         axes.set_yscale("log")
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -193,13 +251,27 @@ def draw(points, log=True):
     axes.grid(which="major")
     handles, labels = axes.get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("simulated"))
-    axes.legend([handles[i] for i in order], [labels[i] for i in order], loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0, handlelength=2.4, labelspacing=0.8)
-    e = points[0].estimates
-    figure.text(0.02, 0.98, f"{points[0].title}: ice resistance and estimates" if len(points) == 1 else "Ice resistance and estimates", va="top",
-                fontsize=13.5, fontweight="bold")
-    figure.text(0.02, 0.94, f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
-                            f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}", va="top", color=style.FAINT)
-    notes = ["dotted: outside the range", "the estimate is meant for", "band: range of kappa"]
+    axes.legend([handles[i] for i in order], [labels[i] for i in order],
+                loc="upper left",
+                bbox_to_anchor=(1.02, 1.0),
+                borderaxespad=0,
+                handlelength=2.4,
+                labelspacing=0.8)
+    e = points[0].conditions
+    figure.text(
+        0.02,
+        0.98,
+        f"{points[0].title}: ice resistance and estimates" if len(points) == 1 else "Ice resistance and estimates",
+        va="top",
+        fontsize=13.5,
+        fontweight="bold")
+    figure.text(0.02,
+                0.94,
+                f"{e['thickness_m']:.3g} m of ice, body {e['width_m']:.3g} m across, {e['speed_along_m_s']:.3g} m/s "
+                f"through the ice; {len(points)} run{'s' if len(points) > 1 else ''}",
+                va="top",
+                color=style.FAINT)
+    notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
     if e["length_scale"] != 1:
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
     if not shown.all():
@@ -212,9 +284,17 @@ def draw(points, log=True):
 
 
 def main(argv=None):
-    p = argparse.ArgumentParser(description="Draw the mean ice resistance of runs against the concentration, beside the estimates.")
-    p.add_argument("run", metavar="RUN", nargs="+", help="output folders of runs that differ in concentration and seed only")
-    p.add_argument("-o", "--output", metavar="FILE", type=Path, help="file to write (default: resistance.png beside the first RUN)")
+    p = argparse.ArgumentParser(
+        description="Draw the mean ice resistance of runs against the concentration, beside the estimates.")
+    p.add_argument("run",
+                   metavar="RUN",
+                   nargs="+",
+                   help="output folders of runs that differ in concentration and seed only")
+    p.add_argument("-o",
+                   "--output",
+                   metavar="FILE",
+                   type=Path,
+                   help="file to write (default: resistance.png beside the first RUN)")
     p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
     a = p.parse_args(argv)

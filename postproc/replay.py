@@ -5,11 +5,11 @@ Positions, yaw, speed and contact force of the floes are kept as 16-bit numbers:
     x = low + step q          step: 1/65535 of the range (1/65536 of the period along a periodic direction)
     yaw = 2π q / 65536
     value = top (q / 65535)²  relative step 2 / q: fine where small, for speed and force
-Each is stored as the difference to the frame before, modulo 65536, low bytes first and high bytes after them, deflated, in base64: ice
-at rest costs next to nothing. postproc/page/replay.js undoes this.
+Each is stored as the difference to the frame before, modulo 65536, low bytes first and high bytes after them, deflated,
+in base64: ice at rest costs next to nothing. postproc/page/replay.js undoes this.
 
-Rejected: 32-bit floats (twice the size, and five digits more than a screen shows); a film (no zoom, no values); images of floes as
-SVG (a hundred times the size).
+Rejected: 32-bit floats (twice the size, and five digits more than a screen shows); a film (no zoom, no values); images
+of floes as SVG (a hundred times the size).
 """
 import base64
 import zlib
@@ -56,7 +56,8 @@ def read_frames(run, frames, floes):
         out[0, k], out[1, k], out[2, k] = pose.T
         out[3, k], out[4, k] = run.speed(frame)[floes], run.contact_force(frame)[floes]
     if not np.isfinite(out).all():
-        raise RunError(run.result, "/frames holds values that are not finite", "the file is damaged: run the case again")
+        raise RunError(run.result, "/frames holds values that are not finite",
+                       "the file is damaged: run the case again")
     return out
 
 
@@ -74,7 +75,8 @@ def quantise_root(x):
 
 
 def nearest_floes(run, frames, n):
-    """Ids of the n floes that come nearest to the towed body in some frames (without one: of the n largest), in order."""
+    """Ids of the n floes that come nearest to the towed body in some frames (without one: of the n largest), in
+    order."""
     if run.towed is None:
         return np.sort(np.argsort(-run.area, kind="stable")[:n])
     least = np.full(run.n_floes, np.inf)
@@ -101,12 +103,17 @@ class Replay:
         self.frames, self.floes = frames, floes
         self._say_what_is_left_out(frames, floes)
         self._add_outlines(floes)
-        self.head = {"deflate": compress, "times": run.frame_times[frames].tolist(), "stored_frames": run.n_frames, "n": len(floes), "n_floes": run.n_floes,
-                     "geographic": run.geographic, "box": list(run.box), "period": list(run.period), "moving": run.case.get("domain.ends") == "moving",
-                     "quanta": self.quanta, "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
-                     "edges": [run.case.get("domain.ends", ""), run.case.get("domain.sides", "")],
-                     "style": {k.lower(): getattr(style, k) for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK")},
-                     **self._bodies(frames), "curve": curve(run)}
+        self.head = {
+            "deflate": compress, "times": run.frame_times[frames].tolist(), "stored_frames": run.n_frames,
+            "n": len(floes), "n_floes": run.n_floes, "geographic": run.geographic, "box": list(run.box),
+            "period": list(run.period), "moving": run.case.get("domain.ends") == "moving", "quanta": self.quanta,
+            "colouring": self._colourings(frames), "ids": floes.tolist() if len(floes) < run.n_floes else None,
+            "edges": [run.case.get("domain.ends", ""),
+                      run.case.get("domain.sides", "")],
+            "style": {k.lower(): getattr(style, k)
+                      for k in ("WATER", "WALL", "FIXED", "BODY", "BODY_EDGE", "TRACK")
+                      }, **self._bodies(frames), "curve": curve(run)
+        }
 
     @property
     def size(self):
@@ -140,7 +147,9 @@ class Replay:
         self.quanta, numbers = {}, {}
         for axis, name, values in ((0, "x", x), (1, "y", y)):
             period = run.period[axis]
-            low, high = (run.box[2 * axis], run.box[2 * axis] + period) if period else (float(values.min(initial=np.inf)), float(values.max(initial=-np.inf)))
+            low, high = (run.box[2 * axis],
+                         run.box[2 * axis] + period) if period else (float(values.min(initial=np.inf)),
+                                                                     float(values.max(initial=-np.inf)))
             if not np.isfinite([low, high]).all():
                 low, high = 0.0, 1.0  # no floes
             numbers[name], *self.quanta[name] = quantise(values, low, high, period)
@@ -152,13 +161,21 @@ class Replay:
     def _say_what_is_left_out(self, frames, floes):
         run, notes = self.run, self.notes
         if len(frames) < run.n_frames:
-            notes.append(f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all are in result.h5.")
+            notes.append(
+                f"{len(frames)} of the {run.n_frames} stored frames are in this page, to keep it small; all are in "
+                f"result.h5."
+            )
         if len(floes) < run.n_floes:
             which = "those that come nearest to the towed body" if run.towed is not None else "the largest ones"
-            notes.append(f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small: the rest of the water is not free of ice. "
-                         "All are in result.h5.")
+            notes.append(
+                f"{len(floes)} of the {run.n_floes} floes are in this page, {which}, to keep it small: the rest of the "
+                f"water is not free of ice. "
+                "All are in result.h5.")
         worst = max(self.quanta[axis][1] / 2 for axis in "xy")
-        notes.append(f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact force to 16 bits; result.h5 holds them in full.")
+        notes.append(
+            f"Positions are rounded to {style.short(1000 * worst, 2)} mm, angles to 0.003°, speed and contact force to "
+            f"16 bits; result.h5 holds them in full."
+        )
 
     def _add_outlines(self, floes):
         run = self.run
@@ -170,16 +187,21 @@ class Replay:
         self.blobs["area"] = pack(run.area[floes].astype(np.float32), self.compress)
 
     def _colourings(self, frames):
-        """What the floes can be coloured by: label, upper and lower limit in SI, power of the scale, 64 colours; as in the pictures."""
+        """What the floes can be coloured by: label, upper and lower limit in SI, power of the scale, 64 colours; as in
+        the pictures."""
         run, out = self.run, []
         kinds = [("speed", "speed"), ("force", "contact force")]
         if run.n_floes and np.ptp(run.thickness) > 1e-9 * run.thickness.max():
             kinds.append(("thickness", "thickness"))
         for kind, name in kinds:
-            c = Colouring(run, kind, thinned(len(frames), 60) if len(frames) == run.n_frames else frames[thinned(len(frames), 60)])
+            c = Colouring(run, kind,
+                          thinned(len(frames), 60) if len(frames) == run.n_frames else frames[thinned(len(frames), 60)])
             table = (255 * c.cmap(np.linspace(0, 1, 64))[:, :3]).round().astype(int)
-            out.append({"kind": kind, "name": name, "label": c.label, "factor": c.factor, "low": float(c.norm.vmin), "high": float(c.norm.vmax),
-                        "power": float(getattr(c.norm, "gamma", 1.0)), "above": c.extend == "max", "table": table.tolist()})
+            out.append({
+                "kind": kind, "name": name, "label": c.label, "factor": c.factor, "low": float(c.norm.vmin),
+                "high": float(c.norm.vmax), "power": float(getattr(c.norm, "gamma", 1.0)), "above": c.extend == "max",
+                "table": table.tolist()
+            })
         return out
 
     def _samples(self, frames):
@@ -201,9 +223,11 @@ class Replay:
         if run.towed is not None:
             self._unwrap(poses[:, run.towed], frames)
         self.blobs["body_pose"] = pack(poses, self.compress)
-        out = {"bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()} for b in run.bodies],
-               "towed": run.towed, "follow": False, "view": None, "heading": None, "line": None, "vessel": run.case.get("tow.mode") == "thrust",
-               "track": None, "window_low": None}
+        out = {
+            "bodies": [{"name": b.name, "wall": b.wall, "towed": b.towed, "vertices": b.vertices.round(6).tolist()}
+                       for b in run.bodies], "towed": run.towed, "follow": False, "view": None, "heading": None,
+            "line": None, "vessel": run.case.get("tow.mode") == "thrust", "track": None, "window_low": None
+        }
         if run.towed is None:
             return out
         heading = tow_heading(run)
@@ -215,7 +239,10 @@ class Replay:
             out["line"] = [line.round(5).tolist() for line in lines]
         if "body_x" in run and len(run["time"]):
             kept = thinned(len(run["time"]), TRACK)
-            out["track"] = {"time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(), "y": run["body_y"][kept].round(5).tolist()}
+            out["track"] = {
+                "time": run["time"][kept].round(6).tolist(), "x": run["body_x"][kept].round(5).tolist(),
+                "y": run["body_y"][kept].round(5).tolist()
+            }
         if "window_x" in run and np.isfinite(run["window_x"]).any():
             sample = self._samples(frames)
             out["window_low"] = np.where(sample < 0, run.box[0], run["window_x"][np.maximum(sample, 0)]).tolist()
@@ -229,7 +256,8 @@ def _digits(values):
 
 
 def curve(run):
-    """Force against time for the replay: least, largest and running mean of the samples in each of at most BUCKETS pieces.
+    """Force against time for the replay: least, largest and running mean of the samples in each of at most BUCKETS
+    pieces.
 
     Without a towed body: kinetic energy. None without samples.
     """
@@ -242,17 +270,23 @@ def curve(run):
     samples, seconds = smoothing(run)
     edges = np.unique(np.linspace(0, len(time), min(BUCKETS, len(time)) + 1).astype(int))
     middle = (edges[:-1] + edges[1:] - 1) // 2
-    out = {"time": _digits(time[middle]), "start": float(min(0.0, time[0])), "end": float(time[-1]), "smooth_s": seconds, "lines": []}
+    out = {
+        "time": _digits(time[middle]), "start": float(min(0.0, time[0])), "end": float(time[-1]), "smooth_s": seconds,
+        "lines": []
+    }
     for name, label, colour in kinds:
         values = run[name]
         with np.errstate(invalid="ignore"):
             smooth = running_mean(values, samples)
             low, high = np.fmin.reduceat(values, edges[:-1]), np.fmax.reduceat(values, edges[:-1])
-        out["lines"].append({"name": name, "label": label, "unit": run.units(name), "colour": colour, "low": _digits(low), "high": _digits(high),
-                             "smooth": _digits(smooth[middle])})
+        out["lines"].append({
+            "name": name, "label": label, "unit": run.units(name), "colour": colour, "low": _digits(low),
+            "high": _digits(high), "smooth": _digits(smooth[middle])
+        })
     out["window"] = list(run.window) if run.window else None
     mean, low, high = run.interval("ice_resistance")
     out["window_name"] = run.window_name
-    out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float((high - low) / 2) if np.isfinite(high - low) else None)
+    out["mean"], out["band"] = (float(mean) if np.isfinite(mean) else None), (float(
+        (high - low) / 2) if np.isfinite(high - low) else None)
     out["events"] = [{"time": e["time_s"], "kind": e["kind"].replace("_", " ")} for e in run.summary.get("events", [])]
     return out

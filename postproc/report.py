@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The report of a run, or of an ensemble, as one HTML page that needs nothing else: numbers, pictures, replay of the ice field, provenance.
+"""The report of a run, or of an ensemble, as one HTML page that needs nothing else: numbers, pictures, replay of the
+ice field, provenance.
 
-The page loads nothing: styles, script, pictures and data stand in it, and its content security policy forbids all else, so that it
-can be mailed, archived and opened offline. Text from case files is escaped by the template engine.
+The page loads nothing: styles, script, pictures and data stand in it, and its content security policy forbids all else,
+so that it can be mailed, archived and opened offline. Text from case files is escaped by the template engine.
 """
 import base64
 import hashlib
@@ -21,7 +22,11 @@ PAGE = Path(__file__).resolve().parent / "page"
 
 def templates():
     """The template engine; a name that is missing in the context is an error, not an empty text."""
-    return jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return jinja2.Environment(loader=jinja2.FileSystemLoader(PAGE),
+                              autoescape=True,
+                              undefined=jinja2.StrictUndefined,
+                              trim_blocks=True,
+                              lstrip_blocks=True)
 
 
 def script():
@@ -39,7 +44,10 @@ def policy(code):
 def render(template, context):
     """The page as text."""
     code = script() if "replay" in context else ""
-    return templates().get_template(template).render(**context, code=code, policy=policy(code), css=(PAGE / "report.css").read_text(encoding="utf-8"),
+    return templates().get_template(template).render(**context,
+                                                     code=code,
+                                                     policy=policy(code),
+                                                     css=(PAGE / "report.css").read_text(encoding="utf-8"),
                                                      made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
 
 
@@ -56,14 +64,27 @@ def write(text, path):
 
 
 def main(argv=None):
-    p = command.parser("Write the report of a run, with a replay of the ice field, or of an ensemble, as one HTML page.", "report.html")
-    p.add_argument("--size", metavar="MB", type=float, default=LIMIT / 1e6, help="limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so (default: %(default)g)")
-    p.add_argument("--no-compression", action="store_true", help="store the replay's data as they are, for browsers that cannot unpack them")
+    p = command.parser(
+        "Write the report of a run, with a replay of the ice field, or of an ensemble, as one HTML page.",
+        "report.html")
+    p.add_argument(
+        "--size",
+        metavar="MB",
+        type=float,
+        default=LIMIT / 1e6,
+        help=
+        "limit of the replay's data in the page; frames, then floes, are left out to meet it, and the page says so "
+        "(default: %(default)g)"
+    )
+    p.add_argument("--no-compression",
+                   action="store_true",
+                   help="store the replay's data as they are, for browsers that cannot unpack them")
     a = p.parse_args(argv)
     if not 0.1 <= a.size <= 1000:
         p.error("--size: choose 0.1 to 1000 MB")
     path = command.output(p, a, "report.html", (".html", ".htm"))
-    if any((Path(a.run) / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):  # the second alone: it has only just begun
+    # the second alone: it has only just begun
+    if any((Path(a.run) / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         import report_ensemble  # and with it the statistics, which a run has no need of
         write(render("ensemble.html", report_ensemble.context(a.run)), path)
         return

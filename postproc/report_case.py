@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Where each value of a case comes from: given with a source, given and called assumed, given without a word, or a default.
+"""Where each value of a case comes from: given with a source, given and called assumed, given without a word, or a
+default.
 
-What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved case says. Nothing
-is inferred: a value without a word on it is shown as one without a stated source.
+What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
+case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
 """
 import re
 import shlex
@@ -12,11 +13,14 @@ import numpy as np
 import yaml
 
 #: kind: what the label says
-KINDS = {"assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line", "study": "study", "default": "default", "field": "as read",
-         "unused": "not used"}
+KINDS = {
+    "assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line",
+    "study": "study", "default": "default", "field": "as read", "unused": "not used"
+}
 
 #: keys of ice that is made, which mean nothing where it is read
-MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread", "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
+MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread",
+        "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
 #: used for outlines that have no thickness of their own; a field file always has one
 THICKNESS = ("ice.thickness", "ice.thickness_law", "ice.thickness_spread", "ice.seed")
 
@@ -47,9 +51,11 @@ def annotated(text):
             return
         if path[:1] == ["floes"]:
             return
-        rest = text[node.end_mark.index:].split("\n", 1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
+        rest = text[node.end_mark.index:].split("\n",
+                                                1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
         comment = re.match(r"\s+#\s*(.*)", rest)
-        value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(text[node.start_mark.index:node.end_mark.index].split())
+        value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(
+            text[node.start_mark.index:node.end_mark.index].split())
         out[".".join(path)] = (value, comment[1].strip() if comment else "")
 
     if root is not None:
@@ -68,7 +74,8 @@ def set_by_hand(command_line):
 
 
 def of_study(run):
-    """{key: what the study says beside it} of the keys that the study of a member sets or varies; {} for a run of its own."""
+    """{key: what the study says beside it} of the keys that the study of a member sets or varies; {} for a run of its
+    own."""
     folder = run.path.resolve().parent
     try:
         text = (folder.parent / "study.yml").read_text(encoding="utf-8") if folder.name == "members" else ""
@@ -77,10 +84,20 @@ def of_study(run):
         return {}
     if not isinstance(study, dict):
         return {}
-    said, groups = annotated(text), {name: study[name] for name in ("set", "parameters") if isinstance(study.get(name), dict)}
+    said, groups = annotated(text), {
+        name: study[name]
+        for name in ("set", "parameters")
+        if isinstance(study.get(name), dict)
+    }
     variants = study.get("variants")
-    groups |= {f"variants.{name}": keys for name, keys in (variants if isinstance(variants, dict) else {}).items() if isinstance(keys, dict)}
-    return {"ice.seed": ""} | {str(key): said.get(f"{name}.{key}", ("", ""))[1] for name, keys in groups.items() for key in keys}
+    groups |= {
+        f"variants.{name}": keys
+        for name, keys in (variants if isinstance(variants, dict) else {}).items()
+        if isinstance(keys, dict)
+    }
+    return {"ice.seed": ""
+            } | {str(key): said.get(f"{name}.{key}", ("", ""))[1]
+                 for name, keys in groups.items() for key in keys}
 
 
 def classify(words):
@@ -113,14 +130,19 @@ def not_used(run, case):
     if ice is None:
         return {}
     thickness = run.value("ice.thickness")
-    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant" or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
-    return {key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness") for key in (MADE if asked else MADE + THICKNESS)}
+    asked = ice == "ice.outlines" and (case.get("ice.thickness_law") != "constant"
+                                       or bool(np.any(np.isclose(run.thickness, thickness, rtol=1e-12, atol=0))))
+    return {
+        key: f"not used: the ice is read by {ice}" + ("" if key in MADE else ", with its thickness")
+        for key in (MADE if asked else MADE + THICKNESS)
+    }
 
 
 def spread(values, unit):
     """Mean and range of a quantity over the floes, in words."""
     low, mean, high = np.min(values), np.mean(values), np.max(values)
-    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
+    return f"{mean:.3g} {unit}" if high - low <= 1e-9 * abs(
+        high) else f"{mean:.3g} {unit}, {low:.3g} to {high:.3g} {unit}"
 
 
 def of_field(run):
@@ -129,8 +151,11 @@ def of_field(run):
     if ice is None or not run.n_floes:
         return []
     said = f"counted in the ice that {ice} read"
-    rows = (("floes", str(run.n_floes), "number of floes"), ("concentration", f"{run.number('concentration'):.4g}", "area fraction of ice in the ice region at the start, before a lead"),
-            ("floe size", spread(np.sqrt(4 * run.area / np.pi), "m"), "diameter of the circle of a floe's area: mean and range"),
+    rows = (("floes", str(run.n_floes),
+             "number of floes"), ("concentration", f"{run.number('concentration'):.4g}",
+                                  "area fraction of ice in the ice region at the start, before a lead"),
+            ("floe size", spread(np.sqrt(4 * run.area / np.pi),
+                                 "m"), "diameter of the circle of a floe's area: mean and range"),
             ("floe thickness", spread(run.thickness, "m"), "mean and range"))
     return [Value(name, value, meaning, "field", said) for name, value, meaning in rows]
 
@@ -139,7 +164,8 @@ def values(run):
     """[Value] of every key of the resolved case, in its order."""
     resolved = annotated(run.resolved_text)
     unused = not_used(run, {key: value for key, (value, _) in resolved.items()})
-    given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line", ""))), of_study(run), []
+    given, by_hand, study, out = annotated(run.case_text), set_by_hand(str(run.attributes.get("command_line",
+                                                                                              ""))), of_study(run), []
     for key, (value, meaning) in resolved.items():
         if key in unused:
             kind, origin = "unused", unused[key]

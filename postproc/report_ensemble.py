@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the report of an ensemble says: the tables of ensemble.py, the pictures of plot_ensemble.py, and every member with its doubts.
+"""What the report of an ensemble says: the tables of ensemble.py, the pictures of plot_ensemble.py, and every member
+with its doubts.
 
-The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the same.
+The tables come from ensemble_text.py as Markdown, so that the page, the terminal and the README of a study say the
+same.
 """
 import argparse
 import sys
@@ -22,7 +24,10 @@ import numpy as np
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 MOST_FIGURES = 8  #: conditions whose means stand at the head of the page
 #: as ensemble.py has them
-OPTIONS = {"error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None, "resamples": stat_fit.RESAMPLES}
+OPTIONS = {
+    "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
+    "resamples": stat_fit.RESAMPLES
+}
 
 
 def cells(line):
@@ -30,10 +35,13 @@ def cells(line):
 
 
 def blocks(markdown):
-    """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"}, {"kind": "text", "lines"}]."""
+    """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"},
+    {"kind": "text", "lines"}]."""
     out = []
     lines = [line for line in markdown.splitlines() if line.strip()]
-    for kind, some in groupby(lines, key=lambda line: "heading" if line.startswith("#") else "table" if line.startswith("|") else "text"):
+    for kind, some in groupby(lines,
+                              key=lambda line: "heading" if line.startswith("#") else "table"
+                              if line.startswith("|") else "text"):
         some = list(some)
         if kind == "heading":
             out += [{"kind": kind, "text": line.lstrip("# ")} for line in some]
@@ -61,8 +69,10 @@ def figures(s):
             out.append((c["label"], "–", "no field finished"))
             continue
         low, high = r["t_95"]
-        between = f"95 % interval of the mean {report_run.force(low)} to {report_run.force(high)}, " if np.isfinite([low, high]).all() else ""
-        out.append((c["label"], report_run.force(r["mean"]), f"{between}median {report_run.force(r['median'])}, {r['n']} field{'s' if r['n'] > 1 else ''}"))
+        between = f"95 % interval of the mean {report_run.force(low)} to {report_run.force(high)}, " if np.isfinite(
+            [low, high]).all() else ""
+        out.append((c["label"], report_run.force(r["mean"]),
+                    f"{between}median {report_run.force(r['median'])}, {r['n']} field{'s' if r['n'] > 1 else ''}"))
     return out if len(out) <= MOST_FIGURES else []
 
 
@@ -82,13 +92,18 @@ def members(e, s):
     for m in range(e.n):
         row = by_name.get(e.name[m])
         mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
-        out.append({"name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]), "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
-                    "doubts": ", ".join(sorted(e.doubts(m))), "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []})
+        out.append({
+            "name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]),
+            "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
+            "doubts": ", ".join(sorted(e.doubts(m))),
+            "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []
+        })
     return out
 
 
 def key_values(e):
-    """{heading: values} of the first member that can be read, with their origin; what differs between members is called varied."""
+    """{heading: values} of the first member that can be read, with their origin; what differs between members is called
+    varied."""
     for m in np.flatnonzero(e.status == FINISHED):
         try:
             with Run(e.folder(m)) as run:
@@ -96,7 +111,10 @@ def key_values(e):
         except RunError:
             continue
         varied = {key for key, values in e.parameters.items() if len(set(values.tolist())) > 1} | {"ice.seed"}
-        return {heading: [replace(v, value="varied") if v.key in varied else v for v in some] for heading, some in found.items()}
+        return {
+            heading: [replace(v, value="varied") if v.key in varied else v for v in some]
+            for heading, some in found.items()
+        }
     return {}
 
 
@@ -107,22 +125,32 @@ def provenance(e):
         try:
             with Run(e.folder(m)) as run:
                 builds.add(tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))
-                rows = rows or [(name, value) for name, value in report_run.provenance(run) if name not in ("state hash", "wall time", "folder", "started")]
+                rows = rows or [(name, value)
+                                for name, value in report_run.provenance(run)
+                                if name not in ("state hash", "wall time", "folder", "started")]
         except RunError:
             continue
-    return rows + [("folder", str(e.path.resolve()))], (f"The members come from {len(builds)} builds of the program, which need not give the same bits." if len(builds) > 1 else None)
+    return rows + [("folder", str(e.path.resolve()))], (
+        f"The members come from {len(builds)} builds of the program, which need not give the same bits."
+        if len(builds) > 1 else None)
 
 
 def caption(name):
     """Words for a picture of plot_ensemble.py by its name, "sweep-ice-concentration"."""
     if name.startswith("sweep-"):
         return "Mean ice resistance against " + name[6:].replace("-", ".", 1)
-    return {"map": "Mean ice resistance over two parameters, and its interval", "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"}.get(name, name)
+    return {
+        "map": "Mean ice resistance over two parameters, and its interval",
+        "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"
+    }.get(name, name)
 
 
 def pictures(e, options):
     """The pictures of plot_ensemble.py that the study supports."""
-    return [p for p in (report_run.picture(name, caption(name), draw) for name, draw in plot_ensemble.pictures(e, options)) if p]
+    return [
+        p for p in (report_run.picture(name, caption(name), draw) for name, draw in plot_ensemble.pictures(e, options))
+        if p
+    ]
 
 
 def context(folder):
@@ -135,5 +163,9 @@ def context(folder):
     rows, other_builds = provenance(e)
     title = report_run.breakable(e.title)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
-    return {"title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []), "figures": figures(s), "sections": found, "pictures": pictures(e, options),
-            "members": members(e, s), "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "key_values": key_values(e), "kinds": report_case.KINDS, "study": e.study, "provenance": rows}
+    return {
+        "title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []),
+        "figures": figures(s), "sections": found, "pictures": pictures(e, options), "members": members(e, s),
+        "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "key_values": key_values(e),
+        "kinds": report_case.KINDS, "study": e.study, "provenance": rows
+    }

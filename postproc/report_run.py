@@ -18,20 +18,36 @@ import numpy as np
 
 #: keys that the page shows in the open; all others are in the folded table
 KEY_VALUES = {
-    "Ice": ["ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law", "ice.density", "ice.friction", "ice.restitution",
-            "ice.crushing.pressure", "ice.rafting.kappa", "ice.field", "ice.outlines", "ice.seed", "lead.mode"],
-    "Towed body": ["body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass", "body.friction", "body.drag.water_form"],
-    "Tow": ["tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter", "tow.line_length", "tow.line_stiffness",
-            "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass", "tow.vessel.bollard_pull", "tow.vessel.free_speed"],
-    "Domain and environment": ["domain.length", "domain.width", "domain.ends", "domain.sides", "water.current_x", "water.current_y", "water.current_table", "water.tilt",
-                               "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"],
-    "Numerical": ["run.dt", "run.duration", "output.window_start", "solver.tolerance", "solver.max_sweeps", "impact.conversion", "impact.duration", "impact.pressure"],
+    "Ice": [
+        "ice.concentration", "ice.shape", "ice.size", "ice.size_law", "ice.thickness", "ice.thickness_law",
+        "ice.density", "ice.friction", "ice.restitution", "ice.crushing.pressure", "ice.rafting.kappa", "ice.field",
+        "ice.outlines", "ice.seed", "lead.mode"
+    ],
+    "Towed body": [
+        "body.shape", "body.length", "body.width", "body.draft", "body.sail", "body.density", "body.mass",
+        "body.friction", "body.drag.water_form"
+    ],
+    "Tow": [
+        "tow.mode", "tow.speed", "tow.programme", "tow.waypoints", "tow.ramp", "tow.line.type", "tow.line.diameter",
+        "tow.line_length", "tow.line_stiffness", "tow.line_damping", "tow.line.breaking_load", "tow.vessel.mass",
+        "tow.vessel.bollard_pull", "tow.vessel.free_speed"
+    ],
+    "Domain and environment": [
+        "domain.length", "domain.width", "domain.ends", "domain.sides", "water.current_x", "water.current_y",
+        "water.current_table", "water.tilt", "water.latitude", "air.wind_x", "air.wind_y", "air.wind_table"
+    ],
+    "Numerical": [
+        "run.dt", "run.duration", "output.window_start", "solver.tolerance", "solver.max_sweeps", "impact.conversion",
+        "impact.duration", "impact.pressure"
+    ],
 }
 UNSET = {"body.mass": "0 kg"}  #: values that stand for "follows from others"
 #: keys of the tow that mean nothing in some modes
-ONLY = {"tow.line": ("line", "thrust"), "tow.vessel": ("thrust",), "tow.speed": ("speed", "line", "thrust"), "tow.ramp": ("speed", "line", "thrust")}
+ONLY = {
+    "tow.line": ("line", "thrust"), "tow.vessel": ("thrust", ), "tow.speed": ("speed", "line", "thrust"),
+    "tow.ramp": ("speed", "line", "thrust")
+}
 
-ESTIMATES = {**{name: label for name, (label, _) in plot_resistance.ESTIMATES.items()}, "open_water_drag": "open-water drag"}
 PICTURE_DPI = 120
 
 
@@ -60,7 +76,8 @@ def share(value):
 
 
 def picture(name, title, draw):
-    """A figure as {"name", "title", "data" (PNG, base64)}; {"name", "title", "why"} where there is nothing to draw; None where it says so itself."""
+    """A figure as {"name", "title", "data" (PNG, base64)}; {"name", "title", "why"} where there is nothing to draw;
+    None where it says so itself."""
     try:
         figure = draw()
     except RunError as error:
@@ -75,13 +92,18 @@ def picture(name, title, draw):
 
 def pictures(run):
     """The pictures that the scripts of postproc/ draw of a run."""
-    out = [picture("field", "Ice field before, during and after", lambda: plot_field.draw(run)),
-           picture("loaded", "Contact force on the floes", lambda: plot_field.draw(run, "force"))] if run.n_floes and run.n_frames else []
+    out = [
+        picture("field", "Ice field before, during and after", lambda: plot_field.draw(run)),
+        picture("loaded", "Contact force on the floes", lambda: plot_field.draw(run, "force"))
+    ] if run.n_floes and run.n_frames else []
     if run.towed is None:
         return out
     out.insert(0, picture("force", "Force on the towed body", lambda: plot_force.draw(run)))
-    out.append(picture("impacts", "Loads around the hull, and how often a peak is exceeded", lambda: plot_impacts.draw(run)))
-    out.append(picture("resistance", "Resistance against concentration: this run and the estimates", lambda: plot_resistance.draw([plot_resistance.read(run.path)])))
+    out.append(
+        picture("impacts", "Loads around the hull, and how often a peak is exceeded", lambda: plot_impacts.draw(run)))
+    out.append(
+        picture("resistance", "Resistance against concentration: this run and the estimates",
+                lambda: plot_resistance.draw([plot_resistance.read(run.path)])))
     out.append(picture("solver", "Contact solver", lambda: plot_force.draw_diagnostics(run)))
     return out
 
@@ -97,18 +119,28 @@ def figures(run):
     if run.towed is None:
         return []
     n = run.number
-    window = f"{run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s" if run.window else "no window"
+    window = (f"{run.window_name} {style.short(run.window[0])} to {style.short(run.window[1])} s"
+              if run.window else "no window")
     name = run.mean_name
     (ice, ice_range), (tow, tow_range) = (with_interval(*run.interval(key)) for key in ("ice_resistance", "tow_force"))
-    out = [(f"ice resistance, {name}", ice, (f"95 % interval {ice_range}; " if ice_range != "–" else "no interval; ") + window),
+    out = [(f"ice resistance, {name}", ice,
+            (f"95 % interval {ice_range}; " if ice_range != "–" else "no interval; ") + window),
            (f"tow force, {name}", tow, f"95 % interval {tow_range}"),
-           ("largest ice resistance in a step", force(n("peak_ice_resistance_n")), run.summary.get("peak_conversion") or "")]
+           ("largest ice resistance in a step", force(n("peak_ice_resistance_n")), run.summary.get("peak_conversion")
+            or "")]
     if np.isfinite(n("peak_line_tension_n")):
-        out.append(("largest line tension", force(n("peak_line_tension_n")), "mean over a step, within the window" + start_peak(run)))
+        out.append(("largest line tension", force(n("peak_line_tension_n")),
+                    "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("impacts.largest.peak_n")):
-        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")), f"{run.summary['impacts']['conversion']}, within the window" + start_peak(run, "impacts.start_largest_peak_n")))
+        out.append(("largest peak of a collision", force(n("impacts.largest.peak_n")),
+                    f"{run.summary['impacts']['conversion']}, within the window" +
+                    start_peak(run, "impacts.start_largest_peak_n")))
     if np.isfinite(n("reference.mean_force_n")):
-        out.append(("simulated / measured", style.short(n("reference.ratio")), f"measured {force(n('reference.mean_force_n'))}: {run.summary['reference'].get('source') or 'source not stated'}"))
+        out.append(("simulated / measured", style.short(
+            n("reference.ratio")
+        ), f"measured {force(n('reference.mean_force_n'))}: "
+           f"{run.summary['reference'].get('source') or 'source not stated'}"
+                    ))
     return out
 
 
@@ -117,41 +149,46 @@ def forces(run):
     if run.towed is None:
         return []
     n, rows = run.number, []
-    for label, key, remark in (("ice resistance", "ice_resistance", "contact force of ice and walls on the body against the tow"), ("tow force", "tow_force", "along the tow"),
-                               ("line tension", "line_tension", ""), ("tension of the second branch", "line_tension_2", ""), ("vessel thrust", "vessel_thrust", "along its course")):
-        if np.isfinite(n(f"mean_{key}_n")) or key in ("ice_resistance", "tow_force"):
-            value, interval = with_interval(*run.interval(key))
-            rows.append((f"{label}, {run.mean_name}", value, interval, remark))
+    for name in run.by_role("balance", "force", "load"):
+        key = run.told(name, "summary") or f"mean_{name}_n"
+        mean = n(key)
+        if not np.isfinite(mean) and name not in ("ice_resistance", "tow_force"):
+            continue
+        known = re.fullmatch(r"mean_(.*)_n", key)
+        value, interval = with_interval(*run.interval(known[1])) if known else (force(mean), "–")
+        rows.append(
+            (f"{run.label(name)}, {run.mean_name}", value, interval if interval != "–" else "", run.description(name)))
     quarters = ((run.summary.get("window") or {}).get("series") or {}).get("ice_resistance", {}).get("quarters_n")
     if quarters:
         rows.append(("ice resistance by quarters of the window", ", ".join(force(q) for q in quarters), "", ""))
-    rows.append(("open-water and air drag, mean", force(n("mean_drag_force_n")), "", "of water and air on the body"))
-    for label, key in (("Coriolis force", "coriolis"), ("force of the sea-surface tilt", "tilt"), ("inertia", "inertia")):
-        if n(f"mean_{key}_force_n", 0.0):
-            rows.append((f"mean {label}", force(n(f"mean_{key}_force_n")), "", ""))
     conversion = run.summary.get("peak_conversion") or ""
-    rows += [("standard deviation of the ice resistance", force(n("sd_ice_resistance_n")), "", conversion), ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
-             ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion), ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion)]
+    rows += [("standard deviation of the ice resistance", force(n("sd_ice_resistance_n")), "", conversion),
+             ("95 % of the step means are below", force(n("p95_ice_resistance_n")), "", conversion),
+             ("99 % of the step means are below", force(n("p99_ice_resistance_n")), "", conversion),
+             ("largest step mean", force(n("peak_ice_resistance_n")), "", conversion)]
     if np.isfinite(n("peak_line_tension_n")):
-        rows.append(("largest line tension", force(n("peak_line_tension_n")), "", "mean over a step, within the window" + start_peak(run)))
+        rows.append(("largest line tension", force(n("peak_line_tension_n")), "",
+                     "mean over a step, within the window" + start_peak(run)))
     if np.isfinite(n("reference.mean_force_n")):
-        rows.append(("measured mean force (reference)", force(n("reference.mean_force_n")), "", run.summary["reference"].get("source") or "source not stated"))
+        rows.append(("measured mean force (reference)", force(n("reference.mean_force_n")), "",
+                     run.summary["reference"].get("source") or "source not stated"))
         rows.append(("simulated / measured", style.short(n("reference.ratio")), "", ""))
     return rows
 
 
 def estimates(run):
     """Rows of the published and derived estimates."""
-    found, rows = run.summary.get("estimates"), []
-    for name, label in ESTIMATES.items() if isinstance(found, dict) else ():
-        e = found.get(name)
-        if not isinstance(e, dict):
-            continue
-        value = force(e["force_n"])
-        spread = e["force_n"] is not None and e["high_n"] is not None and e["high_n"] > e["low_n"]
-        ratio = e["simulated_over_estimate"]
-        rows.append({"label": label, "force": value, "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "", "ratio": style.short(ratio) if ratio is not None else "–",
-                     "valid": bool(e["valid"]), "note": e["note"], "formula": e["formula"], "source": e["source"]})
+    rows = []
+    for estimate in run.estimates.values():
+        e = estimate.numbers
+        spread = None not in (e["force_n"], e["high_n"], e["low_n"]) and e["high_n"] > e["low_n"]
+        ratio = e["simulated_over_estimate"] if estimate.compares else None
+        rows.append({
+            "label": estimate.label, "force": force(e["force_n"]),
+            "range": f"{force(e['low_n'])} to {force(e['high_n'])}" if spread else "",
+            "ratio": style.short(ratio) if ratio is not None else "–", "valid": estimate.valid, "note": e["note"],
+            "formula": e["formula"], "source": e["source"]
+        })
     return rows
 
 
@@ -160,35 +197,68 @@ def impacts(run):
     i = run.summary.get("impacts")
     if not isinstance(i, dict):
         return None
-    rows = [("collisions in the window", f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} min; {i['collisions_whole_run']:.0f} in the whole run"),
-            ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))), ("mean ice resistance by push", force(run.number("impacts.mean_push_resistance_n"))),
-            ("largest push of a floe", force(run.number("impacts.largest_push_n")) + start_peak(run, "impacts.start_largest_push_n"))]
+    rows = [(
+        "collisions in the window",
+        f"{i['collisions']:.0f} in {style.short(60 * run.number('impacts.hours'))} min; "
+        f"{i['collisions_whole_run']:.0f} in the whole run"
+    ), ("mean ice resistance by collisions", force(run.number("impacts.mean_collision_resistance_n"))),
+            ("mean ice resistance by push", force(run.number("impacts.mean_push_resistance_n"))),
+            ("largest push of a floe",
+             force(run.number("impacts.largest_push_n")) + start_peak(run, "impacts.start_largest_push_n"))]
     big = i.get("largest")
     if isinstance(big, dict):
-        rows.append(("largest peak", f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse {style.short(big['impulse_ns'])} N s, "
-                     f"approach {style.short(big['approach_m_s'])} m/s), floe {big['floe']} at {style.short(big['time_s'])} s" + start_peak(run, "impacts.start_largest_peak_n")))
-    return {"conversion": i["conversion"], "rows": rows, "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"])) for e in i.get("exceedance") or []]}
+        rows.append((
+            "largest peak",
+            f"{force(big['peak_n'])} (mean {force(big['mean_n'])} over {style.short(big['duration_s'])} s, impulse "
+            f"{style.short(big['impulse_ns'])} N s, "
+            f"approach {style.short(big['approach_m_s'])} m/s), floe {big['floe']} at {style.short(big['time_s'])} s" +
+            start_peak(run, "impacts.start_largest_peak_n")))
+    return {
+        "conversion": i["conversion"], "rows": rows,
+        "exceedance": [(f"{e['rank']:.0f}", style.short(e["per_hour"]), force(e["peak_n"]))
+                       for e in i.get("exceedance") or []]
+    }
 
 
 def quality(run):
     """Rows (what, value, remark) on how far the numbers can be trusted: window, balances, solver."""
     n, rows = run.number, []
     if run.window:
-        rule = {"given": "begin given in the case", "mser5": "begin found from the series (MSER-5)"}.get(run.summary["window"].get("rule"), "")
-        rows += [("verdict", run.verdict[0], run.verdict[1]), (run.window_name, f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples", rule),
-                 ("independent samples in it", style.short(n("window.n_independent")), f"correlation time {style.short(n('window.correlation_time_s'))} s")]
+        rule = {"given": "begin given in the case",
+                "mser5": "begin found from the series (MSER-5)"}.get(run.summary["window"].get("rule"), "")
+        rows += [
+            ("verdict", run.verdict[0], run.verdict[1]),
+            (run.window_name,
+             f"{style.short(run.window[0])} to {style.short(run.window[1])} s, {n('window.n_samples'):.0f} samples",
+             rule),
+            ("independent samples in it", style.short(n("window.n_independent")),
+             f"correlation time {style.short(n('window.correlation_time_s'))} s")
+        ]
     if run.towed is not None:
-        rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)", share(n("budget.closure_relative")), "relative to the largest of them"),
-                 ("balance of the ice", share(n("budget.ice_momentum_closure_relative")), "mean resistance from the momentum of all other bodies, relative")]
-    rows += [("momentum residual", share(n("momentum_residual")), "largest of all steps, relative to what a step exchanges"),
-             ("steps not converged", f"{n('unconverged_steps'):.0f} of {n('n_steps'):.0f}", f"largest residual {n('max_residual_m_s'):.2g} m/s, tolerance {n('tolerance_m_s'):.2g} m/s"),
-             ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm", f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size" if np.isfinite(n("max_overlap_relative")) else ""),
-             ("contact work", f"{style.short(n('contact_work_j'))} J", f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
+        rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)",
+                  share(n("budget.closure_relative")), "relative to the largest of them"),
+                 ("balance of the ice", share(n("budget.ice_momentum_closure_relative")),
+                  "mean resistance from the momentum of all other bodies, relative")]
+    rows += [("momentum residual", share(n("momentum_residual")),
+              "largest of all steps, relative to what a step exchanges"),
+             ("steps not converged", f"{n('unconverged_steps'):.0f} of {n('n_steps'):.0f}",
+              f"largest residual {n('max_residual_m_s'):.2g} m/s, tolerance {n('tolerance_m_s'):.2g} m/s"),
+             ("largest overlap", f"{style.short(1000 * n('max_overlap_m'), 2)} mm",
+              f"{100 * n('max_overlap_relative'):.2g} % of the mean floe size"
+              if np.isfinite(n("max_overlap_relative")) else ""),
+             ("contact work", f"{style.short(n('contact_work_j'))} J",
+              f"{n('positive_work_steps'):.0f} steps in which the contacts added energy")]
     if n("crushing_steps", 0):
-        rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J", f"in {n('crushing_steps'):.0f} steps, deepest {style.short(n('max_crushed_depth_m'))} m"))
+        rows.append(("crushed", f"{style.short(n('crushed_work_j'))} J",
+                     f"in {n('crushing_steps'):.0f} steps, deepest {style.short(n('max_crushed_depth_m'))} m"))
     if n("max_rafted_area_m2", 0):
-        rows.append(("rafted", f"{style.short(n('rafted_area_m2'))} m²", f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took {style.short(n('raft_edge_work_j'))} J, "
-                     f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction {style.short(n('raft_friction_work_j'))} J"))
+        rows.append((
+            "rafted", f"{style.short(n('rafted_area_m2'))} m²",
+            f"{100 * n('rafted_share_of_ice'):.2g} % of the ice, {n('rafting_pairs'):.0f} pairs; edges took "
+            f"{style.short(n('raft_edge_work_j'))} J, "
+            f"{style.short(n('rafted_energy_j'))} J of it in the sheets' height, friction "
+            f"{style.short(n('raft_friction_work_j'))} J"
+        ))
     if n("stalled_s", 0):
         rows.append(("body stood still", f"{style.short(n('stalled_s'))} s", "while the tow asked for motion"))
     return rows
@@ -197,7 +267,8 @@ def quality(run):
 def events(run):
     """(rows of what happened, how many there were in all)."""
     units = {"line_broken": "N", "adrift": "m/s", "waypoint": "m"}
-    rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]), f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
+    rows = [(f"{e['time_s']:g} s", e["kind"].replace("_", " "), str(e["subject"]),
+             f"{style.short(e['value'])} {units.get(e['kind'], '')}".strip() if e["value"] is not None else "")
             for e in run.summary.get("events") or []]
     return rows, int(run.number("n_events", len(rows)))
 
@@ -205,9 +276,13 @@ def events(run):
 def provenance(run):
     """Rows (what, value) of how the run came about."""
     a = run.attributes
-    rows = [("program", f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision {a.get('revision', 'unknown')}"), ("compiler", a.get("compiler")), ("flags", a.get("flags")),
-            ("libraries", a.get("libraries")), ("command line", a.get("command_line")), ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
-            ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"), ("state hash", run.summary.get("state_hash")), ("folder", str(run.path.resolve()))]
+    rows = [("program",
+             f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision {a.get('revision', 'unknown')}"),
+            ("compiler", a.get("compiler")), ("flags", a.get("flags")), ("libraries", a.get("libraries")),
+            ("command line", a.get("command_line")),
+            ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
+            ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"),
+            ("state hash", run.summary.get("state_hash")), ("folder", str(run.path.resolve()))]
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
 
 
@@ -223,8 +298,11 @@ def key_values(run, values):
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
-        out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in ("", "none", UNSET.get(k))
-                        and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())]
+        out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [
+            by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in
+            ("", "none",
+             UNSET.get(k)) and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())
+        ]
     return out
 
 
@@ -239,9 +317,16 @@ def context(run, limit=LIMIT, compress=True):
     warnings = run.summary.get("warnings")
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
-    return {"title": breakable(run.summary.get("title") or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
-            "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name, "warnings": [str(w) for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"], "figures": figures(run), "forces": forces(run),
-            "estimates": estimates(run), "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run), "events": happened,
-            "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values), "values": values, "kinds": report_case.KINDS,
-            "n_assumed": sum(v.kind in ("assumed", "memory") for v in values), "preface": report_case.preface(run.case_text), "case_text": run.case_text,
-            "resolved_text": run.resolved_text, "pictures": pictures(run), "replay": replay}
+    return {
+        "title": breakable(run.summary.get("title")
+                           or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
+        "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,
+        "warnings": [str(w)
+                     for w in warnings] if isinstance(warnings, list) else ["summary.json holds no list of warnings"],
+        "figures": figures(run), "forces": forces(run), "estimates": estimates(run),
+        "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run),
+        "events": happened, "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values),
+        "values": values, "kinds": report_case.KINDS, "n_assumed": sum(v.kind in ("assumed", "memory") for v in values),
+        "preface": report_case.preface(run.case_text), "case_text": run.case_text, "resolved_text": run.resolved_text,
+        "pictures": pictures(run), "replay": replay
+    }

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The ice field of one frame on one axes: water, floes, towed body, walls; shared by plot_field.py and animate.py.
 
-Orientation. The basin frame is drawn as it is: x to the right, y upwards. The geographic frame (x north, y east) is drawn
-as a map: the horizontal axis is y, the vertical axis is x.
+Orientation. The basin frame is drawn as it is: x to the right, y upwards. The geographic frame (x north, y east) is
+drawn as a map: the horizontal axis is y, the vertical axis is x.
 
 A view is (x0, x1, y0, y1) in m of the world frame, or relative to the towed body when the scene follows it.
 """
@@ -128,17 +128,20 @@ def view_body(run):
     if run.case.get("domain.ends") == "moving":  # what lies beyond it is the ice of its other end
         ahead = run.value("domain.ahead", (x1 - x0) / 2)
         behind = x1 - x0 - ahead
-        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right, ahead if heading[0] >= 0 else behind)
+        left, right = max(left, -(behind if heading[0] >= 0 else ahead)), min(right,
+                                                                              ahead if heading[0] >= 0 else behind)
     return left, right, shift[1] - reach[1] / 2, shift[1] + reach[1] / 2
 
 
 def tow_line(run, frame, position):
-    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where all have broken.
+    """[n, 2] m: hull, towing end and, with two branches, hull again, of a towed body at a position; the end alone where
+    all have broken.
 
     None without a line.
     """
     at = run.frame_times[frame]
-    if run.case.get("tow.mode") not in ("line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
+    if run.case.get("tow.mode") not in (
+            "line", "thrust") or not {"carriage_x", "carriage_y", "body_x", "body_y"} <= set(run.series_names):
         return None
     sample = max(int(np.searchsorted(run["time"], at * (1 + 1e-9), side="right")) - 1, 0)
     if sample >= len(run["time"]):
@@ -148,7 +151,9 @@ def tow_line(run, frame, position):
     broken = {e["subject"]: e["time_s"] for e in run.summary.get("events", []) if e["kind"] == "line_broken"}
     for branch, name in enumerate(("tow.", "tow.branch2.")[:1 + (run.case.get("tow.line.branches") == "2")]):
         if broken.get(branch + 1, np.inf) > at:
-            hull = place([[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]], [*position, run.body_pose(frame)[run.towed, 2]])
+            hull = place(
+                [[run.value(name + "hull_x", 0.0), run.value(name + "hull_y", 0.0)]],
+                [*position, run.body_pose(frame)[run.towed, 2]])
             points += [hull[0]] if points else [hull[0], end]
     return np.array(points or [end])
 
@@ -165,7 +170,8 @@ class Scene:
         self.axes, self.run, self.colouring, self.follow = axes, run, colouring, follow
         x0, x1, y0, y1 = run.box
         self._turn = run.geographic
-        self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2  # what lies within half a period of it is shown
+        # what lies within half a period of it is shown
+        self._middle = np.array([view[0] + view[1], view[2] + view[3]]) / 2
         view = self._flat(np.array([[view[0], view[2]], [view[1], view[3]]]))
         axes.set_xlim(*view[:, 0])
         axes.set_ylim(*view[:, 1])
@@ -184,11 +190,18 @@ class Scene:
 
         # Walls go on without end along a periodic direction; a view about the body may look over the seam.
         px, py = run.period if follow else (0.0, 0.0)
-        self._images = [np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0,)) for j in ((-1, 0, 1) if py else (0,))]
+        self._images = [
+            np.array([i * px, j * py]) for i in ((-1, 0, 1) if px else (0, )) for j in ((-1, 0, 1) if py else (0, ))
+        ]
         corners = np.array([[x0, y0], [x1, y0], [x1, y1], [x0, y1]])
         self._corners = corners
         kept = dict(animated=animated)
-        self._water = Polygon(self._flat(corners), closed=True, facecolor=style.WATER, edgecolor="none", zorder=0, **kept)
+        self._water = Polygon(self._flat(corners),
+                              closed=True,
+                              facecolor=style.WATER,
+                              edgecolor="none",
+                              zorder=0,
+                              **kept)
         width_pt = axes.get_window_extent().width * 72 / axes.figure.dpi
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
@@ -213,7 +226,10 @@ class Scene:
         self._arrow_length = max(0.75 * body_size(run), 0.035 * wide)
         edges = [] if follow else self._edges(**kept)
         #: in the order of drawing
-        self.artists = [self._water, self._floes, self._rafted, self._track, self._solid, *edges, self._line, self._body, self._arrow]
+        self.artists = [
+            self._water, self._floes, self._rafted, self._track, self._solid, *edges, self._line, self._body,
+            self._arrow
+        ]
         axes.add_patch(self._water)
         axes.add_collection(self._floes, autolim=False)
         axes.add_collection(self._rafted, autolim=False)
@@ -290,7 +306,8 @@ class Scene:
         if self.follow:
             period = np.array([p if p > 0 else np.inf for p in run.period])
             last = way[-1] if len(way) else origin
-            way = way + np.where(np.isfinite(period), np.round((origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
+            way = way + np.where(np.isfinite(period), np.round(
+                (origin - last) / period), 0) * np.where(np.isfinite(period), period, 0)
         elif len(way):
             wrapped = run.wrap(way)
             jump = np.flatnonzero((np.abs(np.diff(wrapped, axis=0)) > 0.5 * np.abs(self._corners[2] - self._corners[0]))
@@ -311,6 +328,6 @@ class Scene:
         n = np.array([-u[1], u[0]])
         ahead = position + u * (((outline - position) @ u).max() + 0.22 * self._arrow_length)
         size = self._arrow_length
-        shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]]) * size
+        shape = np.array([[0, -0.07], [0.58, -0.07], [0.52, -0.24], [1, 0], [0.52, 0.24], [0.58, 0.07], [0, 0.07]
+                          ]) * size
         self._arrow.set_xy(self._flat(ahead + shape[:, :1] * u + shape[:, 1:] * n))
-

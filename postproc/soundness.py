@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Are the files of an ensemble what the program left? Seals and digests (XXH3, 128 bits) as src/base/checksum.h and src/run/ensemble_record.h have them.
+"""Are the files of an ensemble what the program left? Seals and digests (XXH3, 128 bits) as src/base/checksum.h and
+src/run/ensemble_record.h have them.
 
-The digest is made by libxxhash, which the program itself is linked to, or by the Python package xxhash. On a machine that has neither nothing can be
-checked, and available() says so.
+The digest is made by libxxhash, which the program itself is linked to, or by the Python package xxhash. On a machine
+that has neither nothing can be checked, and available() says so.
 """
 import ctypes
 import ctypes.util
@@ -45,12 +46,14 @@ def digest(data):
     """Hexadecimal digest of bytes, or of a buffer that may be written to."""
     if _XXH3 is None:
         return xxhash.xxh3_128_hexdigest(data)
-    found = _XXH3(data, len(data)) if isinstance(data, bytes) else _XXH3(ctypes.addressof(ctypes.c_char.from_buffer(data)), len(data))
+    found = _XXH3(data, len(data)) if isinstance(data, bytes) else _XXH3(
+        ctypes.addressof(ctypes.c_char.from_buffer(data)), len(data))
     return f"{found.high:016x}{found.low:016x}"
 
 
 def _of_file(path, skip=0):
-    """(length, digest of what stands behind the first `skip` bytes). Errors: OSError; ValueError for what is no regular file."""
+    """(length, digest of what stands behind the first `skip` bytes). Errors: OSError; ValueError for what is no regular
+    file."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise ValueError("is no regular file")
     with open(path, "rb") as f:
@@ -104,5 +107,8 @@ def fault_of_member(folder, name, study):
     if kept == wanted:
         return None
     have, want = kept.splitlines(), wanted.splitlines()
-    changed = [line.split(b":")[0].decode(errors="replace") for k, line in enumerate(want) if k >= len(have) or have[k] != line]
-    return f"{' and '.join(changed[:3])} changed since it finished" if have[:1] == want[:1] and changed else "its record `finished` is damaged, or of an older version of the program"
+    changed = [
+        line.split(b":")[0].decode(errors="replace") for k, line in enumerate(want) if k >= len(have) or have[k] != line
+    ]
+    return (f"{' and '.join(changed[:3])} changed since it finished"
+            if have[:1] == want[:1] and changed else "its record `finished` is damaged, or of an older version of the program")

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Extreme peaks: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD), return levels with intervals.
+"""Extreme peaks: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD), return levels with
+intervals.
 
 A level z of return time T hours of tow is exceeded once in T hours on the average.
     empirical        rate(z) = number of peaks above z / hours
@@ -8,10 +9,11 @@ A level z of return time T hours of tow is exceeded once in T hours on the avera
                      shape k: z = u + s ((L T)^k - 1)/k, L T > 1            [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
 Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
 
-Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py). With fewer fields than
-that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the tail itself, and the threshold, are assumed.
-Below a shape of -1/2 maximum likelihood is irregular
-[Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels; this is told.
+Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py).
+With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
+tail itself, and the threshold, are assumed. Below a shape of -1/2 maximum likelihood is irregular
+[Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels;
+this is told.
 """
 import numpy as np
 from scipy import optimize, stats
@@ -30,8 +32,8 @@ RESAMPLES = 199       # of the p-values
 def gpd(excess):
     """(scale, shape) of maximum likelihood, shape > stat_fit.LEAST_SHAPE.
 
-    With t = shape/scale the likelihood's best shape is mean ln(1 + t y), which leaves one unknown [Grimshaw 1993, Technometrics 35]; it is
-    searched on a grid, since there can be several maxima, and then refined.
+    With t = shape/scale the likelihood's best shape is mean ln(1 + t y), which leaves one unknown [Grimshaw 1993,
+    Technometrics 35]; it is searched on a grid, since there can be several maxima, and then refined.
     """
     y = np.asarray(excess, dtype=float)
     unit = y.mean()
@@ -42,7 +44,8 @@ def gpd(excess):
         t = np.asarray(t, dtype=float)
         small = np.abs(t) < 1e-8
         shape = np.where(small, 1.0, shape_of(np.where(small, 1.0, t)))
-        value = np.where(small, 1.0, np.log(shape / np.where(small, 1.0, t)) + shape + 1)  # t = 0: exponential of mean 1
+        # t = 0: exponential of mean 1
+        value = np.where(small, 1.0, np.log(shape / np.where(small, 1.0, t)) + shape + 1)
         return np.where(~small & (shape <= stat_fit.LEAST_SHAPE), 1e6, value)  # finite: the search takes differences
     low = -1 / y.max()
     t = np.concatenate([low * (1 - np.geomspace(1e-6, 1, 120)), np.geomspace(1e-6, 50, 120)])
@@ -85,7 +88,8 @@ def _excesses(fields, threshold, gap):
 
 
 def choose_threshold(fields, pooled, gap):
-    """The level that the share SHARE of the peaks exceeds, or lower, up to half of them, until there are LEAST_EXCESSES clusters; None if there never are."""
+    """The level that the share SHARE of the peaks exceeds, or lower, up to half of them, until there are LEAST_EXCESSES
+    clusters; None if there never are."""
     ordered, count = np.sort(pooled)[::-1], max(int(SHARE * len(pooled)), LEAST_EXCESSES)
     while count <= len(pooled) // 2:
         threshold = float(ordered[count])
@@ -96,16 +100,24 @@ def choose_threshold(fields, pooled, gap):
 
 
 def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLES):
-    """Peaks over a threshold as a dict; {"refused": why} where there are too few. fields: dicts of time, peak, start, hours."""
+    """Peaks over a threshold as a dict; {"refused": why} where there are too few. fields: dicts of time, peak, start,
+    hours."""
     pooled, hours = np.concatenate([f["peak"] for f in fields]), sum(f["hours"] for f in fields)
     if threshold is None:
         threshold = choose_threshold(fields, pooled, gap)
         if threshold is None:
-            return {"refused": f"{len(pooled)} collisions do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above any threshold that half of them exceed at most; run longer, more fields, or a shorter --gap"}
+            return {
+                "refused": f"{len(pooled)} collisions do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
+                           f"any threshold that half of them exceed at most; run longer, more fields, or a shorter "
+                           f"--gap"
+            }
     each = _excesses(fields, threshold, gap)
     excess, raw = np.concatenate(each), int(np.sum(pooled > threshold))
     if len(excess) < LEAST_EXCESSES:
-        return {"refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more fields, or choose a lower --threshold"}
+        return {
+            "refused": f"{len(excess)} clusters above {threshold:.4g} N, needs {LEAST_EXCESSES}; run longer, more "
+                       f"fields, or choose a lower --threshold"
+        }
     scale, shape = gpd(excess)
     levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape, return_hours)
     def refit(y):
@@ -113,10 +125,15 @@ def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLE
         return stats.genpareto(k, scale=s)
     frozen = stats.genpareto(shape, scale=scale)
     statistic = stat_fit.anderson_darling(excess, frozen.cdf)
-    return {"threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap, "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours,
-            "scale": scale, "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
-            "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit, resamples), "interval": interval_note(len(fields)),
-            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)} for T, (z, ends) in zip(return_hours, levels)]}
+    return {
+        "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,
+        "extremal_index": len(excess) / raw, "rate_per_hour": len(excess) / hours, "scale": scale, "shape": shape,
+        "shape_95": shape_range, "irregular": bool(shape < IRREGULAR), "anderson_darling": statistic,
+        "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
+                                    resamples), "interval": interval_note(len(fields)),
+        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
+                   for T, (z, ends) in zip(return_hours, levels)]
+    }
 
 
 def interval_note(fields):
@@ -140,14 +157,18 @@ def gpd_minus_log_likelihood(log_scale, shape, y):
 def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
     """([(level, (low, high)) of each return time], (low, high) of the shape). each: excesses by field.
 
-    The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the dispersion.
+    The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the
+    dispersion.
     """
     excess, unit, n = np.concatenate(each), scale, len(each)
     y, total, hours = [x / unit for x in each], np.concatenate(each) / unit, np.asarray(hours, dtype=float)
     rate = len(excess) / hours.sum()
     best = np.array([0.0, shape, np.log(rate)])  # ln scale (in units of the fitted one), shape, ln rate
     def by_field(theta):
-        return np.array([gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h for x, h in zip(y, hours)])
+        return np.array([
+            gpd_minus_log_likelihood(theta[0], theta[1], x) - len(x) * theta[2] + np.exp(theta[2]) * h
+            for x, h in zip(y, hours)
+        ])
     def level(theta, T):
         return np.exp(theta[0]) * growth(theta[1], np.exp(theta[2]) * T)
     def alone(theta):
@@ -157,7 +178,8 @@ def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
         if rate * T <= 1:
             levels.append((np.nan, (np.nan, np.nan)))
             continue
-        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best) * rate_share(alone, by_field, lambda theta: level(theta, T), best)
+        c = stat_profile.dispersion(by_field, lambda theta: level(theta, T), best) * rate_share(
+            alone, by_field, lambda theta: level(theta, T), best)
         z = level(best, T)
         def profile(q, rest):
             g = growth(rest[0], rate * T)
@@ -165,7 +187,8 @@ def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
         low, high = stat_profile.interval(profile, z, [shape], stat_profile.drop(n, c), 0.1 * z)
         levels.append((threshold + unit * z, (threshold + unit * max(low, 0.0), threshold + unit * high)))
     c = stat_profile.dispersion(lambda theta: by_field(np.append(theta, best[2])), lambda theta: theta[1], best[:2])
-    ends = stat_profile.interval(lambda q, rest: gpd_minus_log_likelihood(rest[0], q, total), shape, [0.0], stat_profile.drop(n, c), 0.05)
+    ends = stat_profile.interval(lambda q, rest: gpd_minus_log_likelihood(rest[0], q, total), shape, [0.0],
+                                 stat_profile.drop(n, c), 0.05)
     return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
 
 
@@ -203,7 +226,9 @@ def by_blocks(fields, return_hours, blocks=None, resamples=RESAMPLES):
     if len(maxima) < LEAST_BLOCKS:
         return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
     if empty.mean() > EMPTY:
-        return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without a collision; lower --blocks, or run longer"}
+        return {
+            "refused": f"{empty.sum()} of {len(maxima)} blocks are without a collision; lower --blocks, or run longer"
+        }
     length, total = float(lengths.mean()), sum(f["hours"] for f in fields)
     there = [x[np.isfinite(x)] for x in each]
     fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
@@ -211,13 +236,18 @@ def by_blocks(fields, return_hours, blocks=None, resamples=RESAMPLES):
         return {"refused": f"block maxima: {fitted.refused}"}
     location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
     levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in return_hours])
-    return {"blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale, "shape": shape, "shape_95": shape_range,
-            "irregular": bool(shape < IRREGULAR), "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
-            "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)} for T, (z, ends) in zip(return_hours, levels)]}
+    return {
+        "blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale,
+        "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
+        "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
+        "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}
+                   for T, (z, ends) in zip(return_hours, levels)]
+    }
 
 
 def gev_intervals(each, location, scale, shape, shares):
-    """([(level, (low, high)) exceeded once in 1/share blocks], (low, high) of the shape). each: block maxima by field."""
+    """([(level, (low, high)) exceeded once in 1/share blocks], (low, high) of the shape). each: block maxima by
+    field."""
     y, n = [(x - location) / scale for x in each], len(each)
     total, best = np.concatenate(y), np.array([0.0, 0.0, shape])
     def by_field(theta):
@@ -229,12 +259,14 @@ def gev_intervals(each, location, scale, shape, shares):
     for share in shares:
         z = height(shape, share)
         def profile(q, rest):
-            return stat_fit.gev_minus_log_likelihood((q - np.exp(rest[0]) * height(rest[1], share), rest[0], rest[1]), total) if rest[1] < 10 else np.inf
+            return stat_fit.gev_minus_log_likelihood(
+                (q - np.exp(rest[0]) * height(rest[1], share), rest[0], rest[1]), total) if rest[1] < 10 else np.inf
         c = stat_profile.dispersion(by_field, lambda t: t[0] + np.exp(t[1]) * height(t[2], share), best)
         low, high = stat_profile.interval(profile, z, [0.0, shape], stat_profile.drop(n, c), 0.2 * (1 + abs(z)))
         levels.append((location + scale * z, (location + scale * low, location + scale * high)))
     c = stat_profile.dispersion(by_field, lambda t: t[2], best)
-    ends = stat_profile.interval(lambda q, rest: stat_fit.gev_minus_log_likelihood((rest[0], rest[1], q), total), shape, [0.0, 0.0], stat_profile.drop(n, c), 0.05)
+    ends = stat_profile.interval(lambda q, rest: stat_fit.gev_minus_log_likelihood((rest[0], rest[1], q), total), shape,
+                                 [0.0, 0.0], stat_profile.drop(n, c), 0.05)
     return levels, (max(ends[0], stat_fit.LEAST_SHAPE), ends[1])
 
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Distributions fitted by maximum likelihood, and how well they fit.
 
-normal, lognormal, Weibull and gamma (both from zero on) and the generalised extreme value distribution (GEV, shape > 0: heavy upper tail).
-Goodness of fit: Anderson-Darling A², with a p-value by parametric bootstrap: samples are drawn from the fit and fitted again, since tables
-hold for given parameters only and are far too generous for fitted ones [Stephens 1974, J. Am. Stat. Assoc. 69]. AIC = 2k - 2 ln L, and AICc
-with its correction for few values, compare the fits with each other; neither says that the best of them is good.
+normal, lognormal, Weibull and gamma (both from zero on) and the generalised extreme value distribution (GEV, shape > 0:
+heavy upper tail). Goodness of fit: Anderson-Darling A², with a p-value by parametric bootstrap: samples are drawn from
+the fit and fitted again, since tables hold for given parameters only and are far too generous for fitted ones [Stephens
+1974, J. Am. Stat. Assoc. 69]. AIC = 2k - 2 ln L, and AICc with its correction for few values, compare the fits with
+each other; neither says that the best of them is good.
 """
 from dataclasses import dataclass
 
@@ -70,7 +71,8 @@ def _gamma(x):
 
 
 def gev_moments(x):
-    """(location, scale, shape) by L-moments [Hosking, Wallis & Wood 1985, Technometrics 27]: the start of the likelihood's search."""
+    """(location, scale, shape) by L-moments [Hosking, Wallis & Wood 1985, Technometrics 27]: the start of the
+    likelihood's search."""
     x = np.sort(x)
     n, i = len(x), np.arange(len(x))
     b0, b1, b2 = x.mean(), np.sum(i * x) / (n * (n - 1)), np.sum(i * (i - 1) * x) / (n * (n - 1) * (n - 2))
@@ -103,7 +105,11 @@ def gev(x):
     start = np.array([location, np.log(scale), shape])
     if not np.isfinite(gev_minus_log_likelihood(start, y)):  # a value lies beyond the end of the first guess
         start = np.array([-0.45, np.log(0.78), 1e-3])        # Gumbel of mean 0 and standard deviation 1
-    found = optimize.minimize(gev_minus_log_likelihood, start, args=(y,), method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 2000})
+    found = optimize.minimize(gev_minus_log_likelihood,
+                              start,
+                              args=(y, ),
+                              method="Nelder-Mead",
+                              options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 2000})
     location, log_scale, shape = found.x
     return centre + width * location, width * np.exp(log_scale), shape
 
@@ -114,8 +120,10 @@ def _gev(x):
 
 
 #: name: (fit, parameters, only of positive values)
-DISTRIBUTIONS = {"normal": (_normal, 2, False), "lognormal": (_lognormal, 2, True), "Weibull": (_weibull, 2, True), "gamma": (_gamma, 2, True),
-                 "GEV": (_gev, 3, False)}
+DISTRIBUTIONS = {
+    "normal": (_normal, 2, False), "lognormal": (_lognormal, 2, True), "Weibull": (_weibull, 2, True),
+    "gamma": (_gamma, 2, True), "GEV": (_gev, 3, False)
+}
 
 
 def anderson_darling(x, cdf):
@@ -142,8 +150,9 @@ def p_value(statistic, frozen, n, refit, resamples=RESAMPLES, rng=None):
 def fit(name, x, resamples=RESAMPLES):
     """Fit of one distribution to independent values x; one with `refused` where it makes no sense."""
     make, k, positive = DISTRIBUTIONS[name]
-    # Contiguous: of a view with strides numpy takes the range to end one stride after the last number. Where the result happens to lie there, it sees an
-    # overlap and calls the scalar log instead of the vector one, whose last bits are others: one run of forty then differed.
+    # Contiguous: of a view with strides numpy takes the range to end one stride after the last number. Where the result
+    # happens to lie there, it sees an overlap and calls the scalar log instead of the vector one, whose last bits are
+    # others: one run of forty then differed.
     x, n = np.ascontiguousarray(x, dtype=float), len(x)
     why = (f"{n} values, needs {LEAST}" if n < LEAST else "all values are the same" if np.ptp(x) == 0
            else f"{np.sum(x <= 0)} values are not positive" if positive and x.min() <= 0 else "")
@@ -156,7 +165,9 @@ def fit(name, x, resamples=RESAMPLES):
         p = p_value(statistic, frozen, n, lambda y: make(y)[1], resamples) if resamples else np.nan
     aic = 2 * k - 2 * likelihood
     aicc = aic + 2 * k * (k + 1) / (n - k - 1)
-    return Fit(name, {key: float(v) for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic), float(stats.kstest(x, frozen.cdf).statistic), p, frozen)
+    return Fit(name, {key: float(v)
+                      for key, v in parameters.items()}, likelihood, aic, aicc, float(statistic),
+               float(stats.kstest(x, frozen.cdf).statistic), p, frozen)
 
 
 def fit_all(x, resamples=RESAMPLES):
@@ -169,5 +180,7 @@ def as_dict(f):
     """A fit for JSON."""
     if f.refused:
         return {"name": f.name, "refused": f.refused}
-    return {"name": f.name, "parameters": f.parameters, "log_likelihood": f.log_likelihood, "aic": f.aic, "aicc": f.aicc,
-            "anderson_darling": f.anderson_darling, "kolmogorov_smirnov": f.kolmogorov, "p_value": f.p_value}
+    return {
+        "name": f.name, "parameters": f.parameters, "log_likelihood": f.log_likelihood, "aic": f.aic, "aicc": f.aicc,
+        "anderson_darling": f.anderson_darling, "kolmogorov_smirnov": f.kolmogorov, "p_value": f.p_value
+    }

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Means with intervals: of one correlated series, and of the means of several fields.
 
-Within a run. The interval is that of the program (src/base/stats.c, which says why): the mean square of the slowest cosine waves that the series holds, two or three,
-the larger, is n var(mean), and Student's t has 3 degrees of freedom [after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
+Within a run. The interval is that of the program (src/base/stats.c, which says why): the mean square of the slowest
+cosine waves that the series holds, two or three, the larger, is n var(mean), and Student's t has 3 degrees of freedom
+[after Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ. Stat. 36]; the correlation time is that of a first-order
 autoregression through batch means.
 
-Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense ice are skewed; the
-studentised bootstrap follows the skewness (second-order correct), where the percentile and BCa bootstrap are too short for few fields.
+Between fields. Fields are independent: mean of the n means, se = sd / sqrt(n), the t quantile of n - 1. Means of dense
+ice are skewed; the studentised bootstrap follows the skewness (second-order correct), where the percentile and BCa
+bootstrap are too short for few fields.
 """
 from dataclasses import dataclass
 
@@ -90,7 +92,8 @@ def t_interval(x, level=LEVEL):
 
 
 def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):
-    """(low, high) of the mean by the studentised bootstrap: m - q_high se, m - q_low se with q of (m* - m) / se*. NaN for fewer than LEAST_BOOTSTRAP."""
+    """(low, high) of the mean by the studentised bootstrap: m - q_high se, m - q_low se with q of (m* - m) / se*. NaN
+    for fewer than LEAST_BOOTSTRAP."""
     x = np.asarray(x, dtype=float)
     n, m = len(x), np.mean(x)
     if n < LEAST_BOOTSTRAP:
@@ -108,7 +111,8 @@ def studentised_interval(x, level=LEVEL, resamples=RESAMPLES, rng=None):
 
 
 def median_interval(x, level=LEVEL):
-    """(low, high) of the median by order statistics, without any assumption on the distribution; NaN where n is too small for the level."""
+    """(low, high) of the median by order statistics, without any assumption on the distribution; NaN where n is too
+    small for the level."""
     x = np.sort(x)
     n = len(x)
     k = int(stats.binom.ppf((1 - level) / 2, n, 0.5))
@@ -118,7 +122,8 @@ def median_interval(x, level=LEVEL):
 
 
 def fields_needed(mean, sd, error, level=LEVEL):
-    """Least n whose t interval is within error * |mean|, from the mean and the standard deviation between fields; NaN without either."""
+    """Least n whose t interval is within error * |mean|, from the mean and the standard deviation between fields; NaN
+    without either."""
     if not (np.isfinite([mean, sd]).all() and mean != 0):
         return np.nan
     ratio, n = sd / (error * abs(mean)), 2
@@ -128,7 +133,8 @@ def fields_needed(mean, sd, error, level=LEVEL):
 
 
 def between_fields(means, errors, wanted=0.05):
-    """Statistics of the means of fields, with the standard errors within each, as a dict of numbers and (low, high) pairs."""
+    """Statistics of the means of fields, with the standard errors within each, as a dict of numbers and (low, high)
+    pairs."""
     means, errors = np.asarray(means, dtype=float), np.asarray(errors, dtype=float)
     n = len(means)
     if n == 0:
@@ -139,10 +145,15 @@ def between_fields(means, errors, wanted=0.05):
     sd_range = sd * np.sqrt((n - 1) / np.asarray(spread))
     total = np.sum(np.abs(means))
     trimmed = stats.trim_mean(means, TRIM)
-    return {"n": n, "mean": means.mean(), "sd_between": sd, "sd_between_95": tuple(sd_range), "se_between": sd / np.sqrt(n), "se_within": within,
-            "sd_of_fields": np.sqrt(max(sd ** 2 - within ** 2, 0.0)) if np.isfinite([sd, within]).all() else np.nan,
-            "t_95": t_interval(means), "bootstrap_95": studentised_interval(means), "median": np.median(means), "median_95": median_interval(means),
-            "trimmed_mean": trimmed, "trimmed_each_end": int(TRIM * n), "largest_share": np.max(np.abs(means)) / total if total > 0 else np.nan,
-            "percentiles": {str(p): np.percentile(means, p) for p in (5, 25, 75, 95)}, "min": means.min(), "max": means.max(),
-            "fields_needed": fields_needed(means.mean(), sd, wanted),
-            "fields_needed_95": tuple(fields_needed(means.mean(), s, wanted) for s in sd_range)}
+    return {
+        "n": n, "mean": means.mean(), "sd_between": sd, "sd_between_95": tuple(sd_range), "se_between": sd / np.sqrt(n),
+        "se_within": within,
+        "sd_of_fields": np.sqrt(max(sd**2 - within**2, 0.0)) if np.isfinite([sd, within]).all() else np.nan,
+        "t_95": t_interval(means), "bootstrap_95": studentised_interval(means), "median": np.median(means),
+        "median_95": median_interval(means), "trimmed_mean": trimmed, "trimmed_each_end": int(TRIM * n),
+        "largest_share": np.max(np.abs(means)) / total if total > 0 else np.nan, "percentiles": {
+            str(p): np.percentile(means, p)
+            for p in (5, 25, 75, 95)
+        }, "min": means.min(), "max": means.max(), "fields_needed": fields_needed(means.mean(), sd, wanted),
+        "fields_needed_95": tuple(fields_needed(means.mean(), s, wanted) for s in sd_range)
+    }

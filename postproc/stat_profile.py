@@ -3,10 +3,11 @@
 
 With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval holds the q with
     2 (l(q^) - l_p(q)) <= k c,      k the square of Student's t quantile of F - 1 degrees of freedom, c = max(1, g V_s g / g V_m g).
-g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the squared scores of the F fields:
-c is 1 where the values of a field are independent of each other and of the field, and larger where they are not [Chandler & Bate 2007, Biometrika 94].
-Follows the skewness of return levels. Rejected: percentiles of a bootstrap over fields. Of 95 % intervals of exponential tails from 8 and 20 fields
-they covered 65 to 82 % and 75 to 80 %, since the shape of a short sample is low and its resamples are lower still.
+g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the
+squared scores of the F fields: c is 1 where the values of a field are independent of each other and of the field, and
+larger where they are not [Chandler & Bate 2007, Biometrika 94]. Follows the skewness of return levels. Rejected:
+percentiles of a bootstrap over fields. Of 95 % intervals of exponential tails from 8 and 20 fields they covered 65 to
+82 % and 75 to 80 %, since the shape of a short sample is low and its resamples are lower still.
 """
 import numpy as np
 from scipy import optimize, stats
@@ -30,7 +31,8 @@ def gradient(f, theta, step=1e-4):
 def dispersion(minus_log_likelihoods, quantity, theta):
     """c for a quantity of theta; minus_log_likelihoods(theta) gives one number a field. 1 where it cannot be found."""
     theta = np.asarray(theta, dtype=float)
-    with np.errstate(invalid="ignore"):  # at the edge of what is possible there is no gradient: not finite, and found out below
+    # at the edge of what is possible there is no gradient: not finite, and found out below
+    with np.errstate(invalid="ignore"):
         scores = gradient(minus_log_likelihoods, theta)
         information = gradient(lambda t: gradient(lambda s: np.sum(minus_log_likelihoods(s)), t), theta)
         g = gradient(quantity, theta)
@@ -52,13 +54,15 @@ def drop(fields, c=1.0, level=0.95):
 
 
 def interval(minus_log_likelihood, best, rest, fall, first):
-    """(low, high) of a quantity: where min over rest of minus_log_likelihood(q, rest) has risen by `fall` above its value at q = best.
+    """(low, high) of a quantity: where min over rest of minus_log_likelihood(q, rest) has risen by `fall` above its
+    value at q = best.
 
     first: first step away from best. An end that is not found is infinite.
     """
     least = minus_log_likelihood(best, rest)
     def rise(q, start):
-        # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values are very unlikely ones: the search takes differences.
+        # A simplex of its own size: SciPy's is 0.00025 wide about zero and then ends where it began. Impossible values
+        # are very unlikely ones: the search takes differences.
         simplex = start + SIMPLEX * np.vstack([np.zeros(len(start)), np.eye(len(start))])
         found = optimize.minimize(lambda r: min(minus_log_likelihood(q, r), 1e12), start, method="Nelder-Mead",
                                   options={"xatol": 1e-4, "fatol": 1e-4, "maxiter": 400, "initial_simplex": simplex})

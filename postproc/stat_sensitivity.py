@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Which parameter matters: rank correlations and Sobol indices, from the sample that is there.
 
-Spearman's rho of a parameter with the response, and the partial one (PRCC), after the ranks of the other parameters have been regressed
-out of both; intervals by Fisher's z with the variance 1.06/(n - k - 3) of ranks [Fieller, Hartley & Pearson 1957, Biometrika 44].
+Spearman's rho of a parameter with the response, and the partial one (PRCC), after the ranks of the other parameters
+have been regressed out of both; intervals by Fisher's z with the variance 1.06/(n - k - 3) of ranks [Fieller, Hartley &
+Pearson 1957, Biometrika 44].
 
-Sobol indices from a polynomial chaos expansion fitted by least squares [Sudret 2008, Reliab. Eng. Syst. Saf. 93]. Indices do not change
-when a parameter is transformed monotonically, so each is taken by its rank: uniform on (0, 1) in a Latin hypercube, whether it was sampled on a linear or a
-logarithmic scale. Its functions are orthonormal under the sample's own distribution of it: Legendre-like polynomials where it has many
-values, one function less than there are values where it has few (then a full factorial design gives the analysis of variance), names included.
-Then with y = sum c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms in i. The estimate c²
-is high by the variance of c, which is taken off. The degree is the one with the best Q² (cross-validated R², each value left out in turn).
-What the expansion does not explain, the scatter of the fields among it, is told as 1 - R²; indices share out what it does explain.
+Sobol indices from a polynomial chaos expansion fitted by least squares [Sudret 2008, Reliab. Eng. Syst. Saf. 93].
+Indices do not change when a parameter is transformed monotonically, so each is taken by its rank: uniform on (0, 1) in
+a Latin hypercube, whether it was sampled on a linear or a logarithmic scale. Its functions are orthonormal under the
+sample's own distribution of it: Legendre-like polynomials where it has many values, one function less than there are
+values where it has few (then a full factorial design gives the analysis of variance), names included. Then with y = sum
+c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms in i. The estimate c²
+is high by the variance of c, which is taken off. The degree is the one with the best Q² (cross-validated R², each value
+left out in turn). What the expansion does not explain, the scatter of the fields among it, is told as 1 - R²; indices
+share out what it does explain.
 """
 import itertools
 
@@ -51,7 +54,9 @@ def _interval(r, n, others):
 
 def rank_correlations(parameters, y):
     """{name: spearman, prcc with (low, high), p} of numeric parameters {name: [n]}; names of choices are left out."""
-    names = [k for k, v in parameters.items() if np.asarray(v).dtype != object and np.ptp(np.asarray(v, dtype=float)) > 0]
+    names = [
+        k for k, v in parameters.items() if np.asarray(v).dtype != object and np.ptp(np.asarray(v, dtype=float)) > 0
+    ]
     n, ranks, target = len(y), {k: stats.rankdata(parameters[k]) for k in names}, stats.rankdata(y)
     out = {}
     for name in names:
@@ -62,7 +67,11 @@ def rank_correlations(parameters, y):
             others = np.column_stack(others)
             a, b = _residual(ranks[name], others), _residual(target, others)
             partial = float(np.corrcoef(a, b)[0, 1]) if np.std(a) > 1e-9 * n and np.std(b) > 1e-9 * n else np.nan
-        out[name] = {"spearman": rho, "spearman_95": _interval(rho, n, 0), "prcc": partial, "prcc_95": _interval(partial, n, len(names) - 1)}
+        out[name] = {
+            "spearman": rho, "spearman_95": _interval(rho, n, 0), "prcc": partial,
+            "prcc_95": _interval(partial, n,
+                                 len(names) - 1)
+        }
     return out
 
 
@@ -75,13 +84,18 @@ def _functions(u, levels, degree):
 
 
 def _terms(depth, degree):
-    """Exponents [terms][k], without the constant, of total degree up to `degree`; depth: functions of each parameter and whether it is a choice.
+    """Exponents [terms][k], without the constant, of total degree up to `degree`; depth: functions of each parameter
+    and whether it is a choice.
 
     A function of a choice counts as of degree one: all of them come in together.
     """
     def cost(a):
         return sum((1 if choice else e) for e, (_, choice) in zip(a, depth) if e)
-    return [a for a in itertools.product(*(range(min(d, d if choice else degree) + 1) for d, choice in depth)) if 0 < cost(a) <= degree]
+
+    return [
+        a for a in itertools.product(*(range(min(d, d if choice else degree) + 1) for d, choice in depth))
+        if 0 < cost(a) <= degree
+    ]
 
 
 def _design(columns, degree):
@@ -119,11 +133,13 @@ def _indices(c, variance, terms, k):
     if not whole > 0:
         return np.full(k, np.nan), np.full(k, np.nan)
     alone = inside.sum(axis=1) == 1
-    return (np.array([power[inside[:, i] & alone].sum() for i in range(k)]) / whole, np.array([power[inside[:, i]].sum() for i in range(k)]) / whole)
+    return (np.array([power[inside[:, i] & alone].sum()
+                      for i in range(k)]) / whole, np.array([power[inside[:, i]].sum() for i in range(k)]) / whole)
 
 
 def sobol(parameters, y, resamples=RESAMPLES):
-    """First-order and total Sobol indices with intervals as a dict; {"refused": why} where the sample does not carry them."""
+    """First-order and total Sobol indices with intervals as a dict; {"refused": why} where the sample does not carry
+    them."""
     y = np.asarray(y, dtype=float)
     n, names = len(y), [k for k, v in parameters.items() if len(set(np.asarray(v).tolist())) > 1]
     if not names:
@@ -141,19 +157,35 @@ def sobol(parameters, y, resamples=RESAMPLES):
         if found and (best is None or found[3] > best[0][3] + 1e-12):
             best = found, a, terms, degree
     if best is None:
-        return {"refused": f"{n} members do not suffice for {len(names)} parameters: a linear expansion needs {PER_TERM * (len(names) + 1)} that differ in all of them"}
+        return {
+            "refused": f"{n} members do not suffice for {len(names)} parameters: a linear expansion needs "
+                       f"{PER_TERM * (len(names) + 1)} that differ in all of them"
+        }
     (c, variance, r2, q2), a, terms, degree = best
     if q2 < LEAST_Q2:
-        return {"refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} members: Q² = {q2:.2f}, needs {LEAST_Q2}", "q2": q2, "r2": r2}
+        return {
+            "refused": f"the best expansion (degree {degree}, {len(terms)} terms) predicts too little of {n} members: "
+                       f"Q² = {q2:.2f}, needs {LEAST_Q2}",
+            "q2": q2, "r2": r2
+        }
     first, total = _indices(c, variance, terms, len(names))
     rng, drawn = np.random.default_rng(SEED), []
     for _ in range(resamples):
         pick = rng.integers(0, n, n)
         drawn_a = a[pick]
-        again = np.linalg.lstsq(drawn_a.T @ drawn_a, drawn_a.T @ y[pick], rcond=None)[0]  # nearly orthonormal columns: the normal equations do
-        drawn.append(np.concatenate(_indices(again, 2 * variance, terms, len(names))))  # its own variance and that of drawing anew
+        # nearly orthonormal columns: the normal equations do
+        again = np.linalg.lstsq(drawn_a.T @ drawn_a, drawn_a.T @ y[pick], rcond=None)[0]
+        # its own variance and that of drawing anew
+        drawn.append(np.concatenate(_indices(again, 2 * variance, terms, len(names))))
     drawn = np.array(drawn).reshape(-1, 2 * len(names))
     low, high = np.nanquantile(drawn, [0.025, 0.975], axis=0) if len(drawn) else np.full((2, 2 * len(names)), np.nan)
     k = len(names)
-    return {"samples": n, "degree": degree, "terms": len(terms), "r2": r2, "q2": q2,
-            "indices": {name: {"first": first[i], "first_95": (low[i], high[i]), "total": total[i], "total_95": (low[k + i], high[k + i])} for i, name in enumerate(names)}}
+    return {
+        "samples": n, "degree": degree, "terms": len(terms), "r2": r2, "q2": q2, "indices": {
+            name: {
+                "first": first[i], "first_95": (low[i], high[i]), "total": total[i],
+                "total_95": (low[k + i], high[k + i])
+            }
+            for i, name in enumerate(names)
+        }
+    }

@@ -32,7 +32,13 @@ DRAG = "#009e73"      # drag
 INERTIA = "#8c6bb1"   # inertia
 CORIOLIS = "#b8860b"  # Coriolis force
 TILT = "#4d4d4d"      # force of the sea-surface tilt
-LAWS = ("#c2417c", "#1b4f9c", "#7a5b00")  # force laws that are added
+#: lines of a balance of forces in the order of the file: colour, width, dashes; those of registered forces follow
+BALANCE = ((TOW, 2.8, None), (ICE, 1.3, None), (DRAG, 1.6, (6, 2)), (CORIOLIS, 1.6, (5, 1.5, 1, 1.5)), (TILT, 1.6, (1,
+                                                                                                                    1)),
+           (INERTIA, 1.6, (2, 1.5)), ("#c2417c", 1.6, (4, 1)), ("#1b4f9c", 1.6, (3, 1, 1, 1)), ("#7a5b00", 1.6, (7, 1)))
+#: panels one below the other, and curves of estimates, in the order of the file
+PANELS = (ICE, TOW, DRAG, INERTIA)
+ESTIMATES = (TOW, DRAG, INERTIA, "#56b4e9", "#e69f00", "#cc79a7", "#1b4f9c", "#7a5b00", "#4d4d4d")
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 
@@ -91,7 +97,8 @@ def conditions(run):
         words.append(f"{100 * concentration:.0f} % ice")
     if run.n_floes:
         words.append(f"{run.n_floes} floes")
-        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):  # floes of their own thickness
+        # floes of their own thickness
+        if any(run.case.get(key, "none") != "none" for key in ("ice.outlines", "ice.field")):
             words.append(f"{np.mean(run.thickness):.3g} m thick")
         elif np.isfinite(run.value("ice.thickness")):
             words.append(f"{run.value('ice.thickness'):g} m thick")
@@ -116,7 +123,8 @@ def title(run):
 def head(figure, words, below, left=0.02):
     """Two lines at the head of a figure, at fixed distances from its top."""
     width, height = figure.get_size_inches()
-    size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))  # a letter is on average less than 0.6 of the font size wide: nothing is cut off
+    # a letter is on average less than 0.6 of the font size wide: nothing is cut off
+    size = min(13.5, 72 * (width - 0.4) / (0.6 * len(words)))
     figure.text(left, 1 - 0.14 / height, words, va="top", fontsize=size, fontweight="bold")
     figure.text(left, 1 - 0.42 / height, below, va="top", fontsize=10.5, color=FAINT)
 

@@ -17,7 +17,16 @@ ESTIMATES = {
     "lichey_hellmer": 80.0, "marchenko_compaction": 5.0, "marchenko_rafting": 40.0, "marchenko_momentum": 160.0,
     "dilute_limit": 20.0, "open_water_drag": 300.0
 }
+LABELS = {"lichey_hellmer": "Lichey-Hellmer", "marchenko_compaction": "compaction", "dilute_limit": "dilute limit"}
 TEXT = h5py.string_dtype()
+
+
+def told(name):
+    """What the program says of an estimate beside its numbers."""
+    return {
+        "label": LABELS.get(name, name.replace("_", " ")),
+        "kind": "on top" if name == "open_water_drag" else "ice resistance"
+    }
 
 
 def member(series, parameters, condition, **changes):
@@ -70,7 +79,12 @@ def write_member(folder, m):
     }
     (folder / "case.resolved.yml").write_text("ice: {}\n")
     (folder / "summary.json").write_text(
-        json.dumps(nested | {"title": "made up", "warnings": m["warnings"], "stopped": None}))
+        json.dumps(
+            nested | {
+                "estimate_labels": {n: told(n)
+                                    for n in m["estimates"]}, "title": "made up", "warnings": m["warnings"],
+                "stopped": None
+            }))
     with h5py.File(folder / "result.h5", "w") as f:
         f["case"] = f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
@@ -119,6 +133,8 @@ def write(folder, members, title="made up", sampling="grid"):
         summaries = [dict(flat(numbers(m))) if ok else {} for m, ok in zip(members, done)]
         for key in dict.fromkeys(k for s in summaries for k in s):
             f[f"summary/{key}"] = np.array([s.get(key, np.nan) for s in summaries])
+            for name in (n for n in members[0]["estimates"] if key.startswith(f"estimates_{n}_")):
+                f[f"summary/{key}"].attrs.update({"estimate": name, "order": list(ESTIMATES).index(name), **told(name)})
         time, ice = np.full((n, longest), np.nan), np.full((n, longest), np.nan)
         for i, (m, ok) in enumerate(zip(members, done)):
             if ok:

@@ -80,7 +80,7 @@ int bt_cmd_estimate(int argc, char **argv)
             bt_json_open(&j, NULL, '{');
             bt_json_string(&j, "title", c.run.title);
             bt_estimates_json(&j, "estimates", &in, NAN);
-            bt_estimate_labels_json(&j, "estimate_labels");
+            bt_estimate_labels_json(&j, "estimate_labels", &in);
             bt_json_close(&j, '}');
             fputs(j.text, stdout);
             bt_json_free(&j);

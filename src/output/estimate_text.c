@@ -110,7 +110,17 @@ void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in,
     bt_json_close(j, '}');
 }
 
-void bt_estimate_labels_json(bt_json *j, const char *key)
+/// Does the formula know the size of floes? Asked of itself, in thin ice, where all have a value.
+static bool uses_floe_size(int k, const bt_estimate_input *in)
+{
+    bt_estimate_input small = *in, large = *in;
+    small.concentration = large.concentration = 0.2;
+    large.floe_radius = 2 * in->floe_radius + 1;
+    const double a = bt_estimate_at(k, &small).force, b = bt_estimate_at(k, &large).force;
+    return isfinite(a) && isfinite(b) && a != b;
+}
+
+void bt_estimate_labels_json(bt_json *j, const char *key, const bt_estimate_input *in)
 {
     bt_json_open(j, key, '{');
     for (int k = 0; k < bt_n_estimates(); k++) {
@@ -118,6 +128,7 @@ void bt_estimate_labels_json(bt_json *j, const char *key)
         bt_json_open(j, d->name, '{');
         bt_json_string(j, "label", d->label);
         bt_json_string(j, "kind", bt_estimate_kind_name(d));
+        bt_json_bool(j, "uses_floe_size", uses_floe_size(k, in));
         bt_json_close(j, '}');
     }
     bt_json_close(j, '}');

@@ -15,9 +15,9 @@ extern const int bt_n_condition_keys;
 /// simulated: mean ice resistance of a run, N, for the ratios (of the drag: none); NaN = no run.
 void bt_estimates_json(bt_json *j, const char *key, const bt_estimate_input *in, double simulated);
 
-/// An object "estimate_labels": of each estimate, in the order of the registry, its label and kind. Which of the
-/// members of "estimates" are estimates follows from it.
-void bt_estimate_labels_json(bt_json *j, const char *key);
+/// An object "estimate_labels": of each estimate, in the order of the registry, its label, its kind, and whether its
+/// curve differs between fields of one case. For readers of the file, which know no estimate by name.
+void bt_estimate_labels_json(bt_json *j, const char *key, const bt_estimate_input *in);
 
 static inline const char *bt_estimate_kind_name(const bt_estimate_def *d)
 {

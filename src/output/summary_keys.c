@@ -129,7 +129,7 @@ static void write_estimates(bt_json *j, const char *key, const view *v, const vo
 static void write_labels(bt_json *j, const char *key, const view *v, const void *source)
 {
     (void)source;
-    if (v->s->body) bt_estimate_labels_json(j, key);
+    if (v->s->body) bt_estimate_labels_json(j, key, &v->s->estimate);
     else bt_json_string(j, key, NULL);
 }
 

@@ -54,7 +54,8 @@ static void print_added(const bt_summary *s, bool forces)
         const bt_quantity *q = bt_added(k);
         const bool force = q->role == BT_ROLE_BALANCE || q->role == BT_ROLE_FORCE || q->role == BT_ROLE_LOAD;
         if (force != forces || isnan(s->added[k])) continue;
-        printf("  %-19s %.4g %s (%s)\n", q->label, s->added[k], q->units, bt_keep_names[q->keep]);
+        printf(force ? "    %-17s %.4g %s (%s)\n" : "  %-19s %.4g %s (%s)\n", q->label, s->added[k], q->units,
+               bt_keep_names[q->keep]);
     }
 }
 

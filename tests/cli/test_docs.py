@@ -122,7 +122,7 @@ def test_files_named_exist(path):
     for file in paths:
         assert "NAME" in file or (ROOT / file).exists() or (path.parent / file).exists(), file
     names = {p.name for p in files()} | MADE_BY_RUNS
-    for file in re.findall(r"(?<![\w/.-])(\w+\.(?:c|h|py|sh|csv))\b(?!\()", text):
+    for file in re.findall(r"(?<![\w/.<-])(\w+\.(?:c|h|py|sh|csv))\b(?!\()", text):
         assert file in names, file
 
 
@@ -161,7 +161,7 @@ def test_functions_are_defined_where_the_page_says(path):
 def test_commands_and_options_are_known(path):
     for line, words in calls(path.read_text()):
         if words[0].startswith("--"):
-            assert set(words) <= {"--help", "--version", "--list-keys", "--json"}, line
+            assert set(words) <= {"--help", "--version", "--list-keys", "--list-quantities", "--json"}, line
             continue
         assert words[0] in COMMANDS, line
         assert {w.split("=")[0] for w in words[1:] if re.match("-.", w)} <= options(words[0]), line

@@ -25,8 +25,9 @@ def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
     result = call("estimate", "--json", write_case(folder, changed(case, ice__concentration=concentration)))
     assert result.returncode == DONE, result.stderr
     numbers = json.loads((run / "summary.json").read_text())
+    told = json.loads(result.stdout)
     numbers |= {
-        "estimates": json.loads(result.stdout)["estimates"], "mean_ice_resistance_n": mean,
+        "estimates": told["estimates"], "estimate_labels": told["estimate_labels"], "mean_ice_resistance_n": mean,
         "mean_ice_resistance_se_n": se, "concentration": concentration, "warnings": [], "reference": None
     } | summary
     (run / "summary.json").write_text(json.dumps(numbers))
@@ -48,9 +49,12 @@ def test_the_picture_has_points_bars_and_curves(runs):
     axes = plot_resistance.draw(points).axes[0]
     lines = {line.get_label(): line for line in axes.lines}
     scale = 1e3  # kN
-    for name, (label, _) in plot_resistance.ESTIMATES.items():
+    listed = json.loads(call("--list-quantities", "--json").stdout)["estimates"]
+    assert [e["name"] for e in listed if e["kind"] == "ice resistance"] == list(
+        points[0].of_ice) and len(points[0].of_ice) > 5
+    for name, label in ((e["name"], e["label"]) for e in listed if e["kind"] == "ice resistance"):
         a, force = plot_resistance.curve(points[0], name)
-        low, high = points[0].estimates["curves"]["valid_range"][name]
+        low, high = (np.nan if v is None else v for v in points[0].conditions["curves"]["valid_range"][name])
         y = np.asarray(lines[label].get_ydata(), dtype=float)
         drawn = np.isfinite(y)
         assert np.array_equal(drawn, (a >= low) & (a <= high) & (force > 0)), name
@@ -64,7 +68,7 @@ def test_the_picture_has_points_bars_and_curves(runs):
     assert list(mean.get_xdata()) == [0.5] and np.allclose(mean.get_ydata(), [50])
     low, high = axes.get_ylim()
     assert axes.get_yscale() == "log" and 0.04 - 1e-9 < low < 2 and 800 < high < 8000
-    least = points[1].estimate("lichey_hellmer")  # the smallest of what is meant for 50 %
+    least = points[1].estimates["lichey_hellmer"].force  # the smallest of what is meant for 50 %
     assert np.isclose(plot_resistance.limits(points[1:3], True)[0], least / 2.5)
     assert plot_resistance.draw(points, log=False).axes[0].get_yscale() == "linear"
 
@@ -75,17 +79,19 @@ def test_the_table_has_means_errors_and_ratios(runs, tmp_path):
     head, _, *lines = (tmp_path / "new/r.md").read_text().splitlines()
     cells = [[c.strip() for c in line.strip("|").split("|")] for line in lines]
     assert [c.strip() for c in head.strip("|").split("|")
-            ][:5] == ["ice, %", "runs", "simulated, N", "standard error, N", "Lichey–Hellmer 2001"]
+            ][:5] == ["ice, %", "runs", "simulated, N", "standard error, N", "Lichey-Hellmer"]
     assert [c[0] for c in cells] == ["10", "50", "95"] and [c[1] for c in cells] == ["1", "2", "1"]
     assert cells[0][2:5] == ["2000", "1e+03", "0"]
     assert cells[1][2:4] == ["5e+04", "1e+04"]  # scatter of 40 and 60 kN: 14.1 / sqrt 2
-    width = plot_resistance.read(runs[0]).estimates["width_m"]
+    width = plot_resistance.read(runs[0]).conditions["width_m"]
     drag = 0.5 * 910 * width * 0.25
-    assert cells[1][4] == f"{drag:.3g} ({5e4 / drag:.3g})"
+    assert cells[1][4] == f"{drag:.3g}"  # the same from 15 to 90 %: no ratio
+    rafting = plot_resistance.read(runs[3]).estimates["marchenko_rafting"].force
+    assert cells[2][6] == f"{rafting:.3g} ({8e5 / rafting:.3g})"
     # compaction of loose and of dense ice
     assert cells[1][5].split()[0].endswith("*") and not cells[2][5].split()[0].endswith("*")
     assert cells[2][7] == "–"  # momentum beyond phi
-    assert cells[2][9] == "3 %" and cells[1][10] == "1"
+    assert cells[2][-2] == "3 %" and cells[1][-1] == "1"
     picture = pixels(tmp_path / "r.png")
     for colour in (style.ICE, style.TOW, style.INERTIA, style.DRAG):
         assert len(where(picture, colour)[0]) > 100
@@ -115,7 +121,7 @@ def test_runs_of_other_conditions_are_refused(runs, tmp_path):
 
 @pytest.mark.parametrize("spoil, words", [
     (lambda s: s.pop("estimates"), "holds no estimates"),
-    (lambda s: s["estimates"]["lichey_hellmer"].update(force_n=None), "not towed"),
+    (lambda s: s["estimates"].update(speed_along_m_s=None), "not towed"),
     (lambda s: s.update(mean_ice_resistance_n=None), "no mean ice resistance"),
 ])
 def test_runs_without_the_numbers_are_refused(tmp_path, spoil, words):

@@ -149,16 +149,16 @@ def test_says_the_numbers_of_the_run(page, tow):
         r.find_element("tag name", "th").text: r.text
         for r in page.find_elements("css selector", "#estimates tbody tr")
     }
-    names = {
-        "Lichey–Hellmer 2001": "lichey_hellmer", "Marchenko, compaction": "marchenko_compaction",
-        "Marchenko, rafting": "marchenko_rafting", "Marchenko, momentum": "marchenko_momentum",
-        "dilute limit": "dilute_limit", "open-water drag": "open_water_drag"
-    }
+    names = {e["label"]: name for name, e in s["estimate_labels"].items()}
+    assert list(
+        names.values()) == [e["name"] for e in json.loads(call("--list-quantities", "--json").stdout)["estimates"]]
     assert set(rows) == set(names)
     for label, name in names.items():
         e = s["estimates"][name]
         assert float(re.search(r" ([\d.]+) N\b", rows[label])[1]) == pytest.approx(e["force_n"], rel=0.006)
         assert ("yes:" if e["valid"] else "no:") in rows[label]
+        ratio = e["simulated_over_estimate"]
+        assert (f" {style.short(ratio)} " in rows[label]) == e["compares"] if ratio else " – " in rows[label]
     assert s["state_hash"] in body and s["impacts"]["conversion"] in body and "measured mean force (reference)" in body
     assert style.short(mean / 3.0) in text(page, "#numbers td")
 

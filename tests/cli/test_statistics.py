@@ -109,8 +109,12 @@ def test_means_and_intervals_of_known_fields(plain):
         # AR(1) of 0.5: standard deviation 0.1 of a field's mean, tau 1.5 samples
         assert r["se_within"] == pytest.approx(0.1 * mean * np.sqrt(3 / LENGTH), rel=0.3)
         assert FIELDS * LENGTH / 5 < c["samples"]["independent"] < FIELDS * LENGTH / 2  # every third or fourth
-        assert c["estimates"]["lichey_hellmer"] == {"force": 80, "valid": True, "ratio": pytest.approx(mean / 80)
-                                                    } and not c["estimates"]["marchenko_compaction"]["valid"]
+        assert c["estimates"]["lichey_hellmer"] == {
+            "label": "Lichey-Hellmer", "on_top": False, "force": 80, "valid": True, "compares": True,
+            "ratio": pytest.approx(mean / 80)
+        }
+        assert np.isnan(c["estimates"]["open_water_drag"]["ratio"]
+                        or np.nan) and not c["estimates"]["marchenko_compaction"]["valid"]
         assert c["estimates"]["open_water_drag"]["ratio"] is None
 
 
@@ -315,8 +319,7 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
     expected = np.concatenate([1000 * a * 0.01 * (1 + 0.1 * (np.arange(8) - 3.5)) for a in (0.2, 0.5)])
     assert sorted(shown) == pytest.approx(sorted(expected)) and list(jams) == pytest.approx([2 * 1.35])
     labels = [t.get_text() for t in figure.legends[0].get_texts()]
-    assert ("Lichey–Hellmer 2001" in labels and "dilute limit" in labels
-            and "a field where the body stood still" in labels)
+    assert "Lichey-Hellmer" in labels and "dilute limit" in labels and "a field where the body stood still" in labels
     matplotlib.pyplot.close("all")
 
 
