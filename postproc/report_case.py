@@ -14,7 +14,8 @@ import yaml
 
 #: kind: what the label says
 KINDS = {
-    "assumed": "assumed", "memory": "from memory", "source": "source", "given": "given", "set": "command line",
+    "assumed": "assumed", "memory": "from memory", "reported": "reported", "source": "source", "given": "given",
+    "set": "command line",
     "study": "study", "default": "default", "field": "as read", "unused": "not used"
 }
 
@@ -101,12 +102,18 @@ def of_study(run):
 
 
 def classify(words):
-    """Kind of a comment on a value: assumed, memory, source or, for none, None."""
+    """Kind of a comment on a value: assumed, memory, reported, source or, for none, None.
+
+    By its words, or by the marks of cases/field: [A] assumed, [R] reported without its original source, [P] published.
+    Of several marks the least certain counts.
+    """
     low = words.lower()
-    if "assumed" in low:
+    if "assumed" in low or "[A]" in words:
         return "assumed"
     if "from memory" in low:
         return "memory"
+    if "[R]" in words:
+        return "reported"
     return "source" if words else None
 
 

@@ -504,6 +504,15 @@ def test_where_each_value_comes_from():
     assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
 
 
+@pytest.mark.parametrize("words, kind", [
+    ("[A]", "assumed"), ("[A] large blocks [P], of a size not reported", "assumed"),
+    ("[R] less than 10 cm", "reported"), ("[R] less than 10 cm; [A] the value", "assumed"), ("[P] 10 to 20 cm", "source"), ("", None)
+])
+def test_the_marks_of_the_field_cases_are_read(words, kind):
+    """A value marked [A] was once labelled as one with a source."""
+    assert report_case.classify(words) == kind
+
+
 def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
     (tmp_path / "study.yml").write_text(
         "base: b.yml\nset:\n  ice.size: 2 m  # assumed: larger\n  run.dt: 0.2 s\nparameters: {ice.friction: [0.1, "
