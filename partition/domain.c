@@ -122,9 +122,9 @@ void bt_domain_note(bt_world *w)
         if (!cell->own) continue;
         const bool last = k == t->n - 1;
         d->work[last ? large : bt_division_place(w, cell->x, cell->y)] +=
-            cell->n_contacts * CONTACT_STEP + (double)cell->updates * CONTACT_SWEEP + cell->n_pairs * PAIR +
+            cell->n_contacts * CONTACT_STEP + (double)cell->work.updates * CONTACT_SWEEP + cell->search.n_pairs * PAIR +
             (cell->end - cell->first) * (last || bt_cells_moves(t, k) ? BODY : BT_WORK_AT_REST);
-        cell->updates = 0;
+        cell->work.updates = 0;
     }
     d->drift += w->par.dt *
                 ((w->par.period_x > 0 ? fabs(w->par.water_u) : 0) + (w->par.period_y > 0 ? fabs(w->par.water_v) : 0));

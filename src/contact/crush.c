@@ -53,19 +53,19 @@ static int by_bodies(const void *p, const void *q)
 /// from part to part is sliding.
 static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold *m, bt_limit *l)
 {
-    if (t->n_memory == 0) return;
-    const bt_memory *any = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, by_bodies);
+    if (t->laws.n_memory == 0) return;
+    const bt_memory *any = bsearch(names, t->laws.memory, (size_t)t->laws.n_memory, sizeof *names, by_bodies);
     if (!any) return;
     const bt_memory *end = any + 1, *own = NULL;
-    while (any > t->memory && by_bodies(any - 1, names) == 0) any--;
-    while (end < t->memory + t->n_memory && by_bodies(end, names) == 0) end++;
+    while (any > t->laws.memory && by_bodies(any - 1, names) == 0) any--;
+    while (end < t->laws.memory + t->laws.n_memory && by_bodies(end, names) == 0) end++;
     double deepest = 0;
     for (const bt_memory *s = any; s < end; s++) {
         if (s->law != BT_LAW_CRUSHING) continue;
         deepest = bt_max(deepest, depth_of(s));
         if (bt_memory_by_names(s, names) == 0) own = s;
     }
-    if (own) l->trace[BT_LAW_CRUSHING] = (int32_t)(own - t->memory);
+    if (own) l->trace[BT_LAW_CRUSHING] = (int32_t)(own - t->laws.memory);
     for (int i = 0; i < m->n_points; i++) {
         l->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
@@ -109,7 +109,7 @@ void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, c
     const bt_bodies *s = &w->bodies;
     const bt_contact *u = &t->contacts[j];
     bt_gaps *g = &t->gaps[j];
-    bt_limit *l = &t->limits[j];
+    bt_limit *l = &t->laws.limits[j];
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
     const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
@@ -144,7 +144,7 @@ bool bt_crush_gives_way(const bt_contact *u, const bt_limit *l, int i) { return 
 
 void bt_crush_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {
-    t->limits[j].depth[i] += t->limits[j].grown[i];
+    t->laws.limits[j].depth[i] += t->laws.limits[j].grown[i];
     bt_sum_add(&totals->sum[BT_CRUSHED_WORK], -bt_contacts_normal_work(w, &t->contacts[j], i));
     bt_sum_add(&totals->sum[BT_CRUSHING_POINTS], 1);
 }
@@ -153,11 +153,11 @@ double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
     (void)totals;
     const bt_contact *u = &t->contacts[j];
-    const bt_limit *l = &t->limits[j];
+    const bt_limit *l = &t->laws.limits[j];
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
     if (deepest == 0 || l->trace[BT_LAW_RAFTING] >= 0) return 0;
-    const bt_pair *p = &t->pairs[t->gaps[j].pair];
+    const bt_pair *p = &t->search.pairs[t->gaps[j].pair];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
     r.n_points = u->n;
     for (int i = 0; i < u->n; i++) r.feature[i] = p->feature[i], r.value[i] = l->depth[i];

@@ -114,11 +114,11 @@ typedef struct {
 
 static void go_idle(bt_cell *t)
 {
-    free(t->pairs);
-    t->pairs = NULL;
-    t->n_pairs = t->cap_pairs = t->n_contacts = 0;
+    free(t->search.pairs);
+    t->search.pairs = NULL;
+    t->search.n_pairs = t->search.cap_pairs = t->n_contacts = 0;
     t->n_points = 0;
-    t->listed = false;
+    t->search.listed = false;
     t->overlap = 0;
 }
 
@@ -129,7 +129,7 @@ static void merge(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
     size_t kept = 0;
     for (size_t k = 0; k < s->n; k++) {
         if (s->man[k].n_points == 0) {
-            t->pairs[s->pair[k]].n_points = 0;
+            t->search.pairs[s->pair[k]].n_points = 0;
             continue;
         }
         s->man[kept] = s->man[k];
@@ -145,12 +145,12 @@ static void replace(const bt_world *w, bt_cell *t, bt_pack_scratch *s)
     for (int law = 0; law < BT_LAWS; law++) {
         if (!bt_laws[law].contact || !bt_law_on(&w->par, law)) continue;
         for (size_t k = 0; k < n; k++) {
-            bt_pair *p = &t->pairs[s->pair[k]];
+            bt_pair *p = &t->search.pairs[s->pair[k]];
             const bt_memory names = bt_law_names(w, p, law);
             const bt_idx at = bt_law_find(t, &names);
             if (at < 0) continue;
             bt_manifold edge, *sheets = bt_pack_next(s, s->pair[k]);
-            if (bt_laws[law].contact(w, p, &t->memory[at], &edge, sheets)) {
+            if (bt_laws[law].contact(w, p, &t->laws.memory[at], &edge, sheets)) {
                 s->man[k] = edge;
                 bt_pack_keep(s);
             } else {
@@ -165,15 +165,15 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
 {
     const bt_bodies *b = &w->bodies;
     bt_cell *t = &w->cells->cell[k];
-    if (t->n_memory > 0) bt_laws_prune(w, t);
+    if (t->laws.n_memory > 0) bt_laws_prune(w, t);
     bt_pairs_update(w, k, t, t->margin, &s->pairs);
-    bt_pack_begin(&s->pack, 2 * (size_t)t->n_pairs); // a pair may have a second contact (replace)
+    bt_pack_begin(&s->pack, 2 * (size_t)t->search.n_pairs); // a pair may have a second contact (replace)
     bool parts = false;
     const bool near = bt_pairs_near(w, k, t, t->margin);
     const double far = t->margin + bt_pairs_near_gap(w);
-    for (bt_idx j = 0, n = near ? t->n_near : t->n_pairs; j < n; j++) {
-        const bt_idx i = near ? t->near[j] : j;
-        bt_pair *p = &t->pairs[i];
+    for (bt_idx j = 0, n = near ? t->search.n_near : t->search.n_pairs; j < n; j++) {
+        const bt_idx i = near ? t->search.near[j] : j;
+        bt_pair *p = &t->search.pairs[i];
         const double paths = b->path[p->a] + b->path[p->b];
         if (paths + t->margin < p->reach) {
             p->n_points = 0;
@@ -194,7 +194,7 @@ static void narrow_phase(bt_world *w, bt_idx k, thread_scratch *s)
         parts = parts || p->part[0] || p->part[1];
     }
     if (parts) merge(w, t, &s->pack);
-    if (t->n_memory > 0) replace(w, t, &s->pack);
+    if (t->laws.n_memory > 0) replace(w, t, &s->pack);
     t->n_points = 0;
     t->overlap = 0;
     for (size_t i = 0; i < s->pack.n; i++) {
@@ -248,7 +248,7 @@ static void detect(bt_world *w, bool again)
         if (!cell->own) continue;
         const bool active = t->bound[k] > 0;
         if (!active) {
-            if (cell->pairs || cell->n_contacts) go_idle(cell);
+            if (cell->search.pairs || cell->n_contacts) go_idle(cell);
             cell->active = false;
             continue;
         }
@@ -344,8 +344,8 @@ static void deeper(bt_overlaps *to, const bt_overlaps *o)
 static bt_overlaps overlaps_of(const bt_world *w, const bt_cell *t, double allowed)
 {
     bt_overlaps all = {0}, pair = {0};
-    for (bt_idx i = 0; i < t->n_pairs; i++) {
-        const bt_pair *q = &t->pairs[i];
+    for (bt_idx i = 0; i < t->search.n_pairs; i++) {
+        const bt_pair *q = &t->search.pairs[i];
         const bt_gid a = w->bodies.gid[q->a], b = w->bodies.gid[q->b];
         if (pair.a != a || pair.b != b) {
             deeper(&all, &pair);
@@ -376,14 +376,14 @@ bt_overlaps bt_world_overlaps(bt_world *w, double allowed)
         for (bt_idx k = 0; k < t->n; k++) {
             if (!t->cell[k].own) continue;
             bt_cell own = t->cell[k];
-            own.pairs = NULL;
-            own.n_pairs = own.cap_pairs = 0;
-            own.listed = false;
+            own.search.pairs = NULL;
+            own.search.n_pairs = own.search.cap_pairs = 0;
+            own.search.listed = false;
             bt_pairs_update(w, k, &own, 0, &s);
             const bt_overlaps here = overlaps_of(w, &own, allowed);
 #pragma omp critical
             deeper(&all, &here);
-            free(own.pairs);
+            free(own.search.pairs);
         }
         bt_pair_scratch_free(&s);
     }

@@ -54,24 +54,24 @@ bool bt_laws_rise(const bt_params *p) { return bt_law_on(p, BT_LAW_CRUSHING); }
 void bt_laws_prune(const bt_world *w, bt_cell *t)
 {
     bt_idx kept = 0;
-    for (bt_idx k = 0; k < t->n_memory; k++)
-        if (bt_laws[t->memory[k].law].keeps(w, &t->memory[k])) t->memory[kept++] = t->memory[k];
-    t->n_memory = kept;
+    for (bt_idx k = 0; k < t->laws.n_memory; k++)
+        if (bt_laws[t->laws.memory[k].law].keeps(w, &t->laws.memory[k])) t->laws.memory[kept++] = t->laws.memory[k];
+    t->laws.n_memory = kept;
 }
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
 void bt_laws_reserve(bt_cell *t)
 {
-    if (t->n_contacts <= t->cap_limits) return;
-    t->cap_limits = t->n_contacts + t->n_contacts / 4;
-    free(t->limits);
-    t->limits = bt_alloc_aligned((size_t)t->cap_limits, sizeof *t->limits);
+    if (t->n_contacts <= t->laws.cap_limits) return;
+    t->laws.cap_limits = t->n_contacts + t->n_contacts / 4;
+    free(t->laws.limits);
+    t->laws.limits = bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.limits);
 }
 
 void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
-    bt_limit *l = &t->limits[j];
+    bt_limit *l = &t->laws.limits[j];
     *l = (bt_limit){
         .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}, .trace = {-1, -1, -1}};
     // The last first: what has rafted is not measured from what was crushed before.
@@ -112,7 +112,7 @@ static void grow_contact(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
     const bt_contact *u = &t->contacts[j];
     const bt_vel *v = w->bodies.vel;
-    bt_limit *l = &t->limits[j];
+    bt_limit *l = &t->laws.limits[j];
     for (int i = 0; i < u->n; i++) {
         const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
         if (!(approach > 0)) continue;
@@ -128,14 +128,15 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
 {
     (void)context;
     bt_cell *t = &w->cells->cell[k];
-    const bt_idx before = t->n_memory;
+    const bt_idx before = t->laws.n_memory;
     double most[BT_LAWS] = {0};
     for (bt_idx j = 0; j < t->n_contacts; j++) {
         grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
             if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law].remember(w, t, j, totals));
     }
-    if (t->n_memory > before) qsort(t->memory, (size_t)t->n_memory, sizeof *t->memory, bt_memory_by_names);
+    if (t->laws.n_memory > before)
+        qsort(t->laws.memory, (size_t)t->laws.n_memory, sizeof *t->laws.memory, bt_memory_by_names);
     // One maximum is what a pass carries; of other laws all that counts is in their records.
     totals->most = bt_max(totals->most, most[BT_LAW_CRUSHING]);
 }
@@ -145,8 +146,8 @@ static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *to
 {
     const bt_cells *ts = w->cells;
     for (bt_idx k = 0; k < ts->n; k++)
-        for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].n_memory; i++) {
-            const bt_memory *r = &ts->cell[k].memory[i];
+        for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].laws.n_memory; i++) {
+            const bt_memory *r = &ts->cell[k].laws.memory[i];
             if (r->law == BT_LAW_CRUSHING && ts->cell[k].n_contacts > 0) continue;
             most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
         }

@@ -6,13 +6,13 @@
 
 bt_idx bt_law_find(const bt_cell *t, const bt_memory *names)
 {
-    if (t->n_memory == 0) return -1;
-    const bt_memory *r = bsearch(names, t->memory, (size_t)t->n_memory, sizeof *names, bt_memory_by_names);
-    return r ? (bt_idx)(r - t->memory) : -1;
+    if (t->laws.n_memory == 0) return -1;
+    const bt_memory *r = bsearch(names, t->laws.memory, (size_t)t->laws.n_memory, sizeof *names, bt_memory_by_names);
+    return r ? (bt_idx)(r - t->laws.memory) : -1;
 }
 
 void bt_law_put(bt_cell *t, bt_idx at, const bt_memory *r)
 {
-    if (at >= 0) t->memory[at] = *r;
+    if (at >= 0) t->laws.memory[at] = *r;
     else bt_cells_remember(t, r);
 }

@@ -178,13 +178,13 @@ void bt_pack_contacts(bt_world *w, bt_idx k, bt_pack_scratch *s)
     t->n_contacts = (bt_idx)s->n;
     if (s->n == 0) return;
     const bool bounded = bt_laws_on(&w->par);
-    t->rising = bt_laws_rise(&w->par);
+    t->laws.rising = bt_laws_rise(&w->par);
     if (bounded) bt_laws_reserve(t);
     bt_idx next[MAX_COLOURS + 2] = {0};
     if (t->phase < BT_COLOURS) colour_contacts(w, t, s, next);
     else memset(s->colour, 0, s->n); // in sequence
     for (size_t i = 0; i < s->n; i++) {
-        bt_pair *p = &t->pairs[s->pair[i]];
+        bt_pair *p = &t->search.pairs[s->pair[i]];
         const bt_idx at = next[s->colour[i]]++;
         bt_contact *u = &t->contacts[at];
         if (s->man[i].n_points == 0) {
@@ -208,7 +208,7 @@ void bt_pack_store(bt_world *w, bt_idx k)
     for (bt_idx i = 0; i < t->n_contacts; i++) {
         const bt_contact *u = &t->contacts[i];
         if (u->n == 0) continue; // sheets have a record (contact/raft.h)
-        bt_pair *p = &t->pairs[t->gaps[i].pair];
+        bt_pair *p = &t->search.pairs[t->gaps[i].pair];
         p->ln[0] = u->ln[0];
         p->ln[1] = u->ln[1];
         p->lt = u->lt;

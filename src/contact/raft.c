@@ -117,18 +117,18 @@ static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memor
 {
     bt_contact *u = &t->contacts[j];
     const double pressure = w->par.raft_sheet * thinner(&w->bodies, u->a, u->b);
-    t->limits[j].flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
+    t->laws.limits[j].flat[0] = w->bodies.friction[u->b] * pressure * r->value[1] * w->par.dt;
     if (w->par.warm_start) u->ln[0] = r->value[2], u->lt = r->value[3];
 }
 
 void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
-    bt_limit *l = &t->limits[j];
+    bt_limit *l = &t->laws.limits[j];
     const bt_memory names = bt_law_names(w, p, BT_LAW_RAFTING);
     const bt_idx at = bt_law_find(t, &names);
     l->trace[BT_LAW_RAFTING] = (int32_t)at;
     if (m->n_points == 0) {
-        bound_sheets(w, t, j, &t->memory[at]);
+        bound_sheets(w, t, j, &t->laws.memory[at]);
         return;
     }
     const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
@@ -151,18 +151,18 @@ void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *total
 double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
     const bt_contact *u = &t->contacts[j];
-    const bt_limit *l = &t->limits[j];
+    const bt_limit *l = &t->laws.limits[j];
     const bt_idx at = l->trace[BT_LAW_RAFTING];
     if (u->n == 0) {
-        t->memory[at].value[2] = u->ln[0];
-        t->memory[at].value[3] = u->lt;
+        t->laws.memory[at].value[2] = u->ln[0];
+        t->laws.memory[at].value[3] = u->lt;
         bt_sum_add(&totals->sum[BT_RAFT_FRICTION_WORK], -bt_contacts_work(w, u));
         return 0;
     }
     bool begins = false;
     for (int i = 0; i < u->n; i++) begins = begins || (l->grown[i] > 0 && bt_raft_gives_way(u, l, i));
     if (!begins || at >= 0) return 0;
-    bt_memory r = bt_law_names(w, &t->pairs[t->gaps[j].pair], BT_LAW_RAFTING);
+    bt_memory r = bt_law_names(w, &t->search.pairs[t->gaps[j].pair], BT_LAW_RAFTING);
     r.n_points = 2;
     bt_law_put(t, -1, &r);
     return 0;

@@ -66,7 +66,7 @@ static row sheets_of(const bt_world *w, const bt_cell *t, bt_idx j)
                  .ln = u->ln[0],
                  .lt = u->lt,
                  .bound = INFINITY,
-                 .disc = t->limits[j].flat[0]};
+                 .disc = t->laws.limits[j].flat[0]};
 }
 
 /// Normal and tangential row of every contact point, in the order of the gids.
@@ -83,25 +83,25 @@ static row *rows_of(const bt_world *w, int *n)
             const double total = u->ln[0] + u->ln[1];
             if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->cell[k], j);
             for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
-                rows[(*n)++] =
-                    (row){.gid_a = w->bodies.gid[u->a],
-                          .gid_b = w->bodies.gid[u->b],
-                          .point = i,
-                          .a = u->a,
-                          .b = u->b,
-                          .nx = u->nx,
-                          .ny = u->ny,
-                          .ran = u->ran[i],
-                          .rbn = u->rbn[i],
-                          .rat = u->rat,
-                          .rbt = u->rbt,
-                          .bias = u->bias[i],
-                          .mu = u->mu,
-                          .ln = u->ln[i],
-                          .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
-                          .disc = NAN,
-                          .bound = ts->cell[k].limits ? bt_limit_bound(&ts->cell[k].limits[j], u, i, w->bodies.vel)
-                                                      : INFINITY};
+                rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a],
+                                     .gid_b = w->bodies.gid[u->b],
+                                     .point = i,
+                                     .a = u->a,
+                                     .b = u->b,
+                                     .nx = u->nx,
+                                     .ny = u->ny,
+                                     .ran = u->ran[i],
+                                     .rbn = u->rbn[i],
+                                     .rat = u->rat,
+                                     .rbt = u->rbt,
+                                     .bias = u->bias[i],
+                                     .mu = u->mu,
+                                     .ln = u->ln[i],
+                                     .lt = total > 0 ? u->lt * (u->ln[i] / total) : 0,
+                                     .disc = NAN,
+                                     .bound = ts->cell[k].laws.limits
+                                                  ? bt_limit_bound(&ts->cell[k].laws.limits[j], u, i, w->bodies.vel)
+                                                  : INFINITY};
         }
     if (*n) qsort(rows, (size_t)*n, sizeof *rows, by_gids);
     return rows;

@@ -37,13 +37,16 @@ typedef struct bt_batch {
 #endif
 #define INLINE static inline __attribute__((always_inline))
 
-bool bt_batch_is_for(const bt_cell *cell) { return !(cell->limits && cell->rising) && cell->phase != BT_COLOURS; }
+bool bt_batch_is_for(const bt_cell *cell)
+{
+    return !(cell->laws.limits && cell->laws.rising) && cell->phase != BT_COLOURS;
+}
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
 static kind_of_units kind_of(const bt_cell *cell, const bt_contact *u)
 {
-    return !cell->limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
+    return !cell->laws.limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
 }
 
 static bool holds(const bt_batch *o, bt_idx body)
@@ -67,24 +70,24 @@ static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
     o->w12[l] = u->w12, o->per_det[l] = u->per_det;
     o->wt[l] = u->wt, o->mt[l] = u->mt, o->mu[l] = u->mu;
     o->x[2][l] = u->lt;
-    for (int c = 0; c < 3; c++) o->before[c][l] = cell->before[i][c];
+    for (int c = 0; c < 3; c++) o->before[c][l] = cell->work.before[i][c];
     o->ma[l] = inv[u->a].m, o->ia[l] = inv[u->a].i, o->mb[l] = inv[u->b].m, o->ib[l] = inv[u->b].i;
-    for (int c = 0; cell->limits && c < 2; c++) o->bound[c][l] = cell->limits[i].flat[c];
+    for (int c = 0; cell->laws.limits && c < 2; c++) o->bound[c][l] = cell->laws.limits[i].flat[c];
     o->a[l] = u->a, o->b[l] = u->b, o->contact[l] = i;
     o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
 }
 
 static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u)
 {
-    if (cell->n_batches == cell->cap_batches) {
-        const bt_idx cap = bt_max(LANES, 2 * cell->cap_batches);
+    if (cell->work.n_batches == cell->work.cap_batches) {
+        const bt_idx cap = bt_max(LANES, 2 * cell->work.cap_batches);
         bt_batch *more = bt_alloc_aligned((size_t)cap, sizeof *more);
-        if (cell->n_batches > 0) memcpy(more, cell->batch, (size_t)cell->n_batches * sizeof *more);
-        free(cell->batch);
-        cell->batch = more;
-        cell->cap_batches = cap;
+        if (cell->work.n_batches > 0) memcpy(more, cell->work.batch, (size_t)cell->work.n_batches * sizeof *more);
+        free(cell->work.batch);
+        cell->work.batch = more;
+        cell->work.cap_batches = cap;
     }
-    bt_batch *o = &cell->batch[cell->n_batches++];
+    bt_batch *o = &cell->work.batch[cell->work.n_batches++];
     memset(o, 0, sizeof *o);
     o->kind = kind_of(cell, u);
     for (int l = 0; l < LANES; l++) o->a[l] = u->a, o->b[l] = u->b; // of lanes that stay empty: read, never written
@@ -103,20 +106,20 @@ static void pack(bt_cell *cell, const bt_inv *inv)
 {
     bt_idx open[OPEN];
     int n_open = 0;
-    cell->n_batches = 0;
-    cell->packed = true;
-    for (bt_idx j = 0; j < cell->n_list; j++) {
-        const bt_contact *u = &cell->contacts[cell->list[j]];
+    cell->work.n_batches = 0;
+    cell->work.packed = true;
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_contact *u = &cell->contacts[cell->work.list[j]];
         int k = 0;
         const kind_of_units kind = kind_of(cell, u);
-        while (k < n_open && !fits(&cell->batch[open[k]], u, kind, inv)) k++;
+        while (k < n_open && !fits(&cell->work.batch[open[k]], u, kind, inv)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
             begin_batch(cell, u);
-            open[n_open++] = cell->n_batches - 1;
+            open[n_open++] = cell->work.n_batches - 1;
         }
-        bt_batch *o = &cell->batch[open[k]];
-        put(o, cell, cell->list[j], inv);
+        bt_batch *o = &cell->work.batch[open[k]];
+        put(o, cell, cell->work.list[j], inv);
         if (o->n < LANES) continue;
         n_open--;
         memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
@@ -125,20 +128,20 @@ static void pack(bt_cell *cell, const bt_inv *inv)
 
 void bt_batch_order(const bt_cell *cell, bt_idx *contact)
 {
-    for (bt_idx k = 0; k < cell->n_batches; k++)
-        for (int l = 0; l < cell->batch[k].n; l++) *contact++ = cell->batch[k].contact[l];
+    for (bt_idx k = 0; k < cell->work.n_batches; k++)
+        for (int l = 0; l < cell->work.batch[k].n; l++) *contact++ = cell->work.batch[k].contact[l];
 }
 
 void bt_batch_unpack(bt_cell *cell)
 {
-    if (!cell->packed) return;
-    cell->packed = false;
-    for (bt_idx k = 0; k < cell->n_batches; k++) {
-        const bt_batch *o = &cell->batch[k];
+    if (!cell->work.packed) return;
+    cell->work.packed = false;
+    for (bt_idx k = 0; k < cell->work.n_batches; k++) {
+        const bt_batch *o = &cell->work.batch[k];
         for (int l = 0; l < o->n; l++) {
             bt_contact *u = &cell->contacts[o->contact[l]];
             u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
-            for (int c = 0; c < 3; c++) cell->before[o->contact[l]][c] = o->before[c][l];
+            for (int c = 0; c < 3; c++) cell->work.before[o->contact[l]][c] = o->before[c][l];
         }
     }
 }
@@ -347,13 +350,13 @@ static double against(const bt_batch *batch, bt_idx n)
 double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
                       int64_t *done, double *most)
 {
-    if (!cell->packed) pack(cell, inv);
-    if (s->moves) move(cell->batch, cell->n_batches, s->beta);
+    if (!cell->work.packed) pack(cell, inv);
+    if (s->moves) move(cell->work.batch, cell->work.n_batches, s->beta);
     double last = INFINITY;
     for (int n = 0; n == 0 || (n < times && last > enough); n++) {
-        last = (cell->limits ? pass_bounded : pass)(cell->batch, cell->n_batches, v);
+        last = (cell->laws.limits ? pass_bounded : pass)(cell->work.batch, cell->work.n_batches, v);
         if (n == 0) *most = last;
-        *done += cell->n_list;
+        *done += cell->work.n_list;
     }
-    return s->moves ? against(cell->batch, cell->n_batches) : 0;
+    return s->moves ? against(cell->work.batch, cell->work.n_batches) : 0;
 }

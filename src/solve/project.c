@@ -25,11 +25,11 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
         bt_gaps *g = &cell->gaps[j];
-        for (int i = 0; i < 3; i++) cell->before[j][i] = 0;
+        for (int i = 0; i < 3; i++) cell->work.before[j][i] = 0;
         for (int i = 0; i < u->n; i++) {
             g->push[i] = 0;
             g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
-            if (cell->limits) g->after[i] += cell->limits[j].grown[i]; // what has given way in this step
+            if (cell->laws.limits) g->after[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->after[i]);
         }
     }
@@ -61,12 +61,12 @@ static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
             const double r = fabs(bt_max(0, g->push[i] - open * u->mn[i]) - g->push[i]) * u->w[i];
             worst = bt_max(worst, r);
             sum += r * r;
-            on = on || g->push[i] > 0 || g->push[i] != cell->before[j][i] || !(open >= 0);
+            on = on || g->push[i] > 0 || g->push[i] != cell->work.before[j][i] || !(open >= 0);
         }
         t->most = bt_max(t->most, worst);
         bad += worst > near;
         rows += u->n;
-        if (on) cell->list[cell->n_list++] = j;
+        if (on) cell->work.list[cell->work.n_list++] = j;
     }
     bt_rounds_found(p, cell, sum, rows, bad, t);
 }
@@ -93,21 +93,21 @@ static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_sweep *o = context;
     bt_cell *cell = &w->cells->cell[k];
-    if (cell->n_list == 0) return;
+    if (cell->work.n_list == 0) return;
     bt_moved moved;
     if (o->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; o->moves && j < cell->n_list; j++)
-        bt_rounds_move(o, cell->gaps[cell->list[j]].push, cell->before[cell->list[j]], moved.y[j], 2);
-    for (bt_idx j = 0; j < cell->n_list; j++)
-        push_contact(w, &cell->contacts[cell->list[j]], &cell->gaps[cell->list[j]], &t->most);
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->n_list);
+    for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++)
+        bt_rounds_move(o, cell->gaps[cell->work.list[j]].push, cell->work.before[cell->work.list[j]], moved.y[j], 2);
+    for (bt_idx j = 0; j < cell->work.n_list; j++)
+        push_contact(w, &cell->contacts[cell->work.list[j]], &cell->gaps[cell->work.list[j]], &t->most);
+    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->work.n_list);
     if (!o->moves) return;
     double against = 0;
-    for (bt_idx j = 0; j < cell->n_list; j++) {
-        const bt_idx u = cell->list[j];
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_idx u = cell->work.list[j];
         for (int i = 0; i < 2; i++)
-            against +=
-                bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->before[u][i], moved.y[j][i]);
+            against += bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->work.before[u][i],
+                                         moved.y[j][i]);
     }
     bt_moved_end(&moved, cell, o, against, t);
 }

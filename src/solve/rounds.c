@@ -32,23 +32,23 @@ void bt_rounds_scale(bt_problem *p, double heaviest)
 
 void bt_rounds_list(bt_cell *cell)
 {
-    cell->n_list = 0;
-    cell->bad = false;
-    if (cell->n_contacts <= cell->cap_list) return;
-    cell->cap_list = cell->n_contacts + cell->n_contacts / 4;
-    free(cell->list);
-    free(cell->before);
-    cell->list = bt_alloc((size_t)cell->cap_list, sizeof *cell->list);
-    cell->before = bt_alloc((size_t)cell->cap_list, sizeof *cell->before);
+    cell->work.n_list = 0;
+    cell->work.bad = false;
+    if (cell->n_contacts <= cell->work.cap_list) return;
+    cell->work.cap_list = cell->n_contacts + cell->n_contacts / 4;
+    free(cell->work.list);
+    free(cell->work.before);
+    cell->work.list = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.list);
+    cell->work.before = bt_alloc((size_t)cell->work.cap_list, sizeof *cell->work.before);
 }
 
 void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t)
 {
-    cell->bad = bad > 0;
+    cell->work.bad = bad > 0;
     bt_sum_add(&t->sum[BT_LOOK_SQUARES], bt_min(squares * p->per_square, 0x1p45));
     bt_sum_add(&t->sum[BT_LOOK_ROWS], (double)rows);
     bt_sum_add(&t->sum[BT_LOOK_CONTACTS], cell->n_contacts);
-    bt_sum_add(&t->sum[BT_LOOK_LISTED], cell->n_list);
+    bt_sum_add(&t->sum[BT_LOOK_LISTED], cell->work.n_list);
     bt_sum_add(&t->sum[BT_LOOK_BAD], (double)bad);
 }
 
@@ -56,7 +56,7 @@ void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t
 static void mark_cell_of(bt_world *w, bt_idx i)
 {
     const int32_t *at = w->bodies.cell[i];
-    if (!w->bodies.large[i]) w->cells->cell[bt_cells_at(w->cells, at[0], at[1])].swept = true;
+    if (!w->bodies.large[i]) w->cells->cell[bt_cells_at(w->cells, at[0], at[1])].work.swept = true;
 }
 
 /// Bodies of the block of cell (x, y) may be moved.
@@ -64,7 +64,7 @@ static void mark_block(bt_cells *t, int32_t x, int32_t y, double listed)
 {
     for (int j = 0; listed > 0 && j < 4; j++) {
         const bt_idx k = bt_cells_at(t, x + (j & 1), y + (j >> 1));
-        if (k >= 0) t->cell[k].swept = true;
+        if (k >= 0) t->cell[k].work.swept = true;
     }
 }
 
@@ -84,8 +84,8 @@ static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take
     free(value);
 }
 
-static double has_list(const bt_cell *cell) { return cell->n_list > 0; }
-static double is_bad(const bt_cell *cell) { return cell->bad; }
+static double has_list(const bt_cell *cell) { return cell->work.n_list > 0; }
+static double is_bad(const bt_cell *cell) { return cell->work.bad; }
 
 /// Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body
 /// always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the
@@ -98,11 +98,11 @@ static void mark_swept(bt_world *w)
     for (bt_idx j = 0; j < t->n_busy; j++) {
         const bt_idx k = t->busy[j];
         if (k == last) continue;
-        t->cell[k].still = !t->cell[k].swept;
-        t->cell[k].swept = false;
+        t->cell[k].work.still = !t->cell[k].work.swept;
+        t->cell[k].work.swept = false;
     }
     spread(w, has_list, mark_block);
-    t->cell[last].swept = large->own;
+    t->cell[last].work.swept = large->own;
     for (bt_idx j = 0; large->own && j < large->n_contacts; j++) {
         mark_cell_of(w, large->contacts[j].a);
         mark_cell_of(w, large->contacts[j].b);
@@ -141,7 +141,7 @@ static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
     for (int32_t dy = -1; bad > 0 && dy <= 1; dy++)
         for (int32_t dx = -1; dx <= 1; dx++) {
             const bt_idx k = bt_cells_at(t, x + dx, y + dy);
-            if (k >= 0) t->cell[k].kept = true;
+            if (k >= 0) t->cell[k].work.kept = true;
         }
 }
 
@@ -150,10 +150,10 @@ static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
 static void keep_near_bad(bt_world *w)
 {
     bt_cells *t = w->cells;
-    for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].kept = t->order[i] == t->n - 1;
+    for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].work.kept = t->order[i] == t->n - 1;
     spread(w, is_bad, keep_beside);
     for (bt_idx i = 0; i < t->n_order; i++)
-        if (!t->cell[t->order[i]].kept) t->cell[t->order[i]].n_list = 0;
+        if (!t->cell[t->order[i]].work.kept) t->cell[t->order[i]].work.n_list = 0;
     lists_are_new(w);
 }
 
@@ -169,9 +169,9 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
     (void)t;
     const body_move *m = context;
     bt_cell *cell = &w->cells->cell[k];
-    if (!cell->swept) return;
-    const double beta = cell->still ? 0 : m->beta;
-    cell->still = false;
+    if (!cell->work.swept) return;
+    const double beta = cell->work.still ? 0 : m->beta;
+    cell->work.still = false;
     for (bt_idx i = cell->first; i < cell->end; i++) {
         const bt_vel now = m->vel[i];
         if (beta > 0) {

@@ -123,14 +123,14 @@ typedef struct bt_moved {
 
 static inline void bt_moved_begin(bt_moved *m, const bt_cell *cell)
 {
-    m->y = cell->n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->n_list, sizeof *m->y) : m->few;
+    m->y = cell->work.n_list > BT_MOVED_FEW ? bt_alloc((size_t)cell->work.n_list, sizeof *m->y) : m->few;
 }
 
 /// Into the totals of the sweep: what the cell turned against its move, J, and how many contacts were moved.
 static inline void bt_rounds_moved(const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)
 {
     bt_sum_add(&t->sum[BT_SWEEP_AGAINST], bt_max(-0x1p60, bt_min(0x1p60, against * s->problem->per_energy)));
-    if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], cell->n_list);
+    if (s->beta > 0) bt_sum_add(&t->sum[BT_SWEEP_MOVED], cell->work.n_list);
 }
 
 static inline void bt_moved_end(bt_moved *m, const bt_cell *cell, const bt_sweep *s, double against, bt_totals *t)

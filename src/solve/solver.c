@@ -48,10 +48,10 @@ static void start_impulses(bt_cell *cell)
     bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         bt_contact *u = &cell->contacts[i];
-        for (int j = 0; cell->limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], cell->limits[i].most[j]);
+        for (int j = 0; cell->laws.limits && j < u->n; j++) u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);
         if (u->n > 0) u->lt = bt_clamp(u->lt, u->mu * (u->ln[0] + u->ln[1]));
-        else bt_onto_disc(cell->limits[i].flat[0], &u->ln[0], &u->lt);
-        double *x = cell->before[i];
+        else bt_onto_disc(cell->laws.limits[i].flat[0], &u->ln[0], &u->lt);
+        double *x = cell->work.before[i];
         x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
     }
 }
@@ -98,18 +98,18 @@ static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *
     bt_rounds_list(cell);
     for (bt_idx i = 0; i < cell->n_contacts; i++) {
         const bt_contact *u = &cell->contacts[i];
-        const bt_limit *limit = cell->limits ? &cell->limits[i] : NULL;
+        const bt_limit *limit = cell->laws.limits ? &cell->laws.limits[i] : NULL;
         const double r = limit ? bt_contact_residual(u, limit, v, &sum) : bt_contact_residual(u, NULL, v, &sum);
         t->most = bt_max(t->most, r);
         bad += r > near;
         rows += u->n + 1 + (u->n == 0);
-        const double *x = cell->before[i];
+        const double *x = cell->work.before[i];
         // or did before the last sweep
         bool on =
             p->plain || u->ln[0] + u->ln[1] > 0 || u->lt != 0 || x[0] != u->ln[0] || x[1] != u->ln[1] || x[2] != u->lt;
         if (limit && u->n == 0) on = on || r > 0;
         for (int c = 0; !on && c < u->n; c++) on = !(bt_normal_velocity(u, c, &v[u->a], &v[u->b]) + u->bias[c] >= 0);
-        if (on) cell->list[cell->n_list++] = i;
+        if (on) cell->work.list[cell->work.n_list++] = i;
     }
     const bt_tow *line = line_of(w, k);
     if (line) {
@@ -148,8 +148,8 @@ static void settle(bt_world *w) { form_velocities(w, false); }
 /// Memory is read in the order of the contacts, but with gaps too wide for the hardware to foresee.
 static inline void fetch_ahead(const bt_cell *cell, bt_idx j)
 {
-    if (j >= cell->n_list) return;
-    const char *line = (const char *)&cell->contacts[cell->list[j]];
+    if (j >= cell->work.n_list) return;
+    const char *line = (const char *)&cell->contacts[cell->work.list[j]];
     for (size_t k = 0; k < sizeof(bt_contact); k += 64) __builtin_prefetch(line + k);
 }
 
@@ -158,10 +158,10 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
 {
     enum { AHEAD = 3 };
     double most = 0;
-    for (bt_idx j = 0; j < cell->n_list; j++) {
-        const bt_idx i = cell->list[j];
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_idx i = cell->work.list[j];
         fetch_ahead(cell, j + AHEAD);
-        const bt_limit *k = cell->limits ? &cell->limits[i] : NULL;
+        const bt_limit *k = cell->laws.limits ? &cell->laws.limits[i] : NULL;
         most = bt_max(most, bt_update_contact(&cell->contacts[i], k, v, inv));
     }
     return most;
@@ -169,9 +169,9 @@ static double update_list(bt_cell *cell, bt_vel *v, const bt_inv *inv)
 
 static void move_contacts(const bt_sweep *o, bt_cell *cell, double (*y)[3])
 {
-    for (bt_idx j = 0; j < cell->n_list; j++) {
-        bt_contact *u = &cell->contacts[cell->list[j]];
-        double *x = cell->before[cell->list[j]];
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        bt_contact *u = &cell->contacts[cell->work.list[j]];
+        double *x = cell->work.before[cell->work.list[j]];
         bt_rounds_move(o, u->ln, x, y[j], 2);
         bt_rounds_move(o, &u->lt, x + 2, y[j] + 2, 1);
     }
@@ -180,9 +180,9 @@ static void move_contacts(const bt_sweep *o, bt_cell *cell, double (*y)[3])
 static double contacts_against(const bt_cell *cell, double (*y)[3])
 {
     double sum = 0;
-    for (bt_idx j = 0; j < cell->n_list; j++) {
-        const bt_contact *u = &cell->contacts[cell->list[j]];
-        const double *x = cell->before[cell->list[j]];
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_contact *u = &cell->contacts[cell->work.list[j]];
+        const double *x = cell->work.before[cell->work.list[j]];
         sum += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
                bt_rounds_against(u->w[1], u->ln[1], x[1], y[j][1]) + bt_rounds_against(u->wt, u->lt, x[2], y[j][2]);
     }
@@ -196,7 +196,7 @@ static void sweep_in_batches(bt_world *w, bt_cell *cell, const bt_sweep *o, bt_t
     const double against = bt_batch_sweep(cell, w->bodies.vel, w->bodies.inv, o, w->par.inner_sweeps,
                                           ENOUGH * o->problem->tolerance, &done, &most);
     t->most = bt_max(t->most, most);
-    cell->updates += done;
+    cell->work.updates += done;
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
     if (o->moves) bt_rounds_moved(cell, o, against, t);
 }
@@ -206,7 +206,7 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const bt_sweep *o = context;
     bt_cell *cell = &w->cells->cell[k];
     bt_tow *line = line_of(w, k);
-    if (cell->n_list == 0 && !line) return;
+    if (cell->work.n_list == 0 && !line) return;
     if (bt_batch_is_for(cell)) {
         sweep_in_batches(w, cell, o, t);
         return;
@@ -229,8 +229,8 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
         if (line) most = bt_max(most, bt_tow_update(line, towed, w->bodies.inv[bt_world_towed(w)]));
         if (times == 0) t->most = bt_max(t->most, most);
     }
-    cell->updates += times * cell->n_list;
-    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)(times * cell->n_list));
+    cell->work.updates += times * cell->work.n_list;
+    bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)(times * cell->work.n_list));
     if (!o->moves) return;
     double against = contacts_against(cell, moved.y);
     for (int c = 0; line && c < line->n_branches; c++)

@@ -18,15 +18,15 @@ bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 
 static void free_cell(bt_cell *t)
 {
-    free(t->pairs);
-    free(t->near);
+    free(t->search.pairs);
+    free(t->search.near);
     free(t->contacts);
     free(t->gaps);
-    free(t->limits);
-    free(t->memory);
-    free(t->list);
-    free(t->before);
-    free(t->batch);
+    free(t->laws.limits);
+    free(t->laws.memory);
+    free(t->work.list);
+    free(t->work.before);
+    free(t->work.batch);
     *t = (bt_cell){0};
 }
 
@@ -108,7 +108,7 @@ void bt_cells_leave(bt_cells *t)
             t->busy[kept++] = k;
         } else {
             t->is_busy[k] = 0;
-            t->cell[k].swept = false; // as a look would have it: nothing here moved on
+            t->cell[k].work.swept = false; // as a look would have it: nothing here moved on
         }
     }
     t->n_busy = kept;
@@ -362,11 +362,11 @@ int bt_memory_by_names(const void *p, const void *q)
 
 void bt_cells_remember(bt_cell *t, const bt_memory *r)
 {
-    if (t->n_memory == t->cap_memory) {
-        t->cap_memory = t->cap_memory ? 2 * t->cap_memory : 8;
-        t->memory = bt_realloc(t->memory, (size_t)t->cap_memory, sizeof *t->memory);
+    if (t->laws.n_memory == t->laws.cap_memory) {
+        t->laws.cap_memory = t->laws.cap_memory ? 2 * t->laws.cap_memory : 8;
+        t->laws.memory = bt_realloc(t->laws.memory, (size_t)t->laws.cap_memory, sizeof *t->laws.memory);
     }
-    t->memory[t->n_memory++] = *r;
+    t->laws.memory[t->laws.n_memory++] = *r;
 }
 
 static bt_memory trace_of(const bt_gid *gid, const bt_pair *p)
@@ -380,16 +380,17 @@ bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
     const bt_cells *t = w->cells;
     int64_t cap = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        for (bt_idx i = 0; t->cell[k].own && i < t->cell[k].n_pairs; i++) cap += t->cell[k].pairs[i].n_points > 0;
-        if (t->cell[k].own) cap += t->cell[k].n_memory;
+        for (bt_idx i = 0; t->cell[k].own && i < t->cell[k].search.n_pairs; i++)
+            cap += t->cell[k].search.pairs[i].n_points > 0;
+        if (t->cell[k].own) cap += t->cell[k].laws.n_memory;
     }
     bt_memory *trace = bt_alloc((size_t)cap, sizeof *trace);
     *n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
         const bt_cell *cell = &t->cell[k];
-        for (bt_idx i = 0; cell->own && i < cell->n_memory; i++) trace[(*n)++] = cell->memory[i];
-        for (bt_idx i = 0; cell->own && i < cell->n_pairs; i++)
-            if (cell->pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &cell->pairs[i]);
+        for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) trace[(*n)++] = cell->laws.memory[i];
+        for (bt_idx i = 0; cell->own && i < cell->search.n_pairs; i++)
+            if (cell->search.pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &cell->search.pairs[i]);
     }
     return trace;
 }
@@ -419,11 +420,12 @@ void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
             bt_cells_remember(cell, &trace[k]);
             continue;
         }
-        if (cell->n_pairs == cell->cap_pairs) {
-            cell->cap_pairs = cell->cap_pairs ? 2 * cell->cap_pairs : 16;
-            cell->pairs = bt_realloc(cell->pairs, (size_t)cell->cap_pairs, sizeof *cell->pairs);
+        if (cell->search.n_pairs == cell->search.cap_pairs) {
+            cell->search.cap_pairs = cell->search.cap_pairs ? 2 * cell->search.cap_pairs : 16;
+            cell->search.pairs =
+                bt_realloc(cell->search.pairs, (size_t)cell->search.cap_pairs, sizeof *cell->search.pairs);
         }
-        bt_pair *p = &cell->pairs[cell->n_pairs++];
+        bt_pair *p = &cell->search.pairs[cell->search.n_pairs++];
         *p = (bt_pair){
             .a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
         memcpy(p->part, trace[k].part, sizeof p->part);

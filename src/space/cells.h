@@ -92,16 +92,8 @@ typedef struct bt_memory {
     uint16_t law;        ///< number of the law (contact/law.h); the impulses of the last step are the rigid one's, 0
 } bt_memory;
 
-typedef struct bt_cell {
-    int32_t x, y;                   ///< coordinates
-    bt_idx first, end;              ///< its bodies in storage
-    bt_idx right, above, diagonal;  ///< cells +x, +y, +xy: index, −1 = none
-    bool own;                       ///< this rank solves its contacts and answers for its bodies
-    bool border;                    ///< some body of its block is held by other ranks too
-    int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
-    bool active;                    ///< its contacts are looked at in this step
-    double margin;                  ///< m, of this step's detection
-    // pair list
+/// What a cell keeps of the search for pairs, over many steps (pairs.c).
+typedef struct bt_pair_search {
     bt_pair *pairs;                 ///< [n_pairs] sorted by (gid a, gid b, parts)
     bt_idx n_pairs, cap_pairs;
     bool listed;                    ///< the list is valid for margin_listed
@@ -112,23 +104,23 @@ typedef struct bt_cell {
     bt_idx n_near, cap_near;
     bool near_known;                ///< they are those of the list
     double margin_near, moved_near[4], large_near; ///< margin, and what had moved, when they were found
-    // contacts of this step
-    bt_contact *contacts;                 ///< [n_contacts]
-    bt_gaps *gaps;                  ///< [n_contacts] of the contacts
-    bt_idx n_contacts, cap_contacts;
-    int64_t n_points;
-    double overlap;                 ///< deepest, m
-    // contact laws (contact/law.h)
+} bt_pair_search;
+
+/// What contact laws bound and remember in a cell (contact/law.h).
+typedef struct bt_law_state {
     struct bt_limit *limits;        ///< [n_contacts] bounds of the contacts; NULL where contacts are rigid
     /// [n_memory] what laws remember of pairs of this cell, sorted by bt_memory_by_names
     bt_memory *memory;
     bt_idx cap_limits, n_memory, cap_memory;
     bool rising;                    ///< some bounds have a rising part
-    // contacts that are swept (src/solve/rounds.h)
+} bt_law_state;
+
+/// The contacts of a cell that are swept (solve/rounds.h).
+typedef struct bt_work_list {
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_contacts] unknowns before the last sweep
     bt_idx n_list, cap_list;
-    struct bt_batch *batch;         ///< [n_batches] the listed contacts again (src/solve/batch.h)
+    struct bt_batch *batch;         ///< [n_batches] the listed contacts again (solve/batch.h)
     bt_idx n_batches, cap_batches;
     bool packed;                    ///< their impulses are there, and not in the contacts
     int64_t updates;                ///< of contacts, since the balance of the ranks was last noted
@@ -136,6 +128,26 @@ typedef struct bt_cell {
     bool kept;                      ///< swept in a round over a part of the field
     bool still;                     ///< they could not in the round before: nothing of theirs moves on
     bool swept;                     ///< listed contacts, here or on another rank, may move its bodies
+} bt_work_list;
+
+typedef struct bt_cell {
+    int32_t x, y;                   ///< coordinates
+    bt_idx first, end;              ///< its bodies in storage
+    bt_idx right, above, diagonal;  ///< cells +x, +y, +xy: index, −1 = none
+    bool own;                       ///< this rank solves its contacts and answers for its bodies
+    bool border;                    ///< some body of its block is held by other ranks too
+    int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
+    bool active;                    ///< its contacts are looked at in this step
+    double margin;                  ///< m, of this step's detection
+    bt_pair_search search;
+    // contacts of this step
+    bt_contact *contacts;           ///< [n_contacts]
+    bt_gaps *gaps;                  ///< [n_contacts] of the contacts
+    bt_idx n_contacts, cap_contacts;
+    int64_t n_points;
+    double overlap;                 ///< deepest, m
+    bt_law_state laws;
+    bt_work_list work;
 } bt_cell;
 
 /// What one thread is to do of one stretch of the order (src/space/phases.h).

@@ -214,16 +214,17 @@ static void replace(bt_world *w, bt_cell *t, bt_pair_scratch *s, size_t n)
     if (n > 0) qsort_r(s->found, n, sizeof *s->found, by_gids, gid);
     bt_idx k = 0;
     for (size_t i = 0; i < n; i++) {
-        while (k < t->n_pairs && by_gids(&t->pairs[k], &s->found[i], gid) < 0) k++;
-        if (k < t->n_pairs && by_gids(&t->pairs[k], &s->found[i], gid) == 0) s->found[i] = t->pairs[k];
+        while (k < t->search.n_pairs && by_gids(&t->search.pairs[k], &s->found[i], gid) < 0) k++;
+        if (k < t->search.n_pairs && by_gids(&t->search.pairs[k], &s->found[i], gid) == 0)
+            s->found[i] = t->search.pairs[k];
     }
-    if (n > (size_t)t->cap_pairs) {
-        t->cap_pairs = (bt_idx)(n + n / 4);
-        free(t->pairs);
-        t->pairs = bt_realloc(NULL, (size_t)t->cap_pairs, sizeof *t->pairs);
+    if (n > (size_t)t->search.cap_pairs) {
+        t->search.cap_pairs = (bt_idx)(n + n / 4);
+        free(t->search.pairs);
+        t->search.pairs = bt_realloc(NULL, (size_t)t->search.cap_pairs, sizeof *t->search.pairs);
     }
-    if (n > 0) memcpy(t->pairs, s->found, n * sizeof *t->pairs);
-    t->n_pairs = (bt_idx)n;
+    if (n > 0) memcpy(t->search.pairs, s->found, n * sizeof *t->search.pairs);
+    t->search.n_pairs = (bt_idx)n;
 }
 
 /// What moves the bodies of the pairs of cell k, m: of its four cells, or of any for the last one; and large bodies.
@@ -242,25 +243,25 @@ bool bt_pairs_near(const bt_world *w, bt_idx k, bt_cell *t, double margin)
 {
     double moved[4], large, most;
     paths_of(w, k, t, moved, &large);
-    most = large - t->large_near;
-    for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - t->moved_near[i]);
+    most = large - t->search.large_near;
+    for (int i = 0; i < 4; i++) most = bt_max(most, moved[i] - t->search.moved_near[i]);
     // A hundredth is for the rounding of sums of paths.
-    if (t->near_known && 2 * most + margin - t->margin_near <= 0.99 * bt_pairs_near_gap(w)) return true;
-    memcpy(t->moved_near, moved, sizeof moved);
-    t->large_near = large;
-    t->margin_near = margin;
-    t->n_near = 0;
-    t->near_known = true;
+    if (t->search.near_known && 2 * most + margin - t->search.margin_near <= 0.99 * bt_pairs_near_gap(w)) return true;
+    memcpy(t->search.moved_near, moved, sizeof moved);
+    t->search.large_near = large;
+    t->search.margin_near = margin;
+    t->search.n_near = 0;
+    t->search.near_known = true;
     return false;
 }
 
 void bt_pairs_add_near(bt_cell *t, bt_idx i)
 {
-    if (t->n_near == t->cap_near) {
-        t->cap_near = t->cap_near ? 2 * t->cap_near : 16;
-        t->near = bt_realloc(t->near, (size_t)t->cap_near, sizeof *t->near);
+    if (t->search.n_near == t->search.cap_near) {
+        t->search.cap_near = t->search.cap_near ? 2 * t->search.cap_near : 16;
+        t->search.near = bt_realloc(t->search.near, (size_t)t->search.cap_near, sizeof *t->search.near);
     }
-    t->near[t->n_near++] = i;
+    t->search.near[t->search.n_near++] = i;
 }
 
 void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_scratch *s)
@@ -270,18 +271,19 @@ void bt_pairs_update(bt_world *w, bt_idx k, bt_cell *t, double margin, bt_pair_s
     const double skin = 0.2 * w->par.size, skin_large = w->par.size;
     double moved[4], large_moved;
     paths_of(w, k, t, moved, &large_moved);
-    bool stale = !t->listed || margin > t->margin_listed || large_moved - t->large_listed > 0.5 * skin_large;
-    for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->moved_listed[i] > 0.5 * skin;
+    bool stale = !t->search.listed || margin > t->search.margin_listed ||
+                 large_moved - t->search.large_listed > 0.5 * skin_large;
+    for (int i = 0; i < 4 && !stale; i++) stale = moved[i] - t->search.moved_listed[i] > 0.5 * skin;
     if (!stale) return;
     const double large = margin + 0.5 * skin + 0.5 * skin_large;
     const size_t n =
         last ? pairs_of_large(w, large, margin + skin_large, s) : pairs_of_block(w, t, k, margin + skin, large, s);
     replace(w, t, s, n);
-    t->listed = true;
-    t->margin_listed = margin;
-    t->near_known = false;
-    t->large_listed = large_moved;
-    memcpy(t->moved_listed, moved, sizeof moved);
+    t->search.listed = true;
+    t->search.margin_listed = margin;
+    t->search.near_known = false;
+    t->search.large_listed = large_moved;
+    memcpy(t->search.moved_listed, moved, sizeof moved);
 #pragma omp atomic
     ts->n_listings++;
 }

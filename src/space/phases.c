@@ -31,11 +31,11 @@ static void deal_stretch(bt_cells *t, bt_idx begin, bt_idx end, bt_share *share)
 {
     enum { CELL = 4 }; // contacts
     int64_t all = 0, before = 0;
-    for (bt_idx i = begin; i < end; i++) all += CELL + t->cell[t->order[i]].n_list;
+    for (bt_idx i = begin; i < end; i++) all += CELL + t->cell[t->order[i]].work.n_list;
     bt_idx i = begin;
     for (bt_idx s = 0; s < t->n_shares; s++) {
         share[s].begin = i;
-        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += CELL + t->cell[t->order[i]].n_list;
+        for (; i < end && before * t->n_shares < all * (s + 1); i++) before += CELL + t->cell[t->order[i]].work.n_list;
         share[s].end = i;
     }
     share[t->n_shares - 1].end = end;
@@ -45,7 +45,7 @@ void bt_phases_deal(bt_world *w)
 {
     bt_cells *t = w->cells;
     int64_t listed = 0;
-    for (bt_idx i = 0; i < t->n_order; i++) listed += t->cell[t->order[i]].n_list;
+    for (bt_idx i = 0; i < t->n_order; i++) listed += t->cell[t->order[i]].work.n_list;
     const bt_idx n = BT_MANY(listed, BT_FEW_CONTACTS) ? omp_get_max_threads() : 1;
     if (n > t->cap_shares) {
         free(t->share);
@@ -84,7 +84,7 @@ void bt_phases_order(bt_world *w)
         if (!has_work(w, k)) continue;
         t->order[at[stretch_of(w, k)]++] = k;
         t->n_contacts += t->cell[k].n_contacts;
-        t->cell[k].n_list = t->cell[k].n_contacts; // until they are listed
+        t->cell[k].work.n_list = t->cell[k].n_contacts; // until they are listed
     }
     bt_phases_deal(w);
 }

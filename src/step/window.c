@@ -274,8 +274,8 @@ static void forget_contacts(bt_world *w, const uint8_t *moved)
 {
     const bt_cells *t = w->cells;
     for (bt_idx k = 0; k < t->n; k++)
-        for (bt_idx j = 0; j < t->cell[k].n_pairs; j++) {
-            bt_pair *p = &t->cell[k].pairs[j];
+        for (bt_idx j = 0; j < t->cell[k].search.n_pairs; j++) {
+            bt_pair *p = &t->cell[k].search.pairs[j];
             if (moved[p->a] || moved[p->b]) p->n_points = 0;
         }
 }

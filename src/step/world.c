@@ -90,8 +90,8 @@ uint64_t bt_world_hash(const bt_world *w)
         sum += h;
     }
     for (bt_idx k = 0; k < w->cells->n; k++)
-        for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].n_memory; i++)
-            sum += hash_trace(&w->cells->cell[k].memory[i]);
+        for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].laws.n_memory; i++)
+            sum += hash_trace(&w->cells->cell[k].laws.memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);

@@ -232,11 +232,11 @@ static void memory(void **state)
     scene_wall(w, 0.5, -50, 5, 50, 0);
     for (int s = 0; s < 200; s++) bt_world_step(w);
     const double deep = pose(w, 0)->x;
-    assert_true(deep > 0.02 && w->cells->cell[0].n_memory == 1);
+    assert_true(deep > 0.02 && w->cells->cell[0].laws.n_memory == 1);
     for (int s = 0; s < 20; s++) bt_world_step(w);
     CHECK_CLOSE(pose(w, 0)->x, deep, 0);
     const uint64_t hash = bt_world_hash(w);
-    w->cells->cell[0].memory[0].value[0] *= 1 + 1e-15;
+    w->cells->cell[0].laws.memory[0].value[0] *= 1 + 1e-15;
     assert_true(bt_world_hash(w) != hash);
 
     const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
@@ -285,9 +285,9 @@ static void rebound_below_the_limit(void **state)
         before = now;
     }
     assert_true(before < -1e-3 && depth > 0.01);
-    assert_true(w->cells->cell[0].n_memory == 1);
+    assert_true(w->cells->cell[0].laws.n_memory == 1);
     for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_CRUSH_MEMORY; s++) bt_world_step(w);
-    assert_true(w->cells->cell[0].n_memory == 0); // parted, forgotten
+    assert_true(w->cells->cell[0].laws.n_memory == 0); // parted, forgotten
     bt_world_free(w);
 }
 

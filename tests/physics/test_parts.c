@@ -208,7 +208,8 @@ static void detect_equals_brute_force_with_parts(void **state)
             // Which of two facing edges is the reference depends on the step before, within the tie: without it both
             // must find the same.
             for (bt_idx k = 0; k < w->cells->n; k++)
-                for (bt_idx j = 0; j < w->cells->cell[k].n_pairs; j++) w->cells->cell[k].pairs[j].n_points = 0;
+                for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++)
+                    w->cells->cell[k].search.pairs[j].n_points = 0;
             bt_contacts_detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, have = 0;

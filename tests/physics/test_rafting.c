@@ -164,7 +164,7 @@ static void out_behind(void **state)
     }
     assert_true(under && parted);
     bt_idx records = 0;
-    for (bt_idx k = 0; k < w->cells->n; k++) records += w->cells->cell[k].n_memory;
+    for (bt_idx k = 0; k < w->cells->n; k++) records += w->cells->cell[k].laws.n_memory;
     assert_int_equal(records, 0);
     bt_world_free(w);
 }

@@ -73,7 +73,7 @@ static void make_sheets(bt_contact *u, const bt_inv *inv, uint64_t *rng)
 /// Flat bounds for all contacts; a third of them become sheets.
 static void bind(knot_of_floes *s, uint64_t *rng)
 {
-    s->cell.limits = s->limits;
+    s->cell.laws.limits = s->limits;
     for (bt_idx i = 0; i < CONTACTS; i++) {
         bt_limit *l = &s->limits[i];
         *l = (bt_limit){.flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}};
@@ -93,11 +93,12 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         if (i % 7) s->inv[i] = (bt_inv){0.1 + scene_uniform(rng), 0.1 + scene_uniform(rng)};
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
-    s->cell = (bt_cell){.contacts = s->contacts, .n_contacts = CONTACTS, .before = s->before, .list = s->list};
+    s->cell =
+        (bt_cell){.contacts = s->contacts, .n_contacts = CONTACTS, .work.before = s->before, .work.list = s->list};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         s->contacts[i] = random_contact(rng, s->inv);
         for (int c = 0; c < 3; c++) s->before[i][c] = any(rng);
-        if (scene_uniform(rng) < listed) s->list[s->cell.n_list++] = i;
+        if (scene_uniform(rng) < listed) s->list[s->cell.work.n_list++] = i;
     }
 }
 
@@ -105,21 +106,21 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
 static double scalar_visit(knot_of_floes *s, const bt_idx *order, const bt_sweep *o, int times, double *most)
 {
     static double y[CONTACTS][3];
-    for (bt_idx j = 0; o->moves && j < s->cell.n_list; j++) {
+    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
         bt_contact *u = &s->contacts[order[j]];
         bt_rounds_move(o, u->ln, s->before[order[j]], y[j], 2);
         bt_rounds_move(o, &u->lt, s->before[order[j]] + 2, y[j] + 2, 1);
     }
     for (int n = 0; n < times; n++) {
         double largest = 0;
-        for (bt_idx j = 0; j < s->cell.n_list; j++) {
-            const bt_limit *l = s->cell.limits ? &s->limits[order[j]] : NULL;
+        for (bt_idx j = 0; j < s->cell.work.n_list; j++) {
+            const bt_limit *l = s->cell.laws.limits ? &s->limits[order[j]] : NULL;
             largest = bt_max(largest, bt_update_contact(&s->contacts[order[j]], l, s->v, s->inv));
         }
         if (n == 0) *most = largest;
     }
     double against = 0;
-    for (bt_idx j = 0; o->moves && j < s->cell.n_list; j++) {
+    for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++) {
         const bt_contact *u = &s->contacts[order[j]];
         const double *x = s->before[order[j]];
         against += bt_rounds_against(u->w[0], u->ln[0], x[0], y[j][0]) +
@@ -143,12 +144,12 @@ static void batches_do_what_single_updates_do(void **state)
         int64_t done = 0;
         double most = 0, most_of_one = 0;
         const double against = bt_batch_sweep(&four.cell, four.v, four.inv, &o, times, 0, &done, &most);
-        assert_true(four.cell.packed);
-        assert_int_equal(done, times * four.cell.n_list);
+        assert_true(four.cell.work.packed);
+        assert_int_equal(done, times * four.cell.work.n_list);
         bt_batch_order(&four.cell, order);
         CHECK_CLOSE(scalar_visit(&one, order, &o, times, &most_of_one), against, 1e-12 * (1 + fabs(against)));
         bt_batch_unpack(&four.cell);
-        assert_false(four.cell.packed);
+        assert_false(four.cell.work.packed);
         CHECK_CLOSE(most, most_of_one, 0);
         for (int i = 0; i < BODIES; i++) {
             assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
@@ -159,7 +160,7 @@ static void batches_do_what_single_updates_do(void **state)
             assert_true(p->ln[0] == q->ln[0] && p->ln[1] == q->ln[1] && p->lt == q->lt);
             assert_memory_equal(four.before[i], one.before[i], sizeof *four.before);
         }
-        free(four.cell.batch);
+        free(four.cell.work.batch);
     }
 }
 
@@ -176,16 +177,16 @@ static void each_listed_contact_is_in_one_batch(void **state)
     double most = 0;
     bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 1, 0, &done, &most);
     bt_batch_order(&s.cell, order);
-    for (bt_idx j = 0; j < s.cell.n_list; j++) {
+    for (bt_idx j = 0; j < s.cell.work.n_list; j++) {
         assert_false(seen[order[j]]);
         seen[order[j]] = true;
     }
-    assert_true(LANES * s.cell.n_batches < 1.15 * s.cell.n_list);
+    assert_true(LANES * s.cell.work.n_batches < 1.15 * s.cell.work.n_list);
     // A visit ends when a pass has changed nothing that matters.
     done = 0;
     bt_batch_sweep(&s.cell, s.v, s.inv, &(bt_sweep){0}, 5, INFINITY, &done, &most);
-    assert_int_equal(done, s.cell.n_list);
-    free(s.cell.batch);
+    assert_int_equal(done, s.cell.work.n_list);
+    free(s.cell.work.batch);
 }
 
 int main(void)

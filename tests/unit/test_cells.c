@@ -114,7 +114,7 @@ static void rest_costs_nothing_and_ends(void **state)
     for (int k = 0; k < 50; k++) bt_world_step(w);
     assert_int_equal(w->cells->n_listings, listings);
     for (bt_gid g = 0; g < n; g++) assert_same_pose(before[g], pose_of(w, g));
-    for (bt_idx k = 0; k < w->cells->n - 1; k++) assert_null(w->cells->cell[k].pairs);
+    for (bt_idx k = 0; k < w->cells->n - 1; k++) assert_null(w->cells->cell[k].search.pairs);
 
     // One floe is set in motion from outside: its neighbourhood wakes up, the far end does not.
     const bt_gid first = 10 * LONG + 2;
@@ -150,8 +150,8 @@ static void check_busy(const bt_cells *t)
             continue;
         }
         assert_true(k < t->n - 1 && t->asleep[k] == BT_ASLEEP && !t->awake[k] && t->bound[k] == 0 && t->speed[k] == 0);
-        assert_true(!t->cell[k].active && !t->cell[k].pairs && t->cell[k].n_contacts == 0 && t->cell[k].overlap == 0 &&
-                    !t->cell[k].swept);
+        assert_true(!t->cell[k].active && !t->cell[k].search.pairs && t->cell[k].n_contacts == 0 &&
+                    t->cell[k].overlap == 0 && !t->cell[k].work.swept);
     }
     assert_int_equal(n, t->n_busy);
 }
@@ -180,7 +180,7 @@ static void a_step_looks_at_busy_cells_alone(void **state)
         bt_cells *all = w[1]->cells;
         for (bt_idx k = 0; k < all->n; k++) {
             all->asleep[k] = BT_AWAKE;
-            all->cell[k].near_known = false;
+            all->cell[k].search.near_known = false;
         }
         if (n > 0) bt_cells_wake_all(all);
         for (int k = 0; k < 2; k++) bt_world_step(w[k]);

@@ -140,7 +140,7 @@ static void shares_follow_the_lists(void **state)
         bt_world *w = fill(&(scene){90, 90, false, false, -1, 0}, &rng);
         bt_cells *t = w->cells;
         for (bt_idx i = 0; i < t->n_order; i++)
-            t->cell[t->order[i]].n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
+            t->cell[t->order[i]].work.n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
         bt_phases_deal(w);
         assert_int_equal(t->n_shares, threads);
         for (int p = 0; p < BT_COLOURS; p++) {
@@ -152,8 +152,8 @@ static void shares_follow_the_lists(void **state)
                 at = share->end;
                 int64_t contacts = 0;
                 for (bt_idx i = share->begin; i < share->end; i++) {
-                    contacts += t->cell[t->order[i]].n_list;
-                    largest = t->cell[t->order[i]].n_list > largest ? t->cell[t->order[i]].n_list : largest;
+                    contacts += t->cell[t->order[i]].work.n_list;
+                    largest = t->cell[t->order[i]].work.n_list > largest ? t->cell[t->order[i]].work.n_list : largest;
                 }
                 least = contacts < least ? contacts : least, most = contacts > most ? contacts : most;
             }
@@ -161,7 +161,7 @@ static void shares_follow_the_lists(void **state)
             assert_true((double)(most - least) <= 2 * (double)largest + 0.05 * (double)most);
         }
         assert_sound(w, -1);
-        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].n_list = 0;
+        for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].work.n_list = 0;
         bt_phases_deal(w);
         assert_sound(w, -1);
         bt_world_free(w);
