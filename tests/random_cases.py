@@ -80,6 +80,7 @@ FREE = {
     "solver.turn_rows": (1, 1e5, "l"),
     "solver.tile": (2, 10, "lm"),
     "solver.plain": None,
+    "solver.plain_schedule": None,
     "solver.warm_start": None,
     "solver.slop": (1e-5, 1e-2, "l"),
     "solver.position_sweeps": (10, 300, "l"),
@@ -543,6 +544,7 @@ def may_be_null(path, case, summary):
     reference = value_of(case, "reference.mean_force")
     rules = (
         (r"title|stopped|lead|reference|window\.(warning|reason)|.*\.source", True),
+        (r"estimate_labels", not body),
         (r"start_peak_.*|.*\.start_peak_n", True),  # no step before the window
         (r"outlines\.origin_.*", True),
         (r".*_force_n|.*_ice_resistance.*_n|.*_se_n|peak_line_tension_n|budget\..*|window\..*|estimates.*|impacts.*",

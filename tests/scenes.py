@@ -106,6 +106,7 @@ SCENES = {
         "length": 20, "width": 16, "ends": "open", "sides": "periodic"}),
     "open_sides": changed(DENSE, domain__sides="open", domain__ends="open", water__current_y=0.1),
     "plain_sweeps": changed(DENSE, solver__plain=True, solver__max_sweeps=60),
+    "plain_schedule": changed(DENSE, solver__plain_schedule=True, ice__restitution=0.2),
     "cold_start": changed(DENSE, solver__warm_start=False, solver__inner_sweeps=1, solver__tile=3),
     "few_sweeps": changed(CLOSING, run__duration=1.5),
     "solver_settings": changed(DENSE, solver={"tolerance": 1e-4, "reference_speed": 0.3, "turn_rows": 50, "slop": 5e-3,

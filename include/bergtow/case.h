@@ -209,6 +209,7 @@ typedef struct bt_case {
         int64_t turn_rows;       ///< without effect, of cases written for earlier versions
         double cell;             ///< least side of a cell / mean floe size
         bool plain;              ///< no acceleration
+        bool plain_schedule;     ///< passes by one thread (space/phases.h)
         bool warm_start;
         double slop;             ///< overlap left alone by the position projection / mean floe size
         int64_t position_sweeps; ///< limit of the position projection

@@ -118,10 +118,11 @@ typedef struct bt_params {
     double x0, y0;         ///< low corner of the domain, m
     double period_x, period_y; ///< length of the periodic directions, m; 0 = not periodic
     double tolerance;      ///< natural-map residual at which the sweeps stop, m/s
-    /// limit of the work of a step: 3 updates of every contact for each; with plain_sweeps, of sweeps
+    /// limit of the work of a step: 6 updates of every contact for each; with plain_sweeps, of sweeps
     int64_t max_sweeps;
     bool warm_start;
     bool plain_sweeps;     ///< sweeps over all contacts, without momentum (reference)
+    bool plain_schedule;   ///< passes over the cells by one thread (reference)
     int64_t inner_sweeps;  ///< times a cell is swept before the next one has its turn
     double cell;           ///< least side of a cell in mean floe diameters, 0 = the default
     double slop;           ///< overlap left alone, m

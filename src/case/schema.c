@@ -368,6 +368,9 @@ bt_key bt_case_keys[] = {
     BOOL("solver.plain", solver.plain, "false",
          "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of "
          "sweeps"),
+    BOOL("solver.plain_schedule", solver.plain_schedule, "false",
+         "cells one after the other, colour by colour, by one thread of each rank, as a reference: the same result, to "
+         "the last bit"),
     BOOL("solver.warm_start", solver.warm_start, "true", "start from the impulses of the last step"),
     REAL("solver.slop", solver.slop, RATIO, "1e-3", "[0, 0.1]",
          "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the "

@@ -43,6 +43,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         .max_sweeps = c->solver.max_sweeps,
         .warm_start = c->solver.warm_start,
         .plain_sweeps = c->solver.plain,
+        .plain_schedule = c->solver.plain_schedule,
         .inner_sweeps = c->solver.inner_sweeps,
         .cell = c->solver.cell,
         .slop = c->solver.slop * size,

@@ -147,8 +147,24 @@ static void run_phases(pass *o, bt_vel *exchanged)
     }
 }
 
+/// The reference: what the schedule above comes to, without threads, shares, or an exchange under way.
+static void run_plain(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
+{
+    const bt_cells *cs = w->cells;
+    for (int p = 0; p < BT_PHASES; p++) {
+        for (bt_idx i = cs->start[p]; i < cs->start[p + 1]; i++) visit(w, cs->order[i], context, t);
+        if (!w->exchange || !exchanged) continue;
+        w->exchange->send(w, p, exchanged);
+        w->exchange->receive(w, p, exchanged);
+    }
+}
+
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t)
 {
+    if (w->par.plain_schedule) {
+        run_plain(w, visit, context, exchanged, t);
+        return;
+    }
     open_shares(w->cells);
 #pragma omp parallel num_threads(w->cells->n_shares)
     {

@@ -8,6 +8,17 @@
 // takes cells from the others' shares. Among ranks the cells of a phase for which others wait come first, and their
 // velocities travel while the rest is worked on.
 //
+//     phase 0 (colour 0)       phase 1            ...   phase 4 (large bodies)
+//     border cells | inner     border | inner           one rank
+//     ------------>|           ------>|
+//        send      |...receive   send |...receive       send, receive
+//     thread 0  ====  ======    ===    =====            ==
+//     thread 1  ====  =====x    ===    ====xx           (waits)      x: a cell of another thread's share
+//
+// Invariant: cells of one phase have no movable body in common, so that their visits commute, and every body sees the
+// same visits in the same order as in the plain schedule: phase after phase, cell after cell, by one thread
+// (solver.plain_schedule), which is the reference.
+//
 // Rejected: passes that follow each other through the field without barriers, so that what one has read from memory
 // serves the next. After every sweep there is a decision for the whole field (rounds.h), so that there is no next pass
 // to go on with.

@@ -196,3 +196,11 @@ def test_the_hash_sees_the_last_bit(tmp_path):
     assert all(seen for _, seen in nudged), nudged
     still = {"run": {"dt": 0.1, "duration": 9}, "ice": {"concentration": 0.3}, "body": {"shape": "none"}}
     assert run(tmp_path, still, "--steps", 1, name="one").hash != run(tmp_path, still, "--steps", 2, name="two").hash
+
+
+def test_the_plain_schedule_is_the_reference(one_thread):
+    """Cells one after the other, without shares of threads: the same result as dealt to two threads."""
+    case, one, folder = one_thread
+    plain = run(folder, changed(case, solver__plain_schedule=True), "--threads", 2, name="plain", env=environment())
+    assert plain.hash == one.hash
+    assert differing(one.dir / "result.h5", plain.dir / "result.h5", but=("/case", "/case_as_given")) == []
