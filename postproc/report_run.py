@@ -328,7 +328,8 @@ def context(run, limit=LIMIT, compress=True):
         "figures": figures(run), "forces": forces(run), "estimates": estimates(run),
         "conditions_of_estimates": run.summary.get("estimates") or {}, "impacts": impacts(run), "quality": quality(run),
         "events": happened, "n_events": n_events, "provenance": provenance(run), "key_values": key_values(run, values),
-        "values": values, "kinds": report_case.KINDS, "n_assumed": sum(v.kind in ("assumed", "memory", "reported") for v in values),
+        "values": values, "kinds": report_case.KINDS,
+        "n_assumed": sum(v.kind in ("assumed", "memory", "reported") for v in values),
         "preface": report_case.preface(run.case_text), "case_text": run.case_text, "resolved_text": run.resolved_text,
         "pictures": pictures(run), "replay": replay
     }

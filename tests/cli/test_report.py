@@ -506,7 +506,8 @@ def test_where_each_value_comes_from():
 
 @pytest.mark.parametrize("words, kind", [
     ("[A]", "assumed"), ("[A] large blocks [P], of a size not reported", "assumed"),
-    ("[R] less than 10 cm", "reported"), ("[R] less than 10 cm; [A] the value", "assumed"), ("[P] 10 to 20 cm", "source"), ("", None)
+    ("[R] less than 10 cm", "reported"), ("[R] less than 10 cm; [A] the value", "assumed"),
+    ("[P] 10 to 20 cm", "source"), ("", None)
 ])
 def test_the_marks_of_the_field_cases_are_read(words, kind):
     """A value marked [A] was once labelled as one with a source."""
