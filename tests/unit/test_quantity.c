@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 // The registry of quantities: what it refuses, the keys it makes, and the reductions of a made-up run against sums of
 // the test's own. That every registered number is in every file: cli/test_quantities.py.
+//
+// Red with (tried): the reduction taken over all steps, or without the largest; a force of the balance not subtracted; a
+// key of the summary's own not refused.
 #include "made_up_run.h"
 
 #include "output/summary_keys.h"
