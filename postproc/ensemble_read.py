@@ -150,8 +150,8 @@ class Ensemble:
         out = {}
         for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
             told, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
-            on_top = told[
-                "kind"] == "on top" if "kind" in told else f"estimates_{name}_simulated_over_estimate" not in self.summary
+            without_ratio = f"estimates_{name}_simulated_over_estimate" not in self.summary
+            on_top = told["kind"] == "on top" if "kind" in told else without_ratio
             out[told.get("estimate", name)] = {"label": told.get("label", name.replace("_", " ")), "on_top": on_top}
         return out
 

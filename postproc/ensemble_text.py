@@ -180,8 +180,10 @@ def extremes(s, markdown):
     }
     conversions = sorted({c["extremes"]["conversion"] for c in some})
     text = (
-        f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. GPD: peaks over a threshold; GEV: block maxima. "
-        "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest peak seen."
+        f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. "
+        f"GPD: peaks over a threshold; GEV: block maxima. "
+        "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
+        "peak seen."
     )
     return table(head, rows, markdown) + "\n\n" + "\n".join([text, *(f"No fit for {r}." for r in sorted(refused))])
 
@@ -215,8 +217,10 @@ def sensitivity(s, markdown):
     for of, k in kinds:
         notes.append(
             f"No Sobol indices of the {of}: {k['refused']}." if "refused" in k else
-            f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, {k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
-            f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields and what it misses."
+            f"Sobol indices of the {of}: polynomial expansion of degree {k['degree']}, {k['terms']} terms, "
+            f"{k['samples']} samples; R² {k['r2']:.3f}, cross-validated Q² {k['q2']:.3f}. They share "
+            f"out what it explains; the rest, {100 * (1 - k['r2']):.0f} % of the variance, is scatter of the fields "
+            f"and what it misses."
         )
     return table(head, rows, markdown) + "\n\n" + " ".join(notes)
 
@@ -235,30 +239,36 @@ def report(s, markdown=False):
     ]
     if s["waiting"]:
         lines.append(
-            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number ({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields."
+            f"The ensemble is not complete: {counted(len(s['waiting']))} to come, and in no number "
+            f"({listed(s['waiting'])}). The longest are run first, so conditions have unlike numbers of fields."
         )
     if s["unsound"]:
         name, why = next(iter(s["unsound"].items()))
         lines.append(
-            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: {name}: {why}. `bergtow ensemble` again runs what is damaged anew."
+            f"{counted(len(s['unsound']))} not sound, and in no number ({listed(list(s['unsound']))}); the first: "
+            f"{name}: {why}. `bergtow ensemble` again runs what is damaged anew."
         )
     if s["without_mean"]:
         lines.append(
-            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no steady window, or no body."
+            f"{counted(len(s['without_mean']))} without a mean, and in no number ({listed(s['without_mean'])}): no "
+            f"steady window, or no body."
         )
     if not s["checked"]:
         lines.append(
-            "Whether the files are as they were written was not checked: this machine has neither libxxhash nor the Python package xxhash."
+            "Whether the files are as they were written was not checked: this machine has neither libxxhash nor the "
+            "Python package xxhash."
         )
     if s["behind"]:
         lines.append(
-            f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, which takes them in."
+            f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
+            f"which takes them in."
         )
     for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
             lines.append(
-                f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the first: {name}: {why}"
+                f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the "
+                f"first: {name}: {why}"
             )
     if s["excluded"]:
         lines.append(f"Left out as asked ({', '.join(s['exclude'])}): " +
@@ -268,7 +278,9 @@ def report(s, markdown=False):
         lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
     if s["members_without_folder"]:
         lines.append(
-            f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their peaks not at all."
+            f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
+            f"no folder here ({listed(s['members_without_folder'])}): their warnings are known by numbers alone, their "
+            f"peaks not at all."
         )
     heavy = [
         c["label"]

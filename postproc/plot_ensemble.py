@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Pictures of an ensemble, those that its study supports.
 
-    sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the others: every field, mean with
-                      95 %, median, jams; the estimates beside concentration, the law V^2 beside speed. A Latin
-                      hypercube: one panel, every member
+    sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the
+                      others: every field, mean with 95 %, median, jams; the estimates beside concentration, the
+                      law V^2 beside speed. A Latin hypercube: one panel, every member
     exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
     map.png           mean and its relative uncertainty over two numbers of a grid
     sensitivity.png   Sobol indices and partial rank correlations

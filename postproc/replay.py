@@ -262,8 +262,9 @@ def curve(run):
     Without a towed body: kinetic energy. None without samples.
     """
     time = run["time"]
-    kinds = [("ice_resistance", "ice resistance", style.ICE), ("tow_force", "tow force", style.TOW)] if run.towed is not None else \
-        [("kinetic_energy", "kinetic energy", style.ICE)]
+    kinds = [("kinetic_energy", "kinetic energy", style.ICE)]
+    if run.towed is not None:
+        kinds = [("ice_resistance", "ice resistance", style.ICE), ("tow_force", "tow force", style.TOW)]
     kinds = [k for k in kinds if k[0] in run and np.isfinite(run[k[0]]).any()]
     if len(time) < 2 or not kinds:
         return None

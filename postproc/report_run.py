@@ -289,7 +289,9 @@ def provenance(run):
 def stamp(run):
     """One line that tells this run from every other."""
     a = run.attributes
-    return f"bergtow {a.get('version', '')} (revision {a.get('revision', 'unknown')}), started {a.get('start_time', 'at an unknown time')}, state hash {run.summary.get('state_hash', 'unknown')}"
+    return (f"bergtow {a.get('version', '')} (revision {a.get('revision', 'unknown')}), "
+            f"started {a.get('start_time', 'at an unknown time')}, "
+            f"state hash {run.summary.get('state_hash', 'unknown')}")
 
 
 def key_values(run, values):

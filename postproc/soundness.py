@@ -110,5 +110,5 @@ def fault_of_member(folder, name, study):
     changed = [
         line.split(b":")[0].decode(errors="replace") for k, line in enumerate(want) if k >= len(have) or have[k] != line
     ]
-    return (f"{' and '.join(changed[:3])} changed since it finished"
-            if have[:1] == want[:1] and changed else "its record `finished` is damaged, or of an older version of the program")
+    return (f"{' and '.join(changed[:3])} changed since it finished" if have[:1] == want[:1] and changed else
+            "its record `finished` is damaged, or of an older version of the program")

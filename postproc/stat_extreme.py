@@ -5,8 +5,9 @@ intervals.
 A level z of return time T hours of tow is exceeded once in T hours on the average.
     empirical        rate(z) = number of peaks above z / hours
     block maxima     blocks of b hours, GEV G fitted to their largest peaks: z = G^-1(exp(-b/T))
-    over threshold   clusters of peaks above u come at the rate L a hour, and the excess of a cluster's largest peak is GPD of scale s and
-                     shape k: z = u + s ((L T)^k - 1)/k, L T > 1            [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
+    over threshold   clusters of peaks above u come at the rate L a hour, and the excess of a cluster's largest peak
+                     is GPD of scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
+[Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
 Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
 
 Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py).

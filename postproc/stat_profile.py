@@ -2,7 +2,8 @@
 """Intervals of a quantity by its profile likelihood, widened for values that depend on each other within a field.
 
 With l_p(q) the largest log-likelihood of all parameters that give the quantity q, the interval holds the q with
-    2 (l(q^) - l_p(q)) <= k c,      k the square of Student's t quantile of F - 1 degrees of freedom, c = max(1, g V_s g / g V_m g).
+    2 (l(q^) - l_p(q)) <= k c,      c = max(1, g V_s g / g V_m g),
+k the square of Student's t quantile of F - 1 degrees of freedom.
 g is the gradient of the quantity, V_m the inverse of the observed information, V_s = V_m J V_m with J the sum of the
 squared scores of the F fields: c is 1 where the values of a field are independent of each other and of the field, and
 larger where they are not [Chandler & Bate 2007, Biometrika 94]. Follows the skewness of return levels. Rejected:
