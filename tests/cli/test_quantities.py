@@ -6,11 +6,11 @@ The program of the second half is bergtow with tests/examples/quantity.c and est
 quantity stands in what is tested: the program's list (--list-quantities --json) is held against what it leaves, and the
 other way round.
 
-Red with (tried): columns of registered quantities not in the checkpoint; a running total lost there; the sums of a sample
-under way not restored; the sum over floes without the reduction over ranks; ghosts counted in it; a number of the machine
-not marked as one; a role not written; units of ensemble.h5 forgotten; plot_resistance leaving one estimate out; the ratio
-taken where an estimate is valid alone, in a run and in an ensemble; `knows` of an estimate not asked; a registered quantity
-that does not apply left at 0 (the guard stops the run).
+Red with (tried): columns of registered quantities not in the checkpoint; a running total lost there; the sums of a
+sample under way not restored; the sum over floes without the reduction over ranks; ghosts counted in it; a number of
+the machine not marked as one; a role not written; units of ensemble.h5 forgotten; plot_resistance leaving one
+estimate out; the ratio taken where an estimate is valid alone, in a run and in an ensemble; `knows` of an estimate
+not asked; a registered quantity that does not apply left at 0 (the guard stops the run).
 """
 import json
 import os

@@ -2,8 +2,8 @@
 // The registry of quantities: what it refuses, the keys it makes, and the reductions of a made-up run against sums of
 // the test's own. That every registered number is in every file: cli/test_quantities.py.
 //
-// Red with (tried): the reduction taken over all steps, or without the largest; a force of the balance not subtracted; a
-// key of the summary's own not refused.
+// Red with (tried): the reduction taken over all steps, or without the largest; a force of the balance not subtracted;
+// a key of the summary's own not refused.
 #include "made_up_run.h"
 
 #include "output/summary_keys.h"
@@ -44,10 +44,15 @@ static const bt_quantity five[] = {
     {.name = "a_last", SOUND, .keep = BT_KEEP_LAST},
     {.name = "a_mean", SOUND, .keep = BT_KEEP_MEAN, .role = BT_ROLE_FORCE},
     {.name = "a_most", SOUND, .keep = BT_KEEP_MAX, .role = BT_ROLE_DIAGNOSTIC},
-    {.name = "a_sum", .units = "N m/s", .description = "a number of the test", .keep = BT_KEEP_SUM, .of_floe = one_each},
+    {.name = "a_sum",
+     .units = "N m/s",
+     .description = "a number of the test",
+     .keep = BT_KEEP_SUM,
+     .of_floe = one_each},
     {.name = "a_pull", SOUND, .keep = BT_KEEP_MEAN, .role = BT_ROLE_BALANCE},
 };
-static const char *const keys[] = {"last_a_last_n", "mean_a_mean_n", "max_a_most_n", "sum_a_sum_n_m_s", "mean_a_pull_n"};
+static const char *const keys[] = {"last_a_last_n", "mean_a_mean_n", "max_a_most_n", "sum_a_sum_n_m_s",
+                                   "mean_a_pull_n"};
 enum { STEPS = 600 };
 
 static double number(const char *json, const char *key)
