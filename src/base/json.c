@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: MIT
 // JSON text (RFC 8259) built in memory: always valid, whatever the numbers and strings.
+//
+// Why not jansson, which reads JSON here (ensembles, maps): it writes 60 as 60.0 and 0.1 as 0.10000000000000001, each
+// number of a curve in a line of its own, refuses a string that is not UTF-8 (a title is whatever the case holds), and
+// has no number for NaN. What would be left of this file to work around that is no shorter than it.
 #include "base/json.h"
 
 #include <inttypes.h>

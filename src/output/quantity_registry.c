@@ -20,7 +20,7 @@ const char *const bt_applies_names[BT_APPLIES_KINDS] = {
     [BT_APPLIES_WINDOW] = "with a moving window",
 };
 
-enum { MOST_NAME = 40, MOST_KEY = 80 };
+enum { MOST_NAME = 48, MOST_KEY = 80 }; // of the 40 letters that a force law may have, _force makes 46
 static bt_quantity added[BT_MAX_ADDED];
 static char added_keys[BT_MAX_ADDED][MOST_KEY];
 static int n_added;

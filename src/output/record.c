@@ -18,6 +18,7 @@
 #include "base/fileio.h"
 #include "base/provenance.h"
 #include "output/record_parts.h"
+#include "output/summary_keys.h"
 #include "base/checksum.h"
 #include "output/xdmf.h"
 
@@ -142,7 +143,9 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     for (int k = 0; k < 4; k++) r->events[k] = -1;
 
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
-    bt_status status = bt_comm_agree(comm, comm->rank == 0 ? prepare_dir(r, resolved, fresh, err) : BT_OK);
+    bt_status status = comm->rank == 0 ? bt_summary_check_added(err) : BT_OK;
+    if (status == BT_OK && comm->rank == 0) status = prepare_dir(r, resolved, fresh, err);
+    status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = bt_h5_create_shared(&r->h5, comm, path, err);
     if (status == BT_OK) {
         bt_h5_attr_int(&r->h5, "/", "complete", 0);

@@ -427,6 +427,16 @@ char *bt_summary_json(const bt_summary *s, const bt_history *h, const bt_case *c
     return j.text;
 }
 
+bt_status bt_summary_check_added(bt_errors *err)
+{
+    const size_t before = err->n;
+    for (int k = 0; k < bt_n_added(); k++)
+        if (bt_json_keys_find(bt_summary_keys, bt_n_summary_keys, bt_added(k)->summary))
+            bt_errors_add(err, "quantity %s: its key %s is one of the summary's own; choose another name",
+                          bt_added(k)->name, bt_added(k)->summary);
+    return err->n > before ? BT_ERR_USAGE : BT_OK;
+}
+
 // --- what they mean --------------------------------------------------------------------------------------------------
 
 static bt_meaning meaning_of(const bt_json_key *k)
