@@ -94,7 +94,7 @@ def test_summary_is_json_with_every_promised_number(run):
         raise ValueError(f"{name} is not JSON")
 
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"), parse_constant=no_constant)
-    numbers = """""n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n
+    numbers = """n_floes n_steps dt_s sim_time_s wall_time_s ranks threads mean_ice_resistance_n
         mean_ice_resistance_se_n mean_tow_force_n max_overlap_m unconverged_steps mean_sweeps
         contacts_mean ns_per_floe_step momentum_residual concentration mean_drag_force_n
         mean_ice_resistance_budget_n contact_work_j positive_work_steps floes_outside
