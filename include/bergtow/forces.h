@@ -49,6 +49,7 @@
 #include <math.h>
 
 #include "bergtow/case.h"
+#include "bergtow/law_key.h"
 #include "bergtow/world.h"
 
 enum {
@@ -128,16 +129,6 @@ static inline bt_pose bt_force_pose(const bt_force_body *b)
     return p;
 }
 
-/// A key of a law's own: always a real number.
-typedef struct bt_force_key {
-    const char *name;          ///< after the name of the law: the key is NAME.name
-    /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m"; "" = a plain number
-    const char *unit;
-    /// "0 N", "[0, 1e9]" (least and most of a bare number): the law should do nothing by its presets
-    const char *preset, *range;
-    const char *doc;           ///< one sentence
-} bt_force_key;
-
 /// A force law. It has no state: what it does follows from its numbers, the time and the body.
 typedef struct bt_force_law {
     const char *name;          ///< lower_snake; its series is NAME_force
@@ -147,7 +138,7 @@ typedef struct bt_force_law {
     bool turns_only;           ///< it has a moment and no force: no series of its own
     bool towed_only;           ///< it acts on the towed body alone: add is not called for others
     /// [n_keys] own[k] is the value of the k-th; they are read, checked, listed and written as all others
-    const bt_force_key *keys;
+    const bt_law_key *keys;
     int n_keys;
     /// own[] from other keys of the case; own[0..n_keys) are there. NULL = that is all
     void (*setup)(const bt_case *c, double own[BT_MAX_FORCE_OWN]);

@@ -112,6 +112,9 @@ typedef struct bt_bodies {
     bt_gid n_global;
 } bt_bodies;
 
+/// Contact laws beside the program's own, and what one may have (contact.h).
+enum { BT_MAX_ADDED_LAWS = 3, BT_MAX_CONTACT_OWN = 8, BT_MAX_CONTACT_NUMBERS = 4 };
+
 /// Constants of the step.
 typedef struct bt_params {
     double dt;             ///< Δt, s
@@ -134,6 +137,7 @@ typedef struct bt_params {
     double raft_line;      ///< line load under which floes raft / thickness², Pa/m; 0 = they do not (raft.h)
     double raft_sheet;     ///< pressure between sheets on each other / thickness, Pa/m
     double raft_rise;      ///< potential energy of sheets on each other / (area × both thicknesses), Pa/m
+    double added_own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN]; ///< numbers of contact laws that were added (contact.h)
     // fluid and frame (see forces.h)
     double water_u, water_v, air_u, air_v; ///< of the step at hand (environment.h), m/s
     double coriolis;       ///< dU/dt = coriolis × (−Uy, Ux), rad/s: +f in the geographic frame, −f in the basin's
@@ -176,6 +180,7 @@ typedef struct bt_step_stats {
     double rafted_energy;    ///< potential energy of the sheets on each other, J
     double raft_edge_work;   ///< taken by edges at their bound, J
     double raft_friction_work; ///< taken by friction between sheets, J
+    double added[BT_MAX_ADDED_LAWS][1 + BT_MAX_CONTACT_NUMBERS]; ///< work (J) and numbers of laws that were added
     double momentum_residual;///< relative to the momentum exchanged in the step
     double kinetic_energy;   ///< at the end, J
     double detect_s, colour_s, forces_s, solve_s, advance_s, exchange_s; ///< wall time, s

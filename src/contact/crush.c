@@ -25,14 +25,7 @@ bool bt_crush_applies(const bt_world *w, bt_idx a, bt_idx b) { return thickness_
 
 // --- memory ----------------------------------------------------------------------------------------------------------
 
-bool bt_crush_keeps(const bt_world *w, bt_memory *r)
-{
-    const bt_idx a = bt_world_index(w, r->a), b = bt_world_index(w, r->b);
-    bt_manifold m;
-    double gap;
-    int32_t axis = -1;
-    return a >= 0 && b >= 0 && bt_contacts_parts(w, a, b, r->part, BT_CRUSH_MEMORY * w->par.size, -1, &m, &gap, &axis);
-}
+bool bt_crush_keeps(const bt_world *w, bt_memory *r) { return bt_law_near(w, r); }
 
 static double depth_of(const bt_memory *r) { return bt_max(r->value[0], r->n_points > 1 ? r->value[1] : 0); }
 

@@ -32,7 +32,7 @@
 // or from the clipped points of the manifold: a disc of 32 short edges bears on one of them then, however deep it is
 // in.
 //
-// Memory. A pair keeps its depths, by contact feature, while its gap is at most BT_CRUSH_MEMORY mean floe sizes; then
+// Memory. A pair keeps its depths, by contact feature, while its gap is at most BT_LAW_MEMORY mean floe sizes; then
 // they are forgotten, and the ice is sharp again (assumed). A point whose feature is new (the corner has slid on to the
 // next edge) has the overlap that is there, at most the pair's deepest crush, as its depth: sliding neither crushes nor
 // brings overlap back. So a depth is blunt ice of this pair alone: a third floe meets the outline as it was.
@@ -45,9 +45,6 @@
 #define BERGTOW_CRUSH_H
 
 #include "contact/law.h"
-
-#define BT_CRUSH_MEMORY                                                                                                \
-    0.1 // of the mean floe size, the gap beyond which a pair forgets; cells always reach that far (cells.h)
 
 // The crushing law's row in the table (contact/law.h). Its record: a depth for each contact feature, m.
 bool bt_crush_on(const bt_params *p);

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "contact/added.h"
 #include "contact/crush.h"
 #include "contact/raft.h"
 #include "partition/domain.h"
@@ -38,11 +39,19 @@ const bt_law bt_laws[BT_LAWS] = {
                         .count = bt_raft_count},
 };
 
-bool bt_law_on(const bt_params *p, int law) { return bt_laws[law].on && bt_laws[law].on(p); }
+bool bt_law_on(const bt_params *p, int law)
+{
+    return law < BT_LAWS ? bt_laws[law].on && bt_laws[law].on(p) : bt_added_on(p, law);
+}
+
+bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b)
+{
+    return law < BT_LAWS ? bt_laws[law].applies(w, a, b) : bt_added_applies(w, law, a, b);
+}
 
 bool bt_laws_on(const bt_params *p)
 {
-    for (int law = 0; law < BT_LAWS; law++)
+    for (int law = 0; law < BT_ALL_LAWS; law++)
         if (bt_law_on(p, law)) return true;
     return false;
 }
@@ -54,8 +63,10 @@ bool bt_laws_rise(const bt_params *p) { return bt_law_on(p, BT_LAW_CRUSHING); }
 void bt_laws_prune(const bt_world *w, bt_cell *t)
 {
     bt_idx kept = 0;
-    for (bt_idx k = 0; k < t->laws.n_memory; k++)
-        if (bt_laws[t->laws.memory[k].law].keeps(w, &t->laws.memory[k])) t->laws.memory[kept++] = t->laws.memory[k];
+    for (bt_idx k = 0; k < t->laws.n_memory; k++) {
+        bt_memory *r = &t->laws.memory[k];
+        if (r->law < BT_LAWS ? bt_laws[r->law].keeps(w, r) : bt_law_near(w, r)) t->laws.memory[kept++] = *r;
+    }
     t->laws.n_memory = kept;
 }
 
@@ -69,12 +80,22 @@ void bt_laws_reserve(bt_cell *t)
     t->laws.limits = bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.limits);
 }
 
+void bt_law_narrow(bt_limit *l, int i, double c, int law)
+{
+    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = law;
+    l->flat[i] = bt_min(l->flat[i], c);
+    l->most[i] = bt_min(l->most[i], c);
+}
+
 void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->laws.limits[j];
     *l = (bt_limit){
-        .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}, .trace = {-1, -1, -1}};
+        .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}};
+    for (int law = 0; law < BT_ALL_LAWS; law++) l->trace[law] = -1;
     // The last first: what has rafted is not measured from what was crushed before.
+    for (int law = BT_ALL_LAWS - 1; m->n_points > 0 && law >= BT_LAWS; law--)
+        if (bt_law_on(&w->par, law) && bt_added_applies(w, law, m->a, m->b)) bt_added_bound(w, law, t, j, p);
     for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {
         if (m->n_points == 0 && !bt_laws[law].contact) continue; // sheets are of one law alone
         if (bt_law_on(&w->par, law) && bt_laws[law].applies(w, m->a, m->b)) bt_laws[law].bound(w, t, j, p, m);
@@ -106,6 +127,16 @@ static void tell(bt_step_stats *st, const bt_totals *t, const double most[BT_LAW
     st->rafted_energy = bt_sum_value(&t->sum[BT_RAFTED_ENERGY]);
     st->crushed_depth = most[BT_LAW_CRUSHING];
     st->rafted_largest = most[BT_LAW_RAFTING];
+    bt_added_tell(st, t);
+}
+
+/// The law at whose bound point i is; the rigid one where it is at none.
+static int yields(const bt_contact *u, const bt_limit *l, int i)
+{
+    if (l->by[i] >= BT_LAWS && bt_added_gives_way(u, l, i, l->by[i])) return l->by[i];
+    int law = BT_LAWS - 1;
+    while (law > BT_LAW_RIGID && !bt_laws[law].gives_way(u, l, i)) law--;
+    return law;
 }
 
 static void grow_contact(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
@@ -116,11 +147,11 @@ static void grow_contact(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     for (int i = 0; i < u->n; i++) {
         const double approach = -(bt_normal_velocity(u, i, &v[u->a], &v[u->b]) + l->place[i]);
         if (!(approach > 0)) continue;
-        int law = BT_LAWS - 1;
-        while (law > BT_LAW_RIGID && !bt_laws[law].gives_way(u, l, i)) law--;
+        const int law = yields(u, l, i);
         if (law == BT_LAW_RIGID) continue;
         l->grown[i] = w->par.dt * approach;
-        bt_laws[law].give_way(w, t, j, i, totals);
+        if (law < BT_LAWS) bt_laws[law].give_way(w, t, j, i, totals);
+        else bt_added_give_way(w, law, t, j, i, totals);
     }
 }
 
@@ -134,6 +165,8 @@ static void grow_cell(bt_world *w, bt_idx k, const void *context, bt_totals *tot
         grow_contact(w, t, j, totals);
         for (int law = 0; law < BT_LAWS; law++)
             if (bt_law_on(&w->par, law)) most[law] = bt_max(most[law], bt_laws[law].remember(w, t, j, totals));
+        for (int law = BT_LAWS; law < BT_ALL_LAWS; law++)
+            if (bt_law_on(&w->par, law)) bt_added_remember(w, law, t, j, totals);
     }
     if (t->laws.n_memory > before)
         qsort(t->laws.memory, (size_t)t->laws.n_memory, sizeof *t->laws.memory, bt_memory_by_names);
@@ -149,13 +182,14 @@ static void count_records(const bt_world *w, double most[BT_LAWS], bt_totals *to
         for (bt_idx i = 0; ts->cell[k].own && i < ts->cell[k].laws.n_memory; i++) {
             const bt_memory *r = &ts->cell[k].laws.memory[i];
             if (r->law == BT_LAW_CRUSHING && ts->cell[k].n_contacts > 0) continue;
-            most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
+            if (r->law >= BT_LAWS) bt_added_count(w, r, totals);
+            else most[r->law] = bt_max(most[r->law], bt_laws[r->law].count(w, r, totals));
         }
 }
 
 void bt_laws_grow(bt_world *w)
 {
-    bt_totals t = {.n_sums = BT_LAW_SUMS};
+    bt_totals t = {.n_sums = BT_LAW_SUMS + bt_added_sums()};
     double most[BT_LAWS] = {0};
     if (bt_laws_on(&w->par)) {
         bt_phases_any_order(w, grow_cell, NULL, &t);

@@ -18,8 +18,10 @@
 // (contact/raft.h); the sweeps know bounds only; after them `gives_way` tells which points are at the bound and
 // approach, `give_way` books what that took, and `remember` writes the record.
 //
-// A new law is a row in bt_laws, its keys in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and
-// src/output/record_series.c, and a test in tests/physics. The sweep is not touched.
+// A law that bounds the load of points from what their pair remembers is one source file (bergtow/contact.h,
+// contact/added.h). One that changes what touches, or whose bound rises with the approach, is a row in bt_laws, its keys
+// in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and src/output/record_series.c, and a test in
+// tests/physics. The sweep is not touched by either.
 #ifndef BERGTOW_LAW_H
 #define BERGTOW_LAW_H
 
@@ -27,13 +29,15 @@
 #include "space/phases.h"
 #include "space/cells.h"
 
-enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS };
+/// The program's own; laws that a program adds (bergtow/contact.h) follow from BT_LAWS on.
+enum { BT_LAW_RIGID, BT_LAW_CRUSHING, BT_LAW_RAFTING, BT_LAWS, BT_ALL_LAWS = BT_LAWS + BT_MAX_ADDED_LAWS };
 
 /// What the laws book in a step: exact sums.
 enum {
     BT_CRUSHED_WORK, BT_CRUSHING_POINTS,
     BT_RAFT_EDGE_WORK, BT_RAFT_FRICTION_WORK, BT_RAFTING_PAIRS, BT_RAFTED_AREA, BT_RAFTED_ENERGY,
-    BT_LAW_SUMS
+    BT_LAW_SUMS, ///< from here on those of laws that were added: work and numbers of each
+    BT_ALL_SUMS = BT_LAW_SUMS + BT_MAX_ADDED_LAWS * (1 + BT_MAX_CONTACT_NUMBERS)
 };
 
 /// Bounds of the points of one contact, and what gives way; all INFINITY (and slope 0) where no law applies.
@@ -42,12 +46,16 @@ typedef struct bt_limit {
     double base[2];  ///< of the rising part; never above flat, N s
     double slope[2]; ///< of the rising part, kg
     double most[2];  ///< N s
-    double cap[2];   ///< what rafting allows; never below flat, N s
+    double cap[2];   ///< the least flat bound of rafting and of laws that were added; never below flat, N s
     double place[2]; ///< approach that closes the gap, and nothing gives way, m/s
     double depth[2]; ///< crushed so far, m (contact/crush.h)
     double grown[2]; ///< by how much the bodies go into each other in this step, m
-    int32_t trace[BT_LAWS]; ///< record of each law in the cell, −1 = none
+    int32_t by[2];   ///< the law that set cap
+    int32_t trace[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
 } bt_limit;
+
+/// Mean floe sizes by which two bodies may have parted and still remember each other; cells always reach that far.
+#define BT_LAW_MEMORY 0.1
 
 typedef struct bt_law {
     const char *name;  ///< one word
@@ -81,8 +89,16 @@ bool bt_laws_rise(const bt_params *p);
 
 /// Does any law bound contacts in this world?
 bool bt_laws_on(const bt_params *p);
-/// Does the law of this number bound contacts in this world?
+/// Does the law of this number bound contacts in this world? False where there is none of it.
 bool bt_law_on(const bt_params *p, int law);
+/// And those of this pair?
+bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
+
+/// A flat bound c of this law on point i, whatever bounds it now, N s.
+void bt_law_narrow(bt_limit *l, int i, double c, int law);
+
+/// Is the pair of a record still near: at most BT_LAW_MEMORY mean floe sizes apart?
+bool bt_law_near(const bt_world *w, const bt_memory *r);
 
 /// At the start of a detection: forget what cell t need not remember any more.
 void bt_laws_prune(const bt_world *w, bt_cell *t);

@@ -105,14 +105,6 @@ static void lengths_of(const bt_manifold *m, double slop, double length[2])
 
 // --- bounds ----------------------------------------------------------------------------------------------------------
 
-/// A bound c on point i, whatever bounds it now.
-static void narrow(bt_limit *l, int i, double c)
-{
-    l->cap[i] = c;
-    l->flat[i] = bt_min(l->flat[i], c);
-    l->most[i] = bt_min(l->most[i], c);
-}
-
 static void bound_sheets(const bt_world *w, bt_cell *t, bt_idx j, const bt_memory *r)
 {
     bt_contact *u = &t->contacts[j];
@@ -135,12 +127,16 @@ void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     double length[2];
     if (at >= 0) length[0] = length[1] = hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]); // L/2
     else lengths_of(m, w->par.slop, length);
-    for (int i = 0; i < m->n_points; i++) narrow(l, i, q0 * w->par.dt * bt_max(length[i], h / m->n_points));
+    for (int i = 0; i < m->n_points; i++)
+        bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length[i], h / m->n_points), BT_LAW_RAFTING);
 }
 
 // --- growth ----------------------------------------------------------------------------------------------------------
 
-bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i) { return u->ln[i] >= l->cap[i]; }
+bool bt_raft_gives_way(const bt_contact *u, const bt_limit *l, int i)
+{
+    return l->by[i] == BT_LAW_RAFTING && u->ln[i] >= l->cap[i];
+}
 
 void bt_raft_give_way(bt_world *w, bt_cell *t, bt_idx j, int i, bt_totals *totals)
 {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: MIT
 // The table of force laws, the series they make, and their numbers in a world.
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "case/schema.h"
+#include "case/law_keys.h"
 #include "force/laws.h"
 
 #define POINTER(name) &bt_law_##name,
@@ -44,44 +43,9 @@ static void find_series(void)
 
 // --- a law of a program ----------------------------------------------------------------------------------------------
 
-static bool is_name(const char *s)
-{
-    for (const char *p = s; *p; p++)
-        if (!islower((unsigned char)*p) && *p != '_' && !(p > s && isdigit((unsigned char)*p))) return false;
-    return *s && strlen(s) <= 40;
-}
-
-static int unit_of(const char *symbol)
-{
-    if (!symbol || !*symbol) return BT_UNIT_NONE;
-    for (int u = 0; u < BT_UNIT_KINDS; u++)
-        if (!strcmp(bt_units_symbol((bt_unit)u), symbol)) return u;
-    return -1;
-}
-
-/// Is every key of the law in the table of the case's keys?
 static bool add_keys(const bt_force_law *law, bt_errors *err)
 {
-    bool all = true;
-    for (int k = 0; k < law->n_keys; k++) {
-        const bt_force_key *own = &law->keys[k];
-        const int unit = unit_of(own->unit);
-        const size_t length = strlen(law->name) + strlen(own->name) + 2;
-        char *name = bt_alloc(length, 1); // kept by the table of keys
-        snprintf(name, length, "%s.%s", law->name, own->name);
-        if (unit < 0)
-            bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_force_key, or \"\"",
-                          name, own->unit);
-        const bt_key key = {.name = name,
-                            .unit = (bt_unit)bt_max(unit, 0),
-                            .preset = own->preset,
-                            .range = own->range,
-                            .doc = own->doc};
-        const bool added = unit >= 0 && bt_schema_add(&key, err) >= 0;
-        if (!added) free(name);
-        all = all && added;
-    }
-    return all;
+    return bt_law_keys_add(law->name, law->keys, law->n_keys, err);
 }
 
 /// Keys and series of the laws of the program, before main: whoever looks at the tables finds them complete.
@@ -98,7 +62,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!is_name(name))
+    if (!bt_law_is_name(name))
         bt_errors_add(err, "force law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     else if (bt_force_series_find(name) >= 0)
         bt_errors_add(err, "force law %s: there is a force of this name; choose another", name);
@@ -127,21 +91,11 @@ bt_forces *bt_forces_create(void)
 
 void bt_forces_free(bt_forces *f) { free(f); }
 
-/// Value of the key law.own of a case.
-static double value_of(const bt_case *c, const bt_force_law *law, const bt_force_key *own)
-{
-    char name[128];
-    snprintf(name, sizeof name, "%s.%s", law->name, own->name);
-    double x;
-    memcpy(&x, (const char *)c + bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)].offset, sizeof x);
-    return x;
-}
-
 void bt_forces_setup(bt_world *w, const bt_case *c)
 {
     for (int k = 0; k < w->forces->n; k++) {
         const bt_force_law *law = bt_force_laws[k];
-        for (int j = 0; j < law->n_keys; j++) w->forces->own[k][j] = value_of(c, law, &law->keys[j]);
+        bt_law_keys_values(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
         if (law->setup) law->setup(c, w->forces->own[k]);
     }
 }

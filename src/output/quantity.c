@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // All quantities: the program's own table (record_series.c), then what has been registered (quantity_registry.c), those
-// of force laws included: their table may grow, and is looked at before anybody counts.
+// of force laws and contact laws included: their tables may grow, and are looked at before anybody counts.
 #include "bergtow/quantity.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "output/contact_quantities.h"
 #include "output/force_quantities.h"
 #include "output/quantity_registry.h"
 #include "output/record.h"
@@ -20,6 +21,7 @@ const bt_quantity *bt_series(int k)
 int bt_n_added(void)
 {
     bt_force_quantities();
+    bt_contact_quantities();
     return bt_n_registered();
 }
 

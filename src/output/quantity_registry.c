@@ -4,6 +4,7 @@
 
 #include <ctype.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "output/record.h"
@@ -55,6 +56,16 @@ static void make_key(const bt_quantity *q, char key[MOST_KEY])
     key[n] = '\0';
 }
 
+/// A name without underscores; kept to the end of the program, as the texts of a quantity are.
+static char *in_words(const char *name)
+{
+    char *words = strdup(name);
+    if (!words) abort();
+    for (char *p = words; *p; p++)
+        if (*p == '_') *p = ' ';
+    return words;
+}
+
 bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
 {
     const size_t before = err->n;
@@ -79,7 +90,7 @@ bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
     *own = *q;
     make_key(q, added_keys[n_added]);
     own->summary = added_keys[n_added];
-    if (!own->label) own->label = own->name;
+    if (!own->label) own->label = in_words(own->name);
     own->offset = offsetof(bt_sample, added) + (size_t)n_added * sizeof(double);
     n_added++;
     return BT_OK;

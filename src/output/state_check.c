@@ -12,6 +12,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "bergtow/contact.h"
 #include "contact/law.h"
 #include "loads/impact.h"
 #include "bergtow/outline.h"
@@ -202,9 +203,9 @@ static void check_contacts(const bt_world *w, const bt_memory *trace, int64_t n,
                          "is no part of its body");
         bt_snapshot_want(s, t->n_points == 1 || t->n_points == 2, "contacts/points", k, "is neither 1 nor 2");
         bt_snapshot_want(s, all_finite(t->value, 4), "contacts/value", k, "is not finite");
-        bt_snapshot_want(s, t->law < BT_LAWS, "contacts/law", k, "is no contact law");
+        bt_snapshot_want(s, t->law < BT_LAWS + bt_n_contact_laws(), "contacts/law", k, "is no contact law");
         if (s->faulty) return;
-        const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_laws[t->law].applies(w, i, j));
+        const bool on = t->law == BT_LAW_RIGID || (bt_law_on(&w->par, t->law) && bt_law_applies(w, t->law, i, j));
         bt_snapshot_want(s, on, "contacts/law", k, "is a contact law that does not apply to the pair");
         bt_snapshot_want(s, k == 0 || bt_memory_by_names(t - 1, t) < 0, "contacts/a", k, "is out of order");
     }

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "output/estimate_text.h"
 #include "base/units.h"
@@ -54,8 +55,9 @@ static void print_added(const bt_summary *s, bool forces)
         const bt_quantity *q = bt_added(k);
         const bool force = q->role == BT_ROLE_BALANCE || q->role == BT_ROLE_FORCE || q->role == BT_ROLE_LOAD;
         if (force != forces || isnan(s->added[k])) continue;
-        printf(force ? "    %-17s %.4g %s (%s)\n" : "  %-19s %.4g %s (%s)\n", q->label, s->added[k], q->units,
-               bt_keep_names[q->keep]);
+        const bool plain = !strcmp(q->units, "1");
+        printf(force ? "    %-17s %.4g%s%s (%s)\n" : "  %-19s %.4g%s%s (%s)\n", q->label, s->added[k],
+               plain ? "" : " ", plain ? "" : q->units, bt_keep_names[q->keep]);
     }
 }
 

@@ -14,6 +14,7 @@
 #include "loads/impact.h"
 #include "tow/tow.h"
 #include "step/window.h"
+#include "contact/added.h"
 #include "case/case_check.h"
 #include "run/setup_tow.h"
 
@@ -69,6 +70,7 @@ bt_params bt_setup_params(const bt_case *c, double size)
         p.tilt_ax = -GRAVITY * c->water.slope_x;
         p.tilt_ay = -GRAVITY * c->water.slope_y;
     }
+    bt_added_setup(c, p.added_own);
     return p;
 }
 

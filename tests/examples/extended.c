@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The program with the quantities and the estimate of the examples: what a user of the library has, as a test of what
-// reads them (tests/cli/test_quantities.py). The same main, and nothing else added.
+// The program with the quantities, the estimate and the contact law of the examples: what a user of the library has, as
+// a test of what reads them (tests/cli/test_quantities.py, test_contact_law.py). The same main, and nothing else added.
+#include "examples/contact_law.c"
 #include "examples/estimate.c"
 #include "examples/quantity.c"
 
@@ -9,6 +10,7 @@ __attribute__((constructor)) static void register_examples(void)
     bt_errors err = {0};
     for (int k = 0; k < N_EXAMPLE_QUANTITIES; k++) bt_quantity_register(&example_quantities[k], &err);
     bt_estimate_register(&strip_energy_estimate, &err);
+    bt_contact_register(&fender_law, &err);
     bt_errors_print(&err);
     bt_errors_free(&err);
 }

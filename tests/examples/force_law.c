@@ -8,7 +8,7 @@
 
 enum { AMPLITUDE, PERIOD, DIRECTION, LOAD, PER_SPEED }; // own[]: the keys in their order, and what setup adds
 
-static const bt_force_key wave_drift_keys[] = {
+static const bt_law_key wave_drift_keys[] = {
     {"amplitude", "m", "0 m", "[0, 20]", "amplitude of the waves, 0 = none"},
     {"period", "s", "8 s", "(0, 100]", "period of the waves, assumed"},
     {"direction", "rad", "0 deg", "[-360, 360]", "direction into which the waves run, from the x axis towards y"},

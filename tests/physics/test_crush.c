@@ -241,7 +241,7 @@ static void memory(void **state)
 
     const double away[] = {0.5, 0.95, 1.1}; // of the memory, from the face
     for (int i = 0; i < 3; i++) {
-        const double out = away[i] * BT_CRUSH_MEMORY, start = pose(w, 0)->x;
+        const double out = away[i] * BT_LAW_MEMORY, start = pose(w, 0)->x;
         vel(w, 0)->x = -0.5;
         w->bodies.disturbed[bt_world_index(w, 0)] = 1;
         w->cells->asleep[0] = BT_AWAKE;
@@ -286,7 +286,7 @@ static void rebound_below_the_limit(void **state)
     }
     assert_true(before < -1e-3 && depth > 0.01);
     assert_true(w->cells->cell[0].laws.n_memory == 1);
-    for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_CRUSH_MEMORY; s++) bt_world_step(w);
+    for (int s = 0; s < 20000 && pose(w, 0)->x > -1.1 * BT_LAW_MEMORY; s++) bt_world_step(w);
     assert_true(w->cells->cell[0].laws.n_memory == 0); // parted, forgotten
     bt_world_free(w);
 }

@@ -33,7 +33,7 @@ static void spring(const bt_force_body *b, bt_load *l)
     l->moment -= b->own[1] * p.yaw;
 }
 
-static const bt_force_key spring_keys[] = {
+static const bt_law_key spring_keys[] = {
     {"stiffness", "N/m", "0 N/m", "[0, 1e9]", "pull for each metre from the origin"},
     {"turning", "", "0", "[0, 1e12]", "moment for each radian of yaw, N m"},
 };
@@ -73,7 +73,7 @@ static double width_of(const bt_world *w, bt_idx i) { return 2 * w->bodies.radiu
 static void what_will_not_do_is_refused(void **state)
 {
     (void)state;
-    static const bt_force_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}},
+    static const bt_law_key bad_contact[] = {{"strength", "furlong", "0", "[0, 1]", "a strength of something"}},
                               no_range[] = {{"strength", "N", "0 N", NULL, "a strength of something"}},
                               beyond[] = {{"strength", "N", "2 N", "[0, 1]", "a strength of something"}};
     const struct { bt_force_law law; const char *says;

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: MIT
+// Keys of laws; see law_keys.h.
+#include "case/law_keys.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "case/schema.h"
+
+bool bt_law_is_name(const char *s)
+{
+    for (const char *p = s; *p; p++)
+        if (!islower((unsigned char)*p) && *p != '_' && !(p > s && isdigit((unsigned char)*p))) return false;
+    return *s && strlen(s) <= 40;
+}
+
+static int unit_of(const char *symbol)
+{
+    if (!symbol || !*symbol) return BT_UNIT_NONE;
+    for (int u = 0; u < BT_UNIT_KINDS; u++)
+        if (!strcmp(bt_units_symbol((bt_unit)u), symbol)) return u;
+    return -1;
+}
+
+bool bt_law_keys_add(const char *law, const bt_law_key *keys, int n, bt_errors *err)
+{
+    bool all = true;
+    for (int k = 0; k < n; k++) {
+        const bt_law_key *own = &keys[k];
+        const int unit = unit_of(own->unit);
+        const size_t length = strlen(law) + strlen(own->name) + 2;
+        char *name = bt_alloc(length, 1); // kept by the table of keys
+        snprintf(name, length, "%s.%s", law, own->name);
+        if (unit < 0)
+            bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_law_key, or \"\"",
+                          name, own->unit);
+        const bt_key key = {.name = name,
+                            .unit = (bt_unit)bt_max(unit, 0),
+                            .preset = own->preset,
+                            .range = own->range,
+                            .doc = own->doc};
+        const bool added = unit >= 0 && bt_schema_add(&key, err) >= 0;
+        if (!added) free(name);
+        all = all && added;
+    }
+    return all;
+}
+
+void bt_law_keys_values(const bt_case *c, const char *law, const bt_law_key *keys, int n, double *own)
+{
+    for (int k = 0; k < n; k++) {
+        char name[128];
+        snprintf(name, sizeof name, "%s.%s", law, keys[k].name);
+        const bt_key *key = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
+        memcpy(&own[k], (const char *)c + key->offset, sizeof own[k]);
+    }
+}

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Laws that a program has added (bergtow/contact.h), as the table of contact laws calls them (contact/law.h). Their
+// numbers are BT_LAWS, BT_LAWS + 1, ... in the order of their registration.
+//
+// They have no rows in bt_laws: a row's functions know the law by themselves, and one set of functions here serves all
+// that are added. Their bounds are flat and known before the sweeps, so that batches of four take them.
+#ifndef BERGTOW_ADDED_H
+#define BERGTOW_ADDED_H
+
+#include "bergtow/contact.h"
+#include "contact/law.h"
+
+/// False where there is no law of this number.
+bool bt_added_on(const bt_params *p, int law);
+bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
+
+/// Bounds of contact j of cell t; overlap that the law gives is no gap.
+void bt_added_bound(const bt_world *w, int law, bt_cell *t, bt_idx j, const bt_pair *p);
+
+/// Is point i at the bound of this law?
+static inline bool bt_added_gives_way(const bt_contact *u, const bt_limit *l, int i, int law)
+{
+    return l->by[i] == law && u->ln[i] >= l->cap[i];
+}
+
+/// Point i is at the law's bound and approaches: its work.
+void bt_added_give_way(const bt_world *w, int law, const bt_cell *t, bt_idx j, int i, bt_totals *totals);
+
+/// After the solve: what the pair of contact j remembers.
+void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_totals *totals);
+
+/// A record into the numbers that are a state.
+void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
+
+/// How many sums they have, from BT_LAW_SUMS on.
+int bt_added_sums(void);
+
+/// Their sums into the numbers of the step.
+void bt_added_tell(bt_step_stats *st, const bt_totals *t);
+
+/// Their numbers from a case.
+void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN]);
+
+#endif

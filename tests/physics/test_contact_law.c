@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+// A contact law from outside the program: the fender of docs/how-to-add-a-contact-law.md, against closed forms, and what
+// the table refuses. What runs of it leave is in tests/cli/test_contact_law.py.
+//
+// Red with (tried): the given depth left out of the gap; the bound without Δt; growth booked whichever law is at its
+// bound; the record not written; applies not asked; the work of the points not booked.
+#include "scene.h"
+
+#include "bergtow/contact.h"
+#include "contact/law.h"
+
+#include "examples/contact_law.c"
+
+static const double sheet = 50, soft = 30, stiff = 400; // kg/m², N, N/m
+
+/// The hull: a slab from x = 0.71 on that stands still, and is what is towed.
+static bt_world *hull_and_floe(double dt, double turn, double speed, double slope)
+{
+    bt_params p = scene_params(dt, 1);
+    p.tilt_ax = slope;
+    p.added_own[0][LOAD] = soft, p.added_own[0][STIFFNESS] = stiff;
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, sheet);
+    d.yaw = turn, d.vx = speed, d.x = turn ? 0 : 0.2, d.thickness = 0.1;
+    bt_world_add(w, &d);
+    w->towed = scene_wall(w, 0.71, -5, 4, 5, 0);
+    return w;
+}
+
+static double pressed(const bt_world *w) { return w->stats.added[0][2]; }
+
+/// A floe that comes with its corner first is stopped at F0 d + ½ k d² = ½ m v², and what it lost is the fender's work.
+static void it_takes_the_energy_of_a_floe(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 3; i++) {
+        const double speed = (double[]){0.2, 0.5, 1}[i], energy = 0.5 * sheet * speed * speed;
+        bt_world *w = hull_and_floe(5e-4, BT_PI / 4, speed, 0);
+        double work = 0, points = 0;
+        for (int s = 0; s < 3000; s++) {
+            bt_world_step(w);
+            work += w->stats.added[0][0], points += w->stats.added[0][1];
+            assert_true(w->stats.converged);
+        }
+        const double depth = (sqrt(soft * soft + 2 * stiff * energy) - soft) / stiff;
+        CHECK_CLOSE(pressed(w), depth, 0.01 * depth);
+        CHECK_CLOSE(work, energy, 1e-5 * energy); // the step that stops it is not at the bound
+        CHECK_CLOSE(w->bodies.pose[0].x + sqrt(0.5) - 0.71, depth, 0.01 * depth); // there it stays
+        CHECK_CLOSE(w->bodies.vel[0].x, 0, 1e-12);
+        assert_true(points > 10);
+        bt_world_free(w);
+    }
+}
+
+/// Edge on, two points bear: a steady force presses the fender until 2 (F0 + k d) is the force, and no deeper.
+static void it_creeps_until_it_bears(void **state)
+{
+    (void)state;
+    const double force[] = {0.9 * 2 * soft, 1.5 * 2 * soft, 3 * 2 * soft};
+    for (int i = 0; i < 3; i++) {
+        bt_world *w = hull_and_floe(2e-3, 0, 0, force[i] / sheet);
+        w->bodies.pose[0].x = 0.21; // touching
+        for (int s = 0; s < 12000; s++) {
+            w->bodies.vel[0].x *= 0.9; // slow, so that nothing overshoots
+            bt_world_step(w);
+        }
+        const double depth = bt_max(0, (0.5 * force[i] - soft) / stiff);
+        CHECK_CLOSE(pressed(w), depth, 0.005 * depth + 1e-9);
+        bt_world_free(w);
+    }
+}
+
+/// What is not towed has no fender: a wall stops the same floe at its surface.
+static void it_is_the_hull_s_alone(void **state)
+{
+    (void)state;
+    bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
+    w->towed = -1;
+    for (int s = 0; s < 300; s++) bt_world_step(w);
+    assert_true(pressed(w) == 0 && w->stats.added[0][0] == 0);
+    CHECK_CLOSE(w->bodies.pose[0].x + sqrt(0.5), 0.71, 2e-3);
+    bt_world_free(w);
+}
+
+/// Of two laws the weaker yields: ice that crushes under less than the fender leaves the fender whole.
+static void the_weaker_law_yields(void **state)
+{
+    (void)state;
+    for (int i = 0; i < 2; i++) {
+        bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
+        w->par.crush_pressure = i ? 5e6 : 300, w->par.crush_least = 0.01;
+        double crushed = 0;
+        for (int s = 0; s < 1000; s++) {
+            bt_world_step(w);
+            crushed += w->stats.crushed_work;
+        }
+        const double energy = 0.5 * sheet * 0.25;
+        assert_true(i ? pressed(w) > 0.1 && crushed < 0.05 * energy : pressed(w) == 0 && crushed > 0.2 * energy);
+        bt_world_free(w);
+    }
+}
+
+static void what_will_not_do_is_refused(void **state)
+{
+    (void)state;
+    static const bt_law_key furlong[] = {{"load", "furlong", "0", "[0, 1]", "a load of something"}};
+    static const bt_contact_number lonely[] = {{"bits", "1", "something that nothing counts", true}};
+    const struct { bt_contact_law law; const char *says;
+    } bad[] = {
+        {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "a law of this name"},
+        {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "a law of this name"},
+        {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
+        {{.name = "idle", .doc = "a law without functions"}, "`on` and `bound`"},
+        {{.name = "mute", .on = fender_on, .bound = fender_bound}, "say in a line"},
+        {{.name = "odd", .doc = "a law with a bad unit", .on = fender_on, .bound = fender_bound, .keys = furlong,
+          .n_keys = 1}, "unit furlong"},
+        {{.name = "sad", .doc = "a law with an idle number", .on = fender_on, .bound = fender_bound,
+          .numbers = lonely, .n_numbers = 1}, "nothing adds to its number bits"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        bt_errors err = {0};
+        assert_int_equal(bt_contact_register(&bad[k].law, &err), BT_ERR_USAGE);
+        if (err.n == 0 || !strstr(err.text[0], bad[k].says))
+            fail_msg("%s: %s", bad[k].says, err.n ? err.text[0] : "nothing said");
+        bt_errors_free(&err);
+    }
+    assert_int_equal(bt_n_contact_laws(), 1);
+}
+
+int main(void)
+{
+    bt_errors err = {0};
+    if (bt_contact_register(&fender_law, &err) != BT_OK) bt_errors_print(&err);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(it_takes_the_energy_of_a_floe), cmocka_unit_test(it_creeps_until_it_bears),
+        cmocka_unit_test(it_is_the_hull_s_alone),        cmocka_unit_test(the_weaker_law_yields),
+        cmocka_unit_test(what_will_not_do_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
