@@ -27,7 +27,7 @@ typedef enum {
     BT_BODY_RECTANGLE,
     BT_BODY_SHIP,
     BT_BODY_POLYGON,
-    BT_BODY_ABSENT
+    BT_BODY_ABSENT ///< shapes that a program adds (bergtow/shape.h) follow
 } bt_body_shape;
 typedef enum { BT_TOW_NONE, BT_TOW_SPEED, BT_TOW_LINE, BT_TOW_THRUST } bt_tow_mode; // none, speed, line, thrust
 // numbers, steel-wire, polypropylene, dyneema

@@ -6,11 +6,11 @@
 // that stays, the law says as `given`: overlap which is no overlap, because what stood there has yielded. Where several
 // laws apply the least bound holds, and the law that sets it gives way.
 //
-// Detection, sweeps, ranks, checkpoints, hash of the state, series, summary, ensembles, pictures and report need no line
-// of the law: the numbers that a pair remembers go with it, and NAME_work, what its points have taken at their bound (J),
-// is a quantity (bergtow/quantity.h), as are the numbers that the law adds. The laws of the program itself, crushing and
-// rafting, also change what touches and bound points by their approach; they stand in src/contact. How to add one:
-// docs/how-to-add-a-contact-law.md.
+// Detection, sweeps, ranks, checkpoints, hash of the state, series, summary, ensembles, pictures and report need no
+// line of the law: the numbers that a pair remembers go with it, and NAME_work, what its points have taken at their
+// bound (J), is a quantity (bergtow/quantity.h), as are the numbers that the law adds. The laws of the program itself,
+// crushing and rafting, also change what touches and bound points by their approach; they stand in src/contact. How to
+// add one: docs/how-to-add-a-contact-law.md.
 #ifndef BERGTOW_CONTACT_H
 #define BERGTOW_CONTACT_H
 
@@ -65,8 +65,8 @@ typedef struct bt_contact_law {
 } bt_contact_law;
 
 /// Add a law to the table, for a program that uses the library: before it reads a case or makes a world, from one
-/// thread, on all ranks alike and in the same order in every program that resumes its runs. The law and its texts remain
-/// the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with reason and remedy.
+/// thread, on all ranks alike and in the same order in every program that resumes its runs. The law and its texts
+/// remain the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with the reason.
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err);
 
 /// Those added, in their order.

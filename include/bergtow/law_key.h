@@ -1,16 +1,29 @@
 // SPDX-License-Identifier: MIT
-// Keys of a case that belong to a law: of a force (bergtow/forces.h) or of contact (bergtow/contact.h).
+// Keys of a case that a program adds: those of a law (bergtow/forces.h, bergtow/contact.h), or of its own.
+// How to add one, also to bergtow itself: docs/how-to-add-a-key.md.
 #ifndef BERGTOW_LAW_KEY_H
 #define BERGTOW_LAW_KEY_H
 
-/// A key of a law's own: always a real number.
+#include <stdbool.h>
+
+#include "bergtow/case.h"
+
+/// An added key: always a real number.
 typedef struct bt_law_key {
-    const char *name;          ///< after the name of the law: the key is NAME.name
+    const char *name;          ///< after the name of the law or section: the key is NAME.name
     /// SI symbol: "m", "m/s", "s", "rad", "rad/s", "N", "kg", "kg/m3", "N s/m", "Pa", "N/m"; "" = a plain number
     const char *unit;
     /// "0 N", "[0, 1e9]" (least and most of a bare number): the law should do nothing by its presets
     const char *preset, *range;
     const char *doc;           ///< one sentence
 } bt_law_key;
+
+/// Add keys SECTION.name, before any case is read and from one thread; laws do so by their own registration. They are
+/// read, checked, listed by --list-keys, written to the resolved case and scaled as all others. False where some were
+/// refused: reason and remedy in err. The texts must stay where they are.
+bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err);
+
+/// own[k]: value of the k-th in SI units.
+void bt_keys_values(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own);
 
 #endif

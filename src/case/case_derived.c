@@ -6,16 +6,15 @@
 #include <string.h>
 
 #include "base/table.h"
+#include "case/body_shapes.h"
 #include "bergtow/shape.h"
-
-static const char *const shape_names[] = {BT_SHAPE_NAMES};
 
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                     const char **why)
 {
     if (shape == BT_BODY_ABSENT) return 0;
     if (shape != BT_BODY_POLYGON)
-        n = bt_shape_named(shape_names[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
+        n = bt_body_shape_named(shape, length, width, v);
     else if (n < 3 || n > BT_MAX_VERTICES) n = 0;
     else memcpy(v, vertices, (size_t)n * 2 * sizeof *v);
     const char *reason = bt_shape_fault(n, v);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Keys of laws; see law_keys.h.
+// Keys that a program adds; see bergtow/law_key.h.
 #include "case/law_keys.h"
 
 #include <ctype.h>
@@ -24,15 +24,15 @@ static int unit_of(const char *symbol)
     return -1;
 }
 
-bool bt_law_keys_add(const char *law, const bt_law_key *keys, int n, bt_errors *err)
+bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err)
 {
     bool all = true;
     for (int k = 0; k < n; k++) {
         const bt_law_key *own = &keys[k];
         const int unit = unit_of(own->unit);
-        const size_t length = strlen(law) + strlen(own->name) + 2;
+        const size_t length = strlen(section) + strlen(own->name) + 2;
         char *name = bt_alloc(length, 1); // kept by the table of keys
-        snprintf(name, length, "%s.%s", law, own->name);
+        snprintf(name, length, "%s.%s", section, own->name);
         if (unit < 0)
             bt_errors_add(err, "%s: unit %s is none of those of a case; take an SI symbol of bt_law_key, or \"\"",
                           name, own->unit);
@@ -48,11 +48,11 @@ bool bt_law_keys_add(const char *law, const bt_law_key *keys, int n, bt_errors *
     return all;
 }
 
-void bt_law_keys_values(const bt_case *c, const char *law, const bt_law_key *keys, int n, double *own)
+void bt_keys_values(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own)
 {
     for (int k = 0; k < n; k++) {
         char name[128];
-        snprintf(name, sizeof name, "%s.%s", law, keys[k].name);
+        snprintf(name, sizeof name, "%s.%s", section, keys[k].name);
         const bt_key *key = &bt_case_keys[bt_schema_find(bt_case_keys, bt_n_case_keys, name)];
         memcpy(&own[k], (const char *)c + key->offset, sizeof own[k]);
     }

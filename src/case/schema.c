@@ -17,6 +17,7 @@
 
 #include "base/largest.h"
 #include "base/suggest.h"
+#include "case/body_shapes.h"
 #include "case/value.h"
 
 #include <math.h>
@@ -32,7 +33,6 @@ static const char *const crss[] = {"file", "lonlat", "plane", "frame", "metres",
 static const char *const nonconvexes[] = {"refuse", "hull", "split", NULL};
 static const char *const starts[] = {"drift", "rest", NULL};
 static const char *const thickness_laws[] = {"constant", "lognormal", NULL};
-static const char *const body_shapes[] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
 static const char *const floe_shapes[] = {BT_SHAPE_NAMES, "polygon", NULL};
 static const char *const tow_modes[] = {"none", "speed", "line", "thrust", NULL};
 static const char *const rope_types[] = {"numbers", "steel-wire", "polypropylene", "dyneema", NULL};
@@ -176,7 +176,7 @@ bt_key bt_case_keys[] = {
            "outlines of a file that are not convex by more than a thousandth of their extent: refused, replaced by "
            "their hull (the area grows), or split into convex parts that move as one floe"),
 
-    CHOICE("body.shape", body.shape, body_shapes, "disc", "waterline of the towed body; none: no body"),
+    CHOICE("body.shape", body.shape, bt_body_shapes, "disc", "waterline of the towed body; none: no body"),
     REAL("body.length", body.length, LENGTH, "2 m", "(0, 1e5]",
          "length of a named shape along its own x; no default in the geographic frame; assumed"),
     REAL("body.width", body.width, LENGTH, "= body.length", "(0, 1e5]", "width of a named shape"),

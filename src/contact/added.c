@@ -43,7 +43,8 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
     if (!bt_law_is_name(name))
-        bt_errors_add(err, "contact law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
+        bt_errors_add(err, "contact law \"%s\": the name must be of lower-case letters, digits and _, at most 40",
+                      name);
     else if (is_known(name))
         bt_errors_add(err, "contact law %s: there is a law of this name; choose another", name);
     if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
@@ -53,7 +54,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
     check_numbers(law, name, err);
     if (n_added == BT_MAX_ADDED_LAWS)
         bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name, n_added);
-    if (err->n > before || !bt_law_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
+    if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
     added[n_added++] = law;
     return BT_OK;
 }
@@ -61,7 +62,7 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
 void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN])
 {
     for (int k = 0; k < n_added; k++) {
-        bt_law_keys_values(c, added[k]->name, added[k]->keys, added[k]->n_keys, own[k]);
+        bt_keys_values(c, added[k]->name, added[k]->keys, added[k]->n_keys, own[k]);
         if (added[k]->setup) added[k]->setup(c, own[k]);
     }
 }

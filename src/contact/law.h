@@ -19,7 +19,7 @@
 // approach, `give_way` books what that took, and `remember` writes the record.
 //
 // A law that bounds the load of points from what their pair remembers is one source file (bergtow/contact.h,
-// contact/added.h). One that changes what touches, or whose bound rises with the approach, is a row in bt_laws, its keys
+// contact/added.h). One that changes what touches, or whose bound rises with the approach, is a row in bt_laws, keys
 // in src/case/schema.c and bt_setup_params, its numbers in bt_step_stats and src/output/record_series.c, and a test in
 // tests/physics. The sweep is not touched by either.
 #ifndef BERGTOW_LAW_H

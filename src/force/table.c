@@ -45,7 +45,7 @@ static void find_series(void)
 
 static bool add_keys(const bt_force_law *law, bt_errors *err)
 {
-    return bt_law_keys_add(law->name, law->keys, law->n_keys, err);
+    return bt_keys_add(law->name, law->keys, law->n_keys, err);
 }
 
 /// Keys and series of the laws of the program, before main: whoever looks at the tables finds them complete.
@@ -95,7 +95,7 @@ void bt_forces_setup(bt_world *w, const bt_case *c)
 {
     for (int k = 0; k < w->forces->n; k++) {
         const bt_force_law *law = bt_force_laws[k];
-        bt_law_keys_values(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
+        bt_keys_values(c, law->name, law->keys, law->n_keys, w->forces->own[k]);
         if (law->setup) law->setup(c, w->forces->own[k]);
     }
 }

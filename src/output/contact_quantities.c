@@ -8,7 +8,10 @@
 #include "bergtow/contact.h"
 #include "bergtow/quantity.h"
 
-static double number(const bt_world *w, const void *place) { return ((const double *)w->stats.added)[*(const int *)place]; }
+static double number(const bt_world *w, const void *place)
+{
+    return ((const double *)w->stats.added)[*(const int *)place];
+}
 
 /// Its texts stay for the life of the program, as the law does.
 static void add_quantity(const bt_quantity *like, int law, int k)

@@ -28,14 +28,15 @@ WINDOW = {
     "run": {"dt": 0.1, "duration": 8},
     "domain": {"frame": "geographic", "length": 24, "width": 18, "ends": "moving", "sides": "periodic", "ahead": 14},
     "ice": {"concentration": 0.6, "size": 1.2, "thickness": 0.04, "rafting": {"kappa": 10}},
-    "body": {"length": 2, "draft": 0.5}, "tow": {"speed": 1.6, "ramp": 1}, "fender": {"load": "2 N", "stiffness": "5 N/m"}
+    "body": {"length": 2, "draft": 0.5}, "tow": {"speed": 1.6, "ramp": 1},
+    "fender": {"load": "2 N", "stiffness": "5 N/m"}
 }
 
 
 def started(*arguments, ranks=1, threads=1, cwd=None, code=DONE):
     line = [*(["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []), EXTENDED, *map(str, arguments)]
-    done = subprocess.run(line, cwd=cwd, env=environment(OMP_NUM_THREADS=threads, **MPI), capture_output=True, text=True,
-                          timeout=200)
+    done = subprocess.run(line, cwd=cwd, env=environment(OMP_NUM_THREADS=threads, **MPI), capture_output=True,
+                          text=True, timeout=200)
     assert done.returncode == code, done.stderr
     return done
 

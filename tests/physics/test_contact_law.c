@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A contact law from outside the program: the fender of docs/how-to-add-a-contact-law.md, against closed forms, and what
-// the table refuses. What runs of it leave is in tests/cli/test_contact_law.py.
+// A contact law from outside the program: the fender of docs/how-to-add-a-contact-law.md, against closed forms, and
+// what the table refuses. What runs of it leave is in tests/cli/test_contact_law.py.
 //
 // Red with (tried): the given depth left out of the gap; the bound without Δt; growth booked whichever law is at its
 // bound; the record not written; applies not asked; the work of the points not booked.
@@ -109,8 +109,8 @@ static void what_will_not_do_is_refused(void **state)
     static const bt_contact_number lonely[] = {{"bits", "1", "something that nothing counts", true}};
     const struct { bt_contact_law law; const char *says;
     } bad[] = {
-        {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "a law of this name"},
-        {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "a law of this name"},
+        {{.name = "rafting", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
+        {{.name = "fender", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "law of this name"},
         {{.name = "Big", .doc = "a law of that name", .on = fender_on, .bound = fender_bound}, "lower-case letters"},
         {{.name = "idle", .doc = "a law without functions"}, "`on` and `bound`"},
         {{.name = "mute", .on = fender_on, .bound = fender_bound}, "say in a line"},

@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// A body shape and keys from outside the program: those of docs/how-to-add-a-body-shape.md and how-to-add-a-key.md.
+//
+// Red with (tried): the added shape taken for "none"; its name not in the list of body.shape; values read at the place
+// of the key before; the unit of an added key ignored.
+#include "scene.h"
+
+#include <stdio.h>
+#include <unistd.h>
+
+#include "bergtow/case.h"
+#include "case/law_keys.h"
+
+#include "examples/body_shape.c"
+#include "examples/key.c"
+
+static bt_status read_text(bt_case *c, const char *text, bt_errors *err)
+{
+    char path[] = "/tmp/bergtow-added-XXXXXX";
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    FILE *f = fdopen(fd, "w");
+    fprintf(f, "run: {dt: 0.1, duration: 1}\ndomain: {length: 40, width: 20}\nice: {concentration: 0}\n"
+               "tow: {speed: 0.1}\n%s", text);
+    assert_int_equal(fclose(f), 0);
+    const bt_status status = bt_case_read(c, path, NULL, 0, err);
+    unlink(path);
+    return status;
+}
+
+static void a_shape_is_a_waterline(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_errors err = {0};
+    if (read_text(&c, "body: {shape: capsule, length: 6, width: 2, x: 10, yaw: 30 deg}\n", &err) != BT_OK)
+        fail_msg("%s", err.text[0]);
+    double v[2 * BT_MAX_VERTICES];
+    const int n = bt_case_waterline(&c, v);
+    assert_int_equal(n, 26);
+    const bt_moments m = bt_shape_moments(n, v);
+    // a polygon of 12 sides an end: (n/2π) sin(2π/n) of the circle's area with n = 24
+    CHECK_CLOSE(m.area, 4 * 2 + 12 * sin(BT_PI / 12), 1e-12);
+    CHECK_CLOSE(m.cx, 0, 1e-12);
+    CHECK_CLOSE(bt_shape_width(n, v, 1, 0), 2, 1e-12);
+    CHECK_CLOSE(bt_shape_width(n, v, 0, 1), 6, 1e-12);
+    char *text = bt_case_resolved(&c);
+    assert_non_null(strstr(text, "shape: capsule"));
+    free(text);
+    bt_case_free(&c);
+}
+
+static void unknown_shapes_are_told_of_it(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_errors err = {0};
+    assert_int_equal(read_text(&c, "body: {shape: capsul, length: 6}\n", &err), BT_ERR_CASE);
+    assert_non_null(strstr(err.text[0], "capsule"));
+    bt_errors_free(&err);
+}
+
+static int line(double l, double w, double *v)
+{
+    (void)w;
+    v[0] = 0, v[1] = 0, v[2] = l, v[3] = 0;
+    return 2;
+}
+
+static void what_will_not_do_is_refused(void **state)
+{
+    (void)state;
+    const struct { const char *name; bt_shape_outline *outline; const char *says; } bad[] = {
+        {"ship", capsule, "a shape of this name"}, {"capsule", capsule, "a shape of this name"},
+        {"none", capsule, "a shape of this name"}, {"Big barge", capsule, "lower-case letters"},
+        {"barge", NULL, "no function"},            {"stick", line, "it is no outline"},
+    };
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        bt_errors err = {0};
+        assert_int_equal(bt_shape_register(bad[k].name, bad[k].outline, &err), BT_ERR_USAGE);
+        if (err.n == 0 || !strstr(err.text[0], bad[k].says)) fail_msg("%s: %s", bad[k].says, err.n ? err.text[0] : "-");
+        bt_errors_free(&err);
+    }
+}
+
+static void a_key_is_a_key_of_the_case(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_errors err = {0};
+    if (read_text(&c, "body: {draft: 30 m, length: 2, x: 10}\npilot: {depth: 0.04 km}\n", &err) != BT_OK)
+        fail_msg("%s", err.text[0]);
+    CHECK_CLOSE(pilot_reserve(&c), 40 - 2 - 30, 1e-12);
+    char *text = bt_case_resolved(&c);
+    assert_non_null(strstr(text, "\npilot:\n  depth: 40 m"));
+    free(text);
+    bt_case_free(&c);
+    assert_int_equal(read_text(&c, "pilot: {depth: -3 m}\n", &err), BT_ERR_CASE);
+    assert_non_null(strstr(err.text[0], "pilot.depth"));
+    bt_errors_free(&err);
+    err = (bt_errors){0};
+    assert_int_equal(read_text(&c, "pilot: {dept: 3 m}\n", &err), BT_ERR_CASE);
+    assert_non_null(strstr(err.text[0], "depth"));
+    bt_errors_free(&err);
+}
+
+int main(void)
+{
+    bt_errors err = {0};
+    if (bt_shape_register("capsule", capsule, &err) != BT_OK || !bt_keys_add("pilot", pilot_keys, N_PILOT_KEYS, &err))
+        bt_errors_print(&err);
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_shape_is_a_waterline),
+        cmocka_unit_test(unknown_shapes_are_told_of_it),
+        cmocka_unit_test(what_will_not_do_is_refused),
+        cmocka_unit_test(a_key_is_a_key_of_the_case),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
