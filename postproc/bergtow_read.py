@@ -265,6 +265,14 @@ class Run:
                       key=lambda n: int(told[n]["order"]))
 
     @property
+    def balance(self):
+        """The towed body's balance in the labels of its series, the ice resistance by the others:
+        "tow − drag − ... − inertia"."""
+        ends = "tow_force", "ice_resistance", "inertia_force"
+        terms = [self.label(name) for name in self.by_role("balance") if name not in ends]
+        return " − ".join(["tow", *terms, "inertia"])
+
+    @property
     def estimates(self):
         """{name: Estimate}."""
         return estimates_of(self.summary)

@@ -122,9 +122,10 @@ def draw_balance(axes, run, factor, unit):
     samples, _ = smoothing(run)
     mark_window(axes, run)
     # The tow force is the widest line: where drag and inertia are small, the ice resistance lies on it.
-    for k, name in enumerate(run.by_role("balance", "force")):
+    names = run.by_role("balance", "force")
+    for k, name in enumerate(names):
         mean = running_mean(run[name], samples)
-        if k > 1 and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run["tow_force"]), initial=0):
+        if k > 1 and np.nanmax(np.abs(mean), initial=0) < 0.01 * np.nanmax(np.abs(run[names[0]]), initial=0):
             continue
         colour, width, dashes = style.BALANCE[k] if k < len(style.BALANCE) else style.BALANCE[-1 - k % 3]
         line, = axes.plot(run["time"], mean / factor, color=colour, linewidth=width, label=run.label(name))

@@ -264,7 +264,8 @@ def curve(run):
     time = run["time"]
     kinds = [("kinetic_energy", "kinetic energy", style.ICE)]
     if run.towed is not None:
-        kinds = [("ice_resistance", "ice resistance", style.ICE), ("tow_force", "tow force", style.TOW)]
+        kinds = [(name, run.label(name) if name in run else name, colour)
+                 for name, colour in (("ice_resistance", style.ICE), ("tow_force", style.TOW))]
     kinds = [k for k in kinds if k[0] in run and np.isfinite(run[k[0]]).any()]
     if len(time) < 2 or not kinds:
         return None

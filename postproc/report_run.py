@@ -235,7 +235,7 @@ def quality(run):
              f"correlation time {style.short(n('window.correlation_time_s'))} s")
         ]
     if run.towed is not None:
-        rows += [("balance of the body: ice − (tow − drag − Coriolis − tilt − inertia)",
+        rows += [(f"balance of the body: ice − ({run.balance})",
                   share(n("budget.closure_relative")), "relative to the largest of them"),
                  ("balance of the ice", share(n("budget.ice_momentum_closure_relative")),
                   "mean resistance from the momentum of all other bodies, relative")]

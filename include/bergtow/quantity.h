@@ -77,4 +77,8 @@ const bt_quantity *bt_series_find(const char *name);
 int bt_n_added(void);
 const bt_quantity *bt_added(int k);
 
+/// "tow - drag - Coriolis - tilt - ... - inertia": what the ice resistance is by the balance of the towed body, in the
+/// labels of the series whose role is BT_ROLE_BALANCE. Made anew whenever quantities are added; not from two threads.
+const char *bt_balance_words(void);
+
 #endif

@@ -4,6 +4,8 @@
 #include "bergtow/quantity.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "output/contact_quantities.h"
@@ -32,6 +34,29 @@ const bt_quantity *bt_series_find(const char *name)
     for (int k = 0; k < bt_n_series(); k++)
         if (!strcmp(bt_series(k)->name, name)) return bt_series(k);
     return NULL;
+}
+
+/// Does the balance name this series by itself: at its begin (tow), as what it gives (ice), at its end (inertia)?
+static bool is_end_of_balance(const bt_quantity *q)
+{
+    return q->offset == offsetof(bt_sample, tow_force) || q->offset == offsetof(bt_sample, ice_resistance) ||
+           q->offset == offsetof(bt_sample, inertia_force);
+}
+
+const char *bt_balance_words(void)
+{
+    static char *words;
+    size_t size;
+    free(words);
+    FILE *text = open_memstream(&words, &size);
+    if (!text) abort();
+    fputs("tow", text);
+    for (int k = 0; k < bt_n_series(); k++)
+        if (bt_series(k)->role == BT_ROLE_BALANCE && !is_end_of_balance(bt_series(k)))
+            fprintf(text, " - %s", bt_series(k)->label);
+    fputs(" - inertia", text);
+    if (fclose(text)) abort();
+    return words;
 }
 
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)

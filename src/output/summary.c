@@ -98,10 +98,9 @@ static void reduce_window(bt_summary *s, const bt_history *h)
 
     if (fabs(s->closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings,
-                      "the mean ice resistance differs from tow - drag - Coriolis - tilt - inertia by %.2g of the "
-                      "largest of them; "
-                      "the momentum balance of the towed body does not close",
-                      fabs(s->closure_relative));
+                      "the mean ice resistance differs from %s by %.2g of the largest of them; the momentum balance of "
+                      "the towed body does not close",
+                      bt_balance_words(), fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings,
                       "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "

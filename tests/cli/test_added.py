@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""A body shape and keys from outside, in runs of the program they were added to: tests/examples/body_shape.c, key.c.
+"""A body shape, keys and a force from outside, in runs of the program they were added to: tests/examples/extended.c.
 
-By themselves: tests/unit/test_added.c. Here: the list of keys, the resolved case, a tow, a resumed one, the pages.
+By themselves: tests/unit/test_added.c, tests/physics/test_force_law.c. Here: the list of keys, the resolved case, a tow,
+a resumed one, the balance on the console, the pages.
 
 Red with (tried): the added name written to the resolved case as the one before it; the pages' code changed.
 """
 import json
 import re
 import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -16,6 +18,9 @@ import yaml
 
 from harness import CASE, ROOT, TOW, call, changed, write_case
 from test_contact_law import EXTENDED, of_run, started
+
+sys.path.insert(0, str(ROOT / "postproc"))
+import bergtow_read  # noqa: E402
 
 CAPSULE = changed(TOW, run__duration=4, body__shape="capsule", body__length=3, body__width=1,
                   pilot={"depth": "0.04 km"})
@@ -40,6 +45,20 @@ def test_a_tow_of_it_and_the_same_again(tmp_path):
     assert json.loads((stopped / "summary.json").read_text())["state_hash"] == summary["state_hash"]
     _, box, _ = of_run(tmp_path / "box", changed(CAPSULE, body__shape="rectangle"))
     assert box["state_hash"] != summary["state_hash"]
+
+
+def test_an_added_force_stands_in_the_balance(tmp_path):
+    """The console names what the mean resistance is the rest of, an added law by its own name, and so does the page."""
+    waves = changed(TOW, run__duration=8, output__window_start=2, wave_drift={"amplitude": "0.02 m"})
+    folder, summary, said = of_run(tmp_path, waves)
+    force, balance = re.search(r"from balances +(\S+) N by (tow - .* - inertia), ", said).groups()
+    words = "tow - drag - Coriolis - tilt - wave_drift - inertia"
+    assert balance == words
+    parts = [summary[f"mean_{name}_force_n"] for name in ("tow", "drag", "coriolis", "tilt", "wave_drift", "inertia")]
+    assert abs(parts[4]) > 0.1
+    assert float(force) == pytest.approx(parts[0] - sum(parts[1:]), rel=1e-2)
+    run = bergtow_read.Run(folder)
+    assert run.balance == words.replace("-", "−")
 
 
 def test_the_program_without_them_refuses(tmp_path):

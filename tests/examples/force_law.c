@@ -6,7 +6,7 @@
 // that does not depend on ω].
 #include "bergtow/forces.h"
 
-enum { AMPLITUDE, PERIOD, DIRECTION, LOAD, PER_SPEED }; // own[]: the keys in their order, and what setup adds
+enum { AMPLITUDE, PERIOD, DIRECTION, PER_WIDTH, PER_SPEED }; // own[]: the keys in their order, and what setup adds
 
 static const bt_law_key wave_drift_keys[] = {
     {"amplitude", "m", "0 m", "[0, 20]", "amplitude of the waves, 0 = none"},
@@ -17,8 +17,8 @@ static const bt_law_key wave_drift_keys[] = {
 static void wave_drift_setup(const bt_case *c, double own[BT_MAX_FORCE_OWN])
 {
     const double g = 9.81, pi = 3.14159265358979;
-    own[LOAD] = 0.5 * c->water.density * g * own[AMPLITUDE] * own[AMPLITUDE]; // N/m
-    own[PER_SPEED] = 4 * (2 * pi / own[PERIOD]) / g;                         // s/m
+    own[PER_WIDTH] = 0.5 * c->water.density * g * own[AMPLITUDE] * own[AMPLITUDE]; // N/m
+    own[PER_SPEED] = 4 * (2 * pi / own[PERIOD]) / g;                              // s/m
 }
 
 static bool wave_drift_rests(const bt_params *p, const double *own)
@@ -29,7 +29,7 @@ static bool wave_drift_rests(const bt_params *p, const double *own)
 
 static void wave_drift(const bt_force_body *b, bt_load *l)
 {
-    const double force = b->own[LOAD] * 2 * bt_force_radius(b);
+    const double force = b->own[PER_WIDTH] * 2 * bt_force_radius(b);
     l->fx += force * cos(b->own[DIRECTION]);
     l->fy += force * sin(b->own[DIRECTION]);
     bt_load_damper(l, b->own[PER_SPEED] * force, b->par->water_u, b->par->water_v);

@@ -150,7 +150,7 @@ static void its_keys_are_keys_of_the_case(void **state)
     if (bt_setup_world(&c, &none, &w, &roster, &err) != BT_OK) fail_msg("%s", err.text[0]);
     const double *own = own_of(w, &wave_drift_law);
     CHECK_CLOSE(own[DIRECTION], 160 * BT_PI / 180, 1e-15);
-    CHECK_CLOSE(own[LOAD], 0.5 * 1027 * 9.81 * 0.03 * 0.03, 1e-12);
+    CHECK_CLOSE(own[PER_WIDTH], 0.5 * 1027 * 9.81 * 0.03 * 0.03, 1e-12);
     bt_roster_free(&roster);
     bt_world_free(w);
     bt_case_free(&c);
