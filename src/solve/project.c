@@ -42,7 +42,7 @@ static double opening(const bt_world *w, const bt_contact *u, const bt_gaps *g, 
     return bt_normal_velocity(u, i, da, db) + g->after[i] + w->par.slop;
 }
 
-static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_problem *p = context;
     bt_cell *cell = &w->cells->cell[k];
@@ -135,7 +135,7 @@ void bt_solver_project(bt_world *w)
         if (k == ts->n - 1 || bt_cells_moves(ts, k))
             memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
     }
-    bt_problem p = {.look = look_at_cell,
+    bt_problem p = {.residual = residual_of_cell,
                     .sweep = push_cell,
                     .vel = s->shift,
                     .tolerance = 0.1 * w->par.slop,
@@ -145,8 +145,8 @@ void bt_solver_project(bt_world *w)
                     .plain = w->par.plain_sweeps};
     bt_rounds_scale(&p, ts->heaviest);
     bt_work work = {0};
-    bt_rounds_look(w, &p, false, &work);
-    if (p.plain) // the reference, and what fields are shaken with: no look at the points, it ends with the updates
+    bt_rounds_residual(w, &p, false, &work);
+    if (p.plain) // the reference, and what fields are shaken with: no residual pass, it ends with the updates
         while (work.sweeps < w->par.position_sweeps && (work.sweeps == 0 || work.residual > p.tolerance))
             work.residual = bt_rounds_sweep(w, &p, &work);
     else bt_rounds_run(w, &p, &work);

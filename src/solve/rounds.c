@@ -28,7 +28,7 @@ void bt_rounds_scale(bt_problem *p, double heaviest)
     p->per_energy = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
 }
 
-// --- looks -----------------------------------------------------------------------------------------------------------
+// --- residual passes -------------------------------------------------------------------------------------------------
 
 void bt_rounds_list(bt_cell *cell)
 {
@@ -45,11 +45,11 @@ void bt_rounds_list(bt_cell *cell)
 void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t)
 {
     cell->work.bad = bad > 0;
-    bt_sum_add(&t->sum[BT_LOOK_SQUARES], bt_min(squares * p->per_square, 0x1p45));
-    bt_sum_add(&t->sum[BT_LOOK_ROWS], (double)rows);
-    bt_sum_add(&t->sum[BT_LOOK_CONTACTS], cell->n_contacts);
-    bt_sum_add(&t->sum[BT_LOOK_LISTED], cell->work.n_list);
-    bt_sum_add(&t->sum[BT_LOOK_BAD], (double)bad);
+    bt_sum_add(&t->sum[BT_RESIDUAL_SQUARES], bt_min(squares * p->per_square, 0x1p45));
+    bt_sum_add(&t->sum[BT_RESIDUAL_ROWS], (double)rows);
+    bt_sum_add(&t->sum[BT_RESIDUAL_CONTACTS], cell->n_contacts);
+    bt_sum_add(&t->sum[BT_RESIDUAL_LISTED], cell->work.n_list);
+    bt_sum_add(&t->sum[BT_RESIDUAL_BAD], (double)bad);
 }
 
 /// The bodies of the cell of body i may be moved.
@@ -116,19 +116,19 @@ static void lists_are_new(bt_world *w)
     bt_phases_deal(w);
 }
 
-void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work)
+void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work)
 {
-    bt_totals t = {.n_sums = BT_LOOK_N};
+    bt_totals t = {.n_sums = BT_RESIDUAL_N};
     if (settle && p->settle) p->settle(w);
-    bt_phases_any_order(w, p->look, p, &t);
+    bt_phases_any_order(w, p->residual, p, &t);
     bt_domain_reduce(w, &t);
     work->residual = t.most;
-    work->squares = bt_sum_value(&t.sum[BT_LOOK_SQUARES]) / p->per_square;
-    work->rows = (int64_t)bt_sum_value(&t.sum[BT_LOOK_ROWS]);
-    work->contacts = (int64_t)bt_sum_value(&t.sum[BT_LOOK_CONTACTS]);
-    work->listed = (int64_t)bt_sum_value(&t.sum[BT_LOOK_LISTED]);
-    work->bad = (int64_t)bt_sum_value(&t.sum[BT_LOOK_BAD]);
-    work->looks += (settle && p->settle ? 2 : 1) * work->contacts;
+    work->squares = bt_sum_value(&t.sum[BT_RESIDUAL_SQUARES]) / p->per_square;
+    work->rows = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_ROWS]);
+    work->contacts = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_CONTACTS]);
+    work->listed = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_LISTED]);
+    work->bad = (int64_t)bt_sum_value(&t.sum[BT_RESIDUAL_BAD]);
+    work->checks += (settle && p->settle ? 2 : 1) * work->contacts;
     lists_are_new(w);
 }
 
@@ -207,7 +207,7 @@ double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work)
 static double spent(const bt_problem *p, const bt_work *k)
 {
     if (p->plain) return (double)k->sweeps;
-    return (double)(k->updates + k->looks) + (1 + LEAST_SWEEP * (double)k->contacts) * (double)k->sweeps;
+    return (double)(k->updates + k->checks) + (1 + LEAST_SWEEP * (double)k->contacts) * (double)k->sweeps;
 }
 
 typedef struct {
@@ -243,7 +243,7 @@ static bool run_round(bt_world *w, const bt_problem *p, int length, double cap, 
 
 /// The cap and the length of the rounds, by what they bring.
 typedef struct {
-    double cap, mark; ///< mark: sum of squares when last looked at
+    double cap, mark; ///< mark: sum of squares at the last residual pass
     int length;
 } pace;
 
@@ -287,10 +287,10 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         if (part) keep_near_bad(w);
         settled = run_round(w, p, a.length, a.cap, on, last ? limit : calm, &m, work) && !part;
         all = !part;
-        bt_rounds_look(w, p, settled, work);
+        bt_rounds_residual(w, p, settled, work);
         if (settled || work->residual > p->tolerance) continue;
-        bt_rounds_look(w, p, true, work);
+        bt_rounds_residual(w, p, true, work);
         settled = true;
     }
-    if (!settled) bt_rounds_look(w, p, true, work);
+    if (!settled) bt_rounds_residual(w, p, true, work);
 }

@@ -2,9 +2,9 @@
 // Rounds of sweeps with momentum over the contacts that matter (private to the solver): one iteration for contacts and
 // for the position projection.
 //
-// Half and more of the contacts of a jam bear no load and open: their update changes nothing. So a look over all
-// contacts finds the largest residual and lists, cell by cell, the contacts that bear load or close; a round of sweeps
-// goes over the lists only; then all contacts are looked at again. What has opened leaves the lists then, what has
+// Half and more of the contacts of a jam bear no load and open: their update changes nothing. So a residual pass over
+// all contacts finds the largest residual and lists, cell by cell, the contacts that bear load or close; a round of
+// sweeps goes over the lists only; then follows the next residual pass. What has opened leaves the lists then, what has
 // closed meanwhile enters them.
 //
 // Between two sweeps of a round everything is moved on along its last change (Nesterov 1983, Soviet Math. Dokl. 27;
@@ -31,7 +31,7 @@
 //
 // When few contacts are left that are far from the tolerance, every second round is over the cells about them alone.
 //
-// The limit is one of work: updates of contacts and looks at them, and something for the sweep itself, so that sweeps
+// The limit is one of work: updates and residuals of contacts, and something for the sweep itself, so that sweeps
 // over a few contacts end, too.
 //
 // Order-free decisions. Cells form their parts of the sums in plain arithmetic, in the order of their contacts, which
@@ -54,8 +54,10 @@
 #include "space/cells.h"
 #include "space/phases.h"
 
-/// Totals of a look; the largest residual is `most`.
-enum { BT_LOOK_SQUARES, BT_LOOK_ROWS, BT_LOOK_CONTACTS, BT_LOOK_LISTED, BT_LOOK_BAD, BT_LOOK_N };
+/// Totals of a residual pass; the largest residual is `most`.
+enum {
+    BT_RESIDUAL_SQUARES, BT_RESIDUAL_ROWS, BT_RESIDUAL_CONTACTS, BT_RESIDUAL_LISTED, BT_RESIDUAL_BAD, BT_RESIDUAL_N
+};
 /// Totals of a sweep; the largest update is `most`.
 enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
@@ -63,7 +65,7 @@ enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
 /// What is iterated.
 typedef struct bt_problem {
-    bt_visit *look;       ///< list the contacts of a cell (bt_rounds_list) and add up BT_LOOK_...; context: this
+    bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list) and add up BT_RESIDUAL_...; context: this
     bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
     void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
@@ -88,8 +90,8 @@ typedef struct bt_work {
     int64_t sweeps;
     int64_t updates;      ///< of contacts
     int64_t moves;        ///< of contacts by momentum
-    int64_t looks;        ///< at contacts
-    // what the last look has found
+    int64_t checks;       ///< residuals of contacts that were taken
+    // what the last residual pass has found
     double residual;      ///< largest
     double squares;       ///< sum over the rows
     int64_t rows, contacts, listed, bad;
@@ -98,20 +100,20 @@ typedef struct bt_work {
 /// Scales of the exact sums for a tolerance of the residual, and the largest mass, kg.
 void bt_rounds_scale(bt_problem *p, double heaviest);
 
-/// Room for the list of a cell: what a look calls before it lists.
+/// Room for the list of a cell: what a residual pass calls before it lists.
 void bt_rounds_list(bt_cell *cell);
 
-/// A look at all contacts, after a settling if so, and what it found, into *work. Collective.
-void bt_rounds_look(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
+/// A residual pass over all contacts, after a settling if so, and what it found, into *work. Collective.
+void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
 
 /// One sweep over the lists, without momentum; returns the largest update. Collective.
 double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// Rounds until the residual is within the tolerance, or the limit of work is reached; after a look that has found it
-/// not to be. Collective.
+/// Rounds until the residual is within the tolerance, or the limit of work is reached; after a residual pass that
+/// found it not to be. Collective.
 void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// What a look has found in a cell: squares of the residual and rows, contacts far from the tolerance.
+/// What a residual pass has found in a cell: squares of the residual and rows, contacts far from the tolerance.
 void bt_rounds_found(const bt_problem *p, bt_cell *cell, double squares, int64_t rows, int64_t bad, bt_totals *t);
 
 enum { BT_MOVED_FEW = 192 };

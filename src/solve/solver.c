@@ -86,7 +86,7 @@ static void apply_impulses(bt_world *w, bt_idx k, const void *context, bt_totals
 }
 
 /// Residual of a cell, and its list: contacts that bear load, or close. Others would be left as they are.
-static void look_at_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_problem *p = context;
     bt_cell *cell = &w->cells->cell[k];
@@ -241,7 +241,7 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 static bt_problem contact_problem(const bt_world *w)
 {
     bt_problem p = {
-        .look = look_at_cell,
+        .residual = residual_of_cell,
         .sweep = sweep_cell,
         .settle = settle,
         .vel = w->bodies.vel,
@@ -259,7 +259,7 @@ double bt_solver_residual(bt_world *w, double *rms)
 {
     const bt_problem p = contact_problem(w);
     bt_work work = {0};
-    bt_rounds_look(w, &p, false, &work);
+    bt_rounds_residual(w, &p, false, &work);
     if (rms) *rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
     return work.residual;
 }
@@ -286,11 +286,11 @@ static void sweep_to_tolerance(bt_world *w)
     const bt_problem p = contact_problem(w);
     bt_work work = {0};
     const bool pressed = warm_start(w);
-    bt_rounds_look(w, &p, false, &work);
+    bt_rounds_residual(w, &p, false, &work);
     // An impulse below the tolerance that is carried over from step to step would push for ever: one sweep at least.
     if (pressed && work.residual <= p.tolerance) {
         bt_rounds_sweep(w, &p, &work);
-        bt_rounds_look(w, &p, false, &work);
+        bt_rounds_residual(w, &p, false, &work);
     }
     if (work.residual > p.tolerance) bt_rounds_run(w, &p, &work);
     st->sweeps += work.sweeps;

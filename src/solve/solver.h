@@ -7,16 +7,16 @@
 // together, and their friction as one), cell by cell in the order of cells.h, with the velocities as they stand.
 // Contacts with large movable bodies (the berg on a line has hundreds) follow in sequence, and the tow line after them.
 //
-// Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel -> look ->
-//   lists -> sweeps -> vel, contacts:
-//   look     reads all contacts and vel; writes bt_cell.list (contacts that bear load or close), the residual, and what
+// Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel ->
+//   residual pass -> lists -> sweeps -> vel, contacts:
+//   residual reads all contacts and vel; writes bt_cell.list (contacts that bear load or close), the residual, and what
 //   is bad;
 //   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
 //            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
-//            four a batch, and their impulses put back before the next look (src/solve/batch.h); those of large bodies
-//            and with bounds are swept where they are;
+//            four a batch, and their impulses put back before the next residual pass (src/solve/batch.h); those of
+//            large bodies and with bounds are swept where they are;
 //   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
-//   settle   at the end: vel anew from vel_free and the impulses, then a look: the residual that is reported.
+//   settle   at the end: vel anew from vel_free and the impulses, then a residual pass: the residual that is reported.
 // Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the
 // same, with displacements in place of velocities.
 //

@@ -108,7 +108,7 @@ void bt_cells_leave(bt_cells *t)
             t->busy[kept++] = k;
         } else {
             t->is_busy[k] = 0;
-            t->cell[k].work.swept = false; // as a look would have it: nothing here moved on
+            t->cell[k].work.swept = false; // as a residual pass would have it: nothing here moved on
         }
     }
     t->n_busy = kept;

@@ -52,7 +52,7 @@ typedef struct bt_pair {
     int32_t n_points;    ///< contact points in the last solution
     uint32_t feature[2]; ///< of those
     double ln[2], lt;    ///< impulses found, N s: normal at each point, friction of all
-    /// gap at the last look + path lengths of a and b then: no contact while paths + margin < reach
+    /// gap when last computed + path lengths of a and b then: no contact while paths + margin < reach
     double reach;
 } bt_pair;
 
