@@ -123,11 +123,11 @@ static int64_t *gather_work(bt_world *w)
     const size_t n = (size_t)d->n_x * (size_t)d->n_y;
     int64_t *work = bt_alloc(n, sizeof *work);
     for (bt_idx i = 0; i < b->n; i++) {
-        if (b->large[i] || (d->dealt && !d->owned[i])) continue;
+        if (b->large[i] || (d->distributed && !d->owned[i])) continue;
         const int64_t p = bt_division_place(w, b->cell[i][0], b->cell[i][1]);
-        if (p >= 0) work[p] += d->dealt ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
+        if (p >= 0) work[p] += d->distributed ? (int64_t)(BT_WORK_AT_REST * 1e9) : 1;
     }
-    if (!d->dealt) return work; // every rank has counted them all
+    if (!d->distributed) return work; // every rank has counted them all
     for (size_t p = 0; p < n; p++) work[p] += (int64_t)(1e9 * d->work[p] / (double)(d->steps > 0 ? d->steps : 1));
     MPI_Allreduce(MPI_IN_PLACE, work, (int)n, MPI_INT64_T, MPI_SUM, d->comm->mpi);
     return work;
@@ -186,7 +186,7 @@ static void cut_map(bt_world *w)
     MPI_Bcast(d->owner, n, MPI_INT, 0, d->comm->mpi);
     MPI_Bcast(&d->stats.cut, 1, MPI_DOUBLE, 0, d->comm->mpi);
     MPI_Bcast(&dealt, 1, MPI_DOUBLE, 0, d->comm->mpi);
-    if (d->dealt) { // the first division knew no work yet
+    if (d->distributed) { // the first division knew no work yet
         d->stats.dealt_imbalance += dealt;
         d->stats.worst_dealt_imbalance = bt_max(d->stats.worst_dealt_imbalance, dealt);
     }
@@ -207,7 +207,7 @@ void bt_division_map(bt_world *w, bool cut)
     d->side_x = t->side_x, d->side_y = t->side_y;
     d->under = bt_realloc(d->under, (size_t)t->n_x * (size_t)t->n_y, sizeof *d->under);
     mark_under(w);
-    if (cut || !d->dealt) {
+    if (cut || !d->distributed) {
         cut_map(w);
         memset(d->work, 0, (size_t)d->n_x * (size_t)d->n_y * sizeof *d->work);
         // only now: where floes drift through the cells, labels are renewed more often than the balance is looked at

@@ -29,7 +29,7 @@ typedef struct bt_link {
 
 struct bt_domain {
     const bt_comm *comm;
-    bool dealt;              ///< bodies are where the map says; before that every rank holds all
+    bool distributed;        ///< bodies are where the map says; before that every rank holds all
     bool due;                ///< a new division is due
     // the map: owner of every cell of the box
     int *owner;              ///< [n_y][n_x] rank

@@ -11,7 +11,7 @@
 
 #include "partition/division.h"
 
-#define IMBALANCE 0.05 // of the work, above which cells are dealt anew
+#define IMBALANCE 0.05 // of the work, above which cells are divided anew
 enum { CHECK_STEPS = 10 };
 // Seconds, measured on one core (see partition/README.md): only their ratios matter.
 #define CONTACT_SWEEP 30e-9
@@ -70,7 +70,10 @@ bool bt_domain_owns_cell(const bt_world *w, int32_t x, int32_t y)
 
 bool bt_domain_owns_large(const bt_world *w) { return !w->domain || w->domain->large_owner == w->domain->comm->rank; }
 
-bool bt_domain_owns(const bt_world *w, bt_idx i) { return !w->domain || !w->domain->dealt || w->domain->owned[i]; }
+bool bt_domain_owns(const bt_world *w, bt_idx i)
+{
+    return !w->domain || !w->domain->distributed || w->domain->owned[i];
+}
 
 bool bt_domain_due(const bt_world *w) { return w->domain && w->domain->due; }
 

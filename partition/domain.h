@@ -14,7 +14,7 @@ typedef struct bt_domain bt_domain;
 
 /// What the division costs.
 typedef struct bt_domain_stats {
-    int64_t divisions;       ///< times cells were dealt anew
+    int64_t divisions;       ///< times cells were divided anew
     /// work of the busiest rank / mean − 1 over the checks, mean of those after the first division
     double imbalance;
     double worst_imbalance;  ///< largest of them

@@ -176,14 +176,14 @@ static void move_bodies(bt_world *w)
             keep[i] = 1; // on every rank
             continue;
         }
-        if (d->dealt && !d->owned[i]) continue;
+        if (d->distributed && !d->owned[i]) continue;
         int rank[BT_MAX_SHARERS];
         const int n = bt_division_sharers(w, b->cell[i][0], b->cell[i][1], rank);
         for (int k = 0; k < n; k++) {
             if (rank[k] == me) keep[i] = 1;
-            else if (d->dealt) pack(b, i, &p, rank[k]); // at first every rank has all
+            else if (d->distributed) pack(b, i, &p, rank[k]); // at first every rank has all
         }
-        d->stats.moved += d->dealt && bt_division_owner(w, b->cell[i][0], b->cell[i][1]) != me;
+        d->stats.moved += d->distributed && bt_division_owner(w, b->cell[i][0], b->cell[i][1]) != me;
     }
     for (bt_gid g = 0; g < b->n_global; g++) b->index_of[g] = -1;
     compact(b, keep);
@@ -217,7 +217,7 @@ static void sort_traces(const bt_world *w, bt_memory *trace, int64_t *n, parcels
     for (int64_t k = 0; k < *n; k++) {
         const int to = solver_of(w, bt_world_index(w, trace[k].a), bt_world_index(w, trace[k].b));
         if (to == d->comm->rank) trace[kept++] = trace[k];
-        else if (d->dealt) add(p, to, &trace[k], sizeof *trace);
+        else if (d->distributed) add(p, to, &trace[k], sizeof *trace);
     }
     *n = kept;
 }
@@ -238,6 +238,6 @@ bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n)
     if (more) memcpy(trace + *n, in, n_in);
     *n += more;
     free(in);
-    d->dealt = true;
+    d->distributed = true;
     return trace;
 }

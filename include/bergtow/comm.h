@@ -65,7 +65,7 @@ void bt_comm_reduce(const bt_comm *c, bt_sum *sums, int n_sums, double *maxima, 
 /// Collective. Sum over the ranks before this one; *total (may be NULL): over all.
 int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total);
 
-/// First of the n things that stand in the block of a rank when they are dealt in equal blocks; bt_comm_first(c,
+/// First of the n things that stand in the block of a rank when they are distributed in equal blocks; bt_comm_first(c,
 /// c->size, n) = n.
 static inline int64_t bt_comm_first(const bt_comm *c, int rank, int64_t n)
 {

@@ -111,7 +111,7 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 {
     assert(d->n_vertices >= 3 && d->n_vertices <= BT_MAX_VERTICES);
     assert(d->motion != BT_DYNAMIC || (d->mass > 0 && d->inertia > 0));
-    assert(b->n == b->n_global); // bodies are added before they are dealt to ranks
+    assert(b->n == b->n_global); // bodies are added before they are distributed to ranks
     int64_t first = b->offset[b->n];
     const int n_vertices = d->n_vertices + (d->parts ? d->parts->n_vertices : 0);
     bt_bodies_reserve(b, b->n + 1, first + n_vertices);

@@ -3,8 +3,8 @@
 //
 // n floes that share a strip of width b and length L have the cells A_i, so b = Σ A_i / L and lengths A_i / b; their
 // mean aspect L/(n b) falls as n grows, and the strip closes when it has come down to the one asked for. Every cell
-// area is as asked, so strips fill the region exactly. Floes are dealt to strips by size with some noise: for a narrow
-// size law that is a random order, for a wide one it keeps large floes out of narrow strips, where they would be
+// area is as asked, so strips fill the region exactly. Floes are assigned to strips by size with some noise: for a
+// narrow size law that is a random order, for a wide one it keeps large floes out of narrow strips, where they would be
 // needles. Strips are then shuffled, and the floes within each. In a periodic direction a strip starts at a random
 // place.
 #include <math.h>
@@ -82,7 +82,7 @@ static int by_key(const void *a, const void *b)
 
 // Strip k holds pieces [first[k], first[k+1]). share: cell area over lx per target area. Returns the number of strips;
 // *last: width of the last strip over the width due to it.
-static bt_idx deal(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
+static bt_idx assign(bt_idx n, const piece *p, double share, double aspect, double lx, bt_idx *first, double *last)
 {
     bt_idx n_strips = 0;
     double width = 0;
@@ -124,12 +124,12 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     double best = INFINITY, chosen = aspect;
     for (int k = -20; k <= 20; k++) {
         double trial = aspect * exp(0.01 * k), last;
-        deal(n, p, share / lx, trial, lx, first, &last);
+        assign(n, p, share / lx, trial, lx, first, &last);
         double cost = fabs(0.01 * k) + fabs(log(last));
         if (cost < best) best = cost, chosen = trial;
     }
     double last;
-    bt_idx n_strips = deal(n, p, share / lx, chosen, lx, first, &last);
+    bt_idx n_strips = assign(n, p, share / lx, chosen, lx, first, &last);
     for (bt_idx k = 0; k < n_strips; k++) {
         bt_rng r = bt_rng_start(seed, BT_RNG_CUT, (int64_t)n + k);
         strip[k] = (piece){bt_rng_uniform(&r), 0, k};

@@ -82,7 +82,7 @@ static row *rows_of(const bt_world *w, int *n)
             const bt_contact *u = &ts->cell[k].contacts[j];
             const double total = u->ln[0] + u->ln[1];
             if (u->n == 0) rows[(*n)++] = sheets_of(w, &ts->cell[k], j);
-            for (int i = 0; i < u->n; i++) // the friction of a manifold is one number: dealt like the normal impulses
+            for (int i = 0; i < u->n; i++) // one friction for both: distributed like the normal impulses
                 rows[(*n)++] = (row){.gid_a = w->bodies.gid[u->a],
                                      .gid_b = w->bodies.gid[u->b],
                                      .point = i,

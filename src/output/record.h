@@ -107,7 +107,8 @@ typedef struct bt_phases {
 
 struct bt_impacts;
 
-/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are dealt in equal blocks in the order
+/// Which bodies each rank records: first[k] up to first[k + 1] on rank k. Floes are distributed in equal blocks in the
+/// order
 /// of their ids; the other bodies are the last rank's. first: [size + 1].
 void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first);
 

@@ -256,7 +256,7 @@ static bt_status save_bodies(const bt_world *w, const bt_comm *c, bt_snapshot *s
 static void load_bodies(bt_world *w, bt_snapshot *s)
 {
     int64_t n = w->bodies.n_global;
-    assert(w->bodies.n == n); // nothing is dealt yet
+    assert(w->bodies.n == n); // nothing is distributed yet
     body_row *rows = load_columns(s, "bodies", body_columns, N_OF(body_columns), sizeof *rows, &n);
     for (bt_gid g = 0; g < n && !s->faulty; g++) {
         bt_snapshot_want(s, rows[g].disturbed == 0 || rows[g].disturbed == 1, "bodies/stirred", g,

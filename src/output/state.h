@@ -14,7 +14,7 @@
 bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 
 /// Collective. The state into a world that bt_setup_world has made from the same case and field, all of it on every
-/// rank; it is dealt to the ranks here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of
+/// rank; it is distributed to the ranks here. s is the same on all ranks. Errors: BT_ERR_CASE (not of this case, or of
 /// another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 

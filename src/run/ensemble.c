@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The members of a study, dealt to groups of ranks; reasons in bergtow/ensemble.h.
+// The members of a study, assigned to groups of ranks; reasons in bergtow/ensemble.h.
 #include "bergtow/ensemble.h"
 
 #include <errno.h>

@@ -113,7 +113,7 @@ static void mark_swept(bt_world *w)
 static void lists_are_new(bt_world *w)
 {
     mark_swept(w);
-    bt_phases_deal(w);
+    bt_phases_distribute(w);
 }
 
 void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work)

@@ -477,7 +477,7 @@ static void place(bt_world *w, bt_memory *trace, int64_t n)
 }
 
 /// With `renew` new cells and labels, otherwise only new owners.
-static void deal(bt_world *w, bool renew, double margin)
+static void relabel(bt_world *w, bool renew, double margin)
 {
     bt_cells *t = w->cells;
     if (renew) {
@@ -499,9 +499,9 @@ void bt_cells_begin(bt_world *w)
     bt_cells *t = w->cells;
     if (!t->labelled || t->relabel) {
         if (w->towed >= 0) w->bodies.large[bt_world_towed(w)] = 1; // it has a place of its own, whatever its size
-        deal(w, true, w->par.slop);
+        relabel(w, true, w->par.slop);
     } else if (w->exchange && w->exchange->due(w)) {
-        deal(w, false, 0);
+        relabel(w, false, 0);
     }
     t->still = w->par.water_u == 0 && w->par.water_v == 0;
     if (!t->still) bt_cells_wake_all(t);
@@ -510,6 +510,6 @@ void bt_cells_begin(bt_world *w)
 bool bt_cells_update(bt_world *w, double margin)
 {
     if (margin <= w->cells->margin_max) return false;
-    deal(w, true, margin);
+    relabel(w, true, margin);
     return true;
 }

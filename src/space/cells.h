@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Cells: the division of space that orders the contacts, colours them, and is dealt to threads and ranks.
+// Cells: the division of space that orders the contacts, colours them, and is distributed to threads and ranks.
 //
 // Space is cut into square cells, some floe diameters wide. A floe carries the coordinates (tx, ty) of the cell that
 // its centroid was in when labels were last renewed. A contact of bodies a and b belongs to cell
@@ -247,7 +247,7 @@ void bt_cells_remember(bt_cell *t, const bt_memory *r);
 bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
 /// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
 /// have been set, and the traces [n], which are released, are those of all ranks. A domain has been created, but
-/// nothing is dealt yet.
+/// nothing is distributed yet.
 void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n);
 /// Put traces, in any order, into the pair lists of empty cells.
 void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n);

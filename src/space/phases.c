@@ -41,7 +41,7 @@ static void deal_stretch(bt_cells *t, bt_idx begin, bt_idx end, bt_share *share)
     share[t->n_shares - 1].end = end;
 }
 
-void bt_phases_deal(bt_world *w)
+void bt_phases_distribute(bt_world *w)
 {
     bt_cells *t = w->cells;
     int64_t listed = 0;
@@ -86,7 +86,7 @@ void bt_phases_order(bt_world *w)
         t->n_contacts += t->cell[k].n_contacts;
         t->cell[k].work.n_list = t->cell[k].n_contacts; // until they are listed
     }
-    bt_phases_deal(w);
+    bt_phases_distribute(w);
 }
 
 // --- passes ----------------------------------------------------------------------------------------------------------

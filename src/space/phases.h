@@ -46,12 +46,12 @@ void bt_totals_merge(bt_totals *into, const bt_totals *from);
 /// Work on one cell. Only the bodies of its block, its contacts and *t may be changed.
 typedef void bt_visit(bt_world *w, bt_idx cell, const void *context, bt_totals *t);
 
-/// List the cells of this rank with work in t->order, by phase, and deal them to threads. After the contacts have been
-/// made.
+/// List the cells of this rank with work in t->order, by phase, and distribute them to threads. After the contacts have
+/// been made.
 void bt_phases_order(bt_world *w);
 
 /// Deal the cells to threads by the contacts that are listed in them. No result depends on it.
-void bt_phases_deal(bt_world *w);
+void bt_phases_distribute(bt_world *w);
 
 /// Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at
 /// once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date

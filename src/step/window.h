@@ -50,7 +50,7 @@ typedef struct bt_window {
     double brought[3];    ///< the same as they entered
 } bt_window;
 
-/// Let the window follow the towed body of a world whose bodies have all been added, before it is dealt to ranks:
+/// Let the window follow the towed body of a world whose bodies have all been added, before it is distributed to ranks:
 /// par.period_x is its length.
 /// sign: of the tow along x; ahead: m; n_floes: bodies below this id are renewed; held: walls at the sides.
 void bt_window_create(bt_world *w, double sign, double ahead, bt_gid n_floes, bool held);

@@ -141,7 +141,7 @@ static void shares_follow_the_lists(void **state)
         bt_cells *t = w->cells;
         for (bt_idx i = 0; i < t->n_order; i++)
             t->cell[t->order[i]].work.n_list = i % 7 == 0 ? 0 : t->cell[t->order[i]].n_contacts;
-        bt_phases_deal(w);
+        bt_phases_distribute(w);
         assert_int_equal(t->n_shares, threads);
         for (int p = 0; p < BT_COLOURS; p++) {
             bt_idx at = t->start[p];
@@ -162,7 +162,7 @@ static void shares_follow_the_lists(void **state)
         }
         assert_sound(w, -1);
         for (bt_idx i = 0; i < t->n_order; i++) t->cell[t->order[i]].work.n_list = 0;
-        bt_phases_deal(w);
+        bt_phases_distribute(w);
         assert_sound(w, -1);
         bt_world_free(w);
     }
