@@ -103,8 +103,8 @@ static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
         }
 }
 
-/// Lists of cells of which a value is told: at the border of the map's parts only.
-static void list_told(bt_world *w)
+/// Lists of cells of which a value is sent: at the border of the map's parts only.
+static void list_sent(bt_world *w)
 {
     bt_domain *d = w->domain;
     const bt_cells *t = w->cells;
@@ -168,7 +168,7 @@ void bt_halo_connect(bt_world *w)
     bt_domain *d = w->domain;
     bt_halo_free(d);
     list_bodies(w);
-    list_told(w);
+    list_sent(w);
     for (int k = 0; k < d->n_links; k++) {
         bt_link *l = &d->link[k];
         bt_idx most_out = 0, most_in = 0;

@@ -8,7 +8,7 @@
 #include "bergtow/stats.h"
 #include "output/steady.h"
 
-enum { BT_EVENTS_TOLD = 40 }; ///< one by one; all are in result.h5
+enum { BT_EVENTS_REPORTED = 40 }; ///< one by one; all are in result.h5
 
 typedef struct bt_summary {
     bool body;                        ///< there is a towed body: the forces have a meaning

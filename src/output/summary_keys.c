@@ -144,7 +144,7 @@ static void write_events(bt_json *j, const char *key, const view *v, const void 
     (void)source;
     const bt_events *e = v->t->events;
     bt_json_open(j, key, '[');
-    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_TOLD; i++) {
+    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_REPORTED; i++) {
         bt_json_open(j, NULL, '{');
         bt_json_number(j, "time_s", e->event[i].time);
         bt_json_string(j, "kind", bt_event_names[e->event[i].kind]);

@@ -33,12 +33,12 @@ enum { N_OF_THE_LINE = sizeof of_the_line / sizeof *of_the_line };
 static void print_events(const bt_events *e)
 {
     char text[160];
-    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_TOLD; i++) {
+    for (int64_t i = 0; e && i < e->n && i < BT_EVENTS_REPORTED; i++) {
         bt_event_describe(&e->event[i], text);
         printf("  event               %g s: %s\n", e->event[i].time, text);
     }
-    if (e && e->n > BT_EVENTS_TOLD)
-        printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - BT_EVENTS_TOLD);
+    if (e && e->n > BT_EVENTS_REPORTED)
+        printf("  event               and %" PRId64 " more, in /events of result.h5\n", e->n - BT_EVENTS_REPORTED);
 }
 
 static void print_mean(const char *label, const bt_mean *m)
