@@ -28,7 +28,7 @@ const bt_column_def bt_history_columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_UNCONVERGED, "unconverged_step", unconverged),
     COLUMN(BT_COL_RESIDUAL, "residual", residual),
     COLUMN(BT_COL_COLLISION, "collision", collision_resistance),
-    COLUMN(BT_COL_PUSH, "push", largest_push),
+    COLUMN(BT_COL_QUASI_STATIC, "push", largest_push),
 };
 
 double bt_history_largest(const double *x, int64_t from, int64_t to)

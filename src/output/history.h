@@ -22,7 +22,7 @@ typedef enum bt_column {
     BT_COL_UNCONVERGED,
     BT_COL_RESIDUAL,
     BT_COL_COLLISION,
-    BT_COL_PUSH,
+    BT_COL_QUASI_STATIC,
     BT_N_COLUMNS
 } bt_column;
 

@@ -8,7 +8,7 @@
 
 void bt_impact_count_init(bt_impact_count *c, const bt_impacts *m, const bt_history *h, const bt_steady *w)
 {
-    const double *push = h->column[BT_COL_PUSH];
+    const double *push = h->column[BT_COL_QUASI_STATIC];
     *c = (bt_impact_count){.start = w->start, .hours = (double)w->n * m->dt / 3600, .start_peak = NAN};
     bt_impact_describe(&m->rule, c->conversion);
     c->peaks = bt_alloc(BT_IMPACT_PEAKS, sizeof *c->peaks);

@@ -98,7 +98,7 @@ static void collisions_by_their_time(void **state)
     for (int i = 0; i < N; i++) column[i] = i + 1;
     bt_history h = {.n = N};
     for (int k = 0; k < BT_N_COLUMNS; k++) h.column[k] = column;
-    h.column[BT_COL_PUSH] = push;
+    h.column[BT_COL_QUASI_STATIC] = push;
     h.column[BT_COL_COLLISION] = share;
     bt_steady w = {.start = 0.1 * 4, .first = 4, .n = 6};
     w.series[BT_REPORTED_ICE].mean.mean = 13.5;
