@@ -27,7 +27,7 @@
 #include "case/cost.h"
 #include "partition/domain.h"
 #include "base/fileio.h"
-#include "output/handover.h"
+#include "output/gather.h"
 #include "base/lock.h"
 #include "revision.h"
 #include "run/run_parts.h"
@@ -54,11 +54,11 @@ static bt_status make_field(const bt_comm *comm, const bt_case *c, bt_field *f, 
 static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
 {
     bt_record_bodies b;
-    bt_status status = bt_handover_bodies(r->comm, r->w, &r->roster, &b, err);
+    bt_status status = bt_gather_bodies(r->comm, r->w, &r->roster, &b, err);
     if (status != BT_OK) return status;
     status =
         (kept ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
-    bt_handover_free(&b);
+    bt_gather_free(&b);
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
     if (status == BT_OK && kept) status = bt_record_load(r->record, kept, &r->w->events, err);
@@ -69,7 +69,7 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
 static bt_status record_frame(run *r, bt_errors *err)
 {
     bt_frame_row *rows;
-    bt_status status = bt_handover_frame(r->comm, r->w, &r->roster, &rows, err);
+    bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, err);
     free(rows);
     return status;

@@ -4,7 +4,7 @@
 // The world lies on the ranks as the computation wants it; result.h5 has the bodies in the order of their ids. Each
 // body is sent once, by the rank that speaks for it, to the rank whose block of ids holds it (bt_record_blocks). Lost
 // and doubled bodies show here.
-#include "output/handover.h"
+#include "output/gather.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -81,7 +81,7 @@ static bt_status hand_over_vertices(const bt_comm *c, const bt_bodies *b, const 
     return status;
 }
 
-bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out,
+bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *out,
                              bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;
@@ -114,11 +114,11 @@ bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roste
                               .area = area,
                               .names = roster->names,
                               .towed = (bt_idx)w->towed};
-    if (status != BT_OK) bt_handover_free(out);
+    if (status != BT_OK) bt_gather_free(out);
     return status;
 }
 
-void bt_handover_free(bt_record_bodies *b)
+void bt_gather_free(bt_record_bodies *b)
 {
     free((void *)b->offsets);
     free((void *)b->vertices);
@@ -127,7 +127,7 @@ void bt_handover_free(bt_record_bodies *b)
     *b = (bt_record_bodies){0};
 }
 
-bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out,
+bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **out,
                             bt_errors *err)
 {
     const bt_bodies *b = &w->bodies;

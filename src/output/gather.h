@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 // Bodies from the ranks that hold them to the ranks that record them.
-#ifndef BT_HANDOVER_H
-#define BT_HANDOVER_H
+#ifndef BT_GATHER_H
+#define BT_GATHER_H
 
 #include "output/record.h"
 #include "bergtow/setup.h"
 #include "bergtow/world.h"
 
-/// Collective. The outlines of this rank's block, for bt_record_open; released with bt_handover_free.
+/// Collective. The outlines of this rank's block, for bt_record_open; released with bt_gather_free.
 /// Errors, the same status on all ranks: BT_ERR_NUMERIC (bodies are lost or doubled).
-bt_status bt_handover_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *b,
+bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_record_bodies *b,
                              bt_errors *err);
-void bt_handover_free(bt_record_bodies *b);
+void bt_gather_free(bt_record_bodies *b);
 
 /// Collective. A frame of this rank's block; *rows is to be freed, NULL after an error. Errors as above.
-bt_status bt_handover_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **rows,
+bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **rows,
                             bt_errors *err);
 
 #endif
