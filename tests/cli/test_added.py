@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A body shape, keys and a force from outside, in runs of the program they were added to: tests/examples/extended.c.
 
-By themselves: tests/unit/test_added.c, tests/physics/test_force_law.c. Here: the list of keys, the resolved case, a tow,
-a resumed one, the balance on the console, the pages.
+By themselves: tests/unit/test_added.c, tests/physics/test_force_law.c. Here: the list of keys, the resolved case, a
+tow, a resumed one, the balance on the console, the pages.
 
 Red with (tried): the added name written to the resolved case as the one before it; the pages' code changed.
 """
