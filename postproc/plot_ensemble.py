@@ -6,6 +6,7 @@
                       law V^2 beside speed. A Latin hypercube: one panel, every member
     exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
     map.png           mean and its relative uncertainty over two numbers of a grid
+    variants.png      what each variant does to the mean, against the first one (plot_variants.py)
     sensitivity.png   Sobol indices and partial rank correlations
 """
 import argparse
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import command
 import plot_resistance
+import plot_variants
 import stat_extreme
 import stat_mean
 import style
@@ -510,6 +512,8 @@ def pictures(e, options):
         out.append(("map", lambda: draw_map(e, keys[0], keys[1])))
     if len(keys) >= 2:
         out.append(("sensitivity", lambda: draw_sensitivity(e, sensitivity(e, {int(m): member(e, m) for m in e.used}))))
+    if plot_variants.KEY in e.parameters:
+        out.append(("variants", lambda: plot_variants.draw(e, headline)))
     if not e.sampled or len(e.conditions()) <= MOST_LINES:
         out.append(("exceedance", lambda: draw_exceedance(e, options)))
     return out

@@ -92,11 +92,12 @@ def draw(run, kind="speed", times=(), window="auto"):
     def inches(rect):
         return rect[0] / size[0], rect[1] / size[1], rect[2] / size[0], rect[3] / size[1]
 
-    stacked = orientation == "vertical"
+    stacked, rafted = orientation == "vertical", False
     for i, ((_, frame), rect) in enumerate(zip(shown, rects)):
         axes = figure.add_axes(inches(rect))
         scene = Scene(axes, run, colouring, view, follow)
         scene.show(frame)
+        rafted = rafted or scene.rafted
         one_line = ", ".join(titles[i])
         axes.set_title(one_line if LETTER * len(one_line) < rect[2] else "\n".join(titles[i]))
         if not stacked:
@@ -109,6 +110,9 @@ def draw(run, kind="speed", times=(), window="auto"):
             axes.tick_params(labelleft=False)
     if run.n_floes:
         colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
+    if rafted:
+        figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right", fontsize=10.5,
+                    color=style.RAFTED)
     style.headline(figure, run, "ice field", 0.2 / size[0])
     return figure
 

@@ -206,6 +206,7 @@ class Scene:
         floe_pt = np.sqrt(run.area.mean()) / wide * width_pt if run.n_floes else 10
         self._floes = PolyCollection([], cmap=colouring.cmap, norm=colouring.norm, edgecolors=style.WATER,
                                      linewidths=float(np.clip(0.035 * floe_pt, 0.1, 0.6)), zorder=2, **kept)
+        self.rafted = False  #: does the frame that is shown have floes over each other?
         self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
         self._rafts = run.value("ice.rafting.kappa", 0) > 0
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
@@ -264,7 +265,9 @@ class Scene:
         self._floes.set_verts(self._flat(outlines - origin))
         self._floes.set_array(self.colouring.values(frame)[index])
         if self._rafts:
-            self._rafted.set_verts([self._flat(p - origin) for p in rafted.overlaps(outlines)])
+            over = rafted.overlaps(outlines)
+            self._rafted.set_verts([self._flat(p - origin) for p in over])
+            self.rafted = len(over) > 0
         bodies = run.body_polygons(frame, centre)
         self._solid.set_verts([self._flat(p + shift - origin) for shift in self._images
                                for p, b in zip(bodies, run.bodies) if not b.towed])

@@ -291,7 +291,8 @@ static void print_width(const bt_case *c, const bt_check_ice *n)
     printf("domain width         ");
     if (isfinite(a.bodies)) printf("%.3g body widths, ", a.bodies);
     if (isfinite(a.floes)) printf("%.3g floe sizes, ", a.floes);
-    printf("%s: arches of rigid floes %s\n", a.sides, a.possible ? "POSSIBLE" : "not expected");
+    printf("%s: arches of %s %s", a.sides, bt_arch_floes(&a), a.possible ? "POSSIBLE" : "not expected");
+    printf("%s\n", a.unbounded ? ", load without an upper bound" : "");
 }
 
 static void print_packing(const bt_case *c, const bt_check_ice *n)

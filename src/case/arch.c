@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Width of the domain against body, floes and arches; the rule is in arch.h.
+// Width of the domain against body, floes and arches, and what bounds their load; the rules are in arch.h.
 #include "case/arch.h"
 
 #include <math.h>
@@ -19,15 +19,25 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
                  .floes = floe_size > 0 ? c->domain.width / floe_size : NAN};
     a.sides = open ? "open sides" : c->domain.sides == BT_BOUND_PERIODIC ? "periodic images" : "walls";
     a.possible = !open && n > 0 && floe_size > 0 && concentration >= BT_ARCH_CONCENTRATION && a.bodies < BT_ARCH_WIDTHS;
+    a.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
+    a.unbounded = a.rigid && n > 0 && floe_size > 0 && concentration >= BT_BOUND_CONCENTRATION;
     return a;
 }
+
+const char *bt_arch_floes(const bt_arch *a) { return a->rigid ? "rigid floes" : "floes"; }
 
 void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
 {
     if (a->possible)
         bt_errors_add(warnings,
-                      "domain.width: %.3g body widths of %.0f %% ice, and %s can carry arches of rigid floes: the "
+                      "domain.width: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
-                      a->bodies, 100 * a->concentration, a->sides, BT_ARCH_WIDTHS);
+                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), BT_ARCH_WIDTHS);
+    if (a->unbounded)
+        bt_errors_add(warnings,
+                      "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "
+                      "load has no upper bound; read it as a property of this model, or let floes raft "
+                      "(ice.rafting.kappa, 5 to 17) or crush (ice.crushing.pressure)",
+                      100 * a->concentration, 100 * BT_BOUND_CONCENTRATION);
 }

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Can walls or periodic images beside the body carry arches of rigid floes, so that the load is a property of the
-// domain's width?
+// Can walls or periodic images beside the body carry arches of floes, so that the load is a property of the domain's
+// width; and is there anything that bounds such a load?
 //
-//     wall ─────────────────────────      Dense rigid floes wedge between the body and what holds them at the sides: a
-//        wall, or the
-//        \ \ \   arch                     next image of the body in a periodic domain. The load of such an arch has no
-//          upper bound but what
-//          ( body ) ──>                   the tow gives, and the wider the domain, the rarer it is.
-//        / / /   arch
+//     wall ─────────────────────────      Dense floes wedge between the body and what holds them at the sides: a
+//        \ \ \   arch                     wall, or the next image of the body in a periodic domain. The load of an
+//          ( body ) ──>                   arch of rigid floes has no upper bound but what the tow gives, and the wider
+//        / / /   arch                     the domain, the rarer it is. Floes that raft or crush bound it.
 //     wall ─────────────────────────
 //
 // The limits are assumed, after trials with rigid floes of friction 0.05 to 0.35: at 50 % the width does not show, at
@@ -18,21 +16,27 @@
 
 #include "bergtow/case.h"
 
-#define BT_ARCH_CONCENTRATION 0.7 ///< from which on arches are looked for, assumed
-#define BT_ARCH_WIDTHS 30.0       ///< body widths of domain from which on they are not expected, assumed
+#define BT_ARCH_CONCENTRATION 0.7   ///< from which on arches are looked for, assumed
+#define BT_BOUND_CONCENTRATION 0.75 ///< from which on rigid ice is said to have no upper bound of load, assumed
+#define BT_ARCH_WIDTHS 30.0         ///< body widths of domain from which on they are not expected, assumed
 
 typedef struct bt_arch {
     double concentration; ///< as given
     double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
     double floes;         ///< the same in mean floe sizes; NaN without floes
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
+    bool rigid;           ///< floes neither raft nor crush
+    bool unbounded;       ///< rigid and dense, around a towed body: no upper bound of its load
     const char *sides;    ///< "walls", "periodic images" or "open sides"
 } bt_arch;
 
 /// concentration, and mean floe size in m (0 without floes): as made, or as the case asks for.
 bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size);
 
-/// Tell of a width of which the answer is a property.
+/// "rigid floes" or "floes": of what the arches are.
+const char *bt_arch_floes(const bt_arch *a);
+
+/// Warn of a width of which the answer is a property, and of a load without an upper bound.
 void bt_arch_warn(const bt_arch *a, bt_errors *warnings);
 
 #endif

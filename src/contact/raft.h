@@ -47,9 +47,11 @@
 // projection leaves rafted overlap alone. Where ice crushes as well the smaller bound holds. A pair that has rafted
 // gives way in its area whichever law sets the bound; crushed depths are kept by pairs that have not.
 //
-// Between which bodies: floes of the field and by hand, also fixed ones, whose outlines are both convex. Not the towed
-// body (a deep hull does not raft), not walls, nothing without ice; a floe in convex parts stays rigid. Three floes on
-// one spot are treated pair by pair: the load of a third sheet on the other two is left out.
+// Between which bodies: floes of the field and by hand, also fixed ones, whose outlines are both convex. Not the
+// towed body (a deep hull does not raft), not walls, nothing without ice; a floe in convex parts stays rigid.
+// Several floes on one spot are treated pair by pair: N sheets of h make N(N − 1)/2 pairs, and (N h)² − N h² = N(N −
+// 1) h² is as many times what it is for two, so that the energy of a pile, and the buoyancy that presses its layers
+// together, come out right.
 #ifndef BERGTOW_RAFT_H
 #define BERGTOW_RAFT_H
 

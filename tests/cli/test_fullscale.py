@@ -25,7 +25,7 @@ def study(*arguments):
 def test_the_base_case_is_what_the_readme_says():
     result = call("check", ROOT / "cases/fullscale/berg.yml")
     assert result.returncode == DONE
-    for words in ("5000 x 2000 m", "1440 of 5 s", "0.5 m/s", "80.06 m across", "time step, contact   5 s", ": ok"):
+    for words in ("5000 x 2500 m", "1440 of 5 s", "0.5 m/s", "80.06 m across", "time step, contact   5 s", ": ok"):
         assert words in result.stdout.replace("body                 ", ""), words
     floes = next(line for line in result.stdout.splitlines() if line.startswith("floes"))
     assert int(floes.split()[-1]) > 10_000

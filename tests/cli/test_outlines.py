@@ -180,7 +180,9 @@ def test_hull_and_split_are_counted(tmp_path):
     assert same_ring(placed(r.dataset("/floes/vertices")[:8],
                             r.dataset("/frames/pose")[0, 0]), at(C_SHAPE, 5, 0), 1e-12)
     said = call("check", write_case(tmp_path, changed(BASE, ice__nonconvex="split"))).stdout
-    assert "1 floes in 3 convex parts" in said
+    assert "1 floes in 3 convex parts" in said and "stay rigid" not in said
+    said = call("check", write_case(tmp_path, changed(BASE, ice__nonconvex="split", ice__rafting={"kappa": 10}))).stdout
+    assert "ice.rafting: 1 floes are not convex" in said
 
 
 def test_many_vertices_become_a_hull(tmp_path):

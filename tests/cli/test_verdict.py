@@ -117,6 +117,18 @@ def test_the_width_of_the_domain_is_told(tmp_path):
     assert call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": -1}))).returncode == CASE
 
 
+def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
+    dense = changed(BERG, ice__concentration=0.8, run__duration=5)
+    words = "of rigid floes: from some 75 % on (assumed) they lock, and their load has no upper bound"
+    assert words in call("check", write_case(tmp_path, dense)).stdout
+    assert any(words in text for text in run(tmp_path, dense).summary["warnings"])
+    for looser in (changed(dense, ice__concentration=0.7), changed(dense, ice__rafting={"kappa": 10}),
+                   changed(dense, ice__crushing={"pressure": 1e5})):
+        assert "upper bound" not in call("check", write_case(tmp_path, looser)).stdout
+    yields = call("check", write_case(tmp_path, changed(dense, ice__rafting={"kappa": 10}))).stdout
+    assert "arches of floes POSSIBLE" in yields and "can carry arches of floes" in yields
+
+
 def test_packed_ice_that_reaches_the_end_wall_is_told(tmp_path):
     """In basin-80 it was seen at 180 to 200 s: a run of 165 s ends before it, one of 360 s does not."""
     basin = ROOT / "cases/basin/basin-80.yml"

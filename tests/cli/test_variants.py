@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: MIT
+"""Variants of a study against its first one: the change of the mean, its interval, and the picture."""
+import sys
+
+import numpy as np
+import pytest
+import yaml
+
+from harness import ROOT, call, write_case
+
+sys.path.insert(0, str(ROOT / "postproc"))
+
+import plot_ensemble  # noqa: E402
+import plot_variants  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
+
+BASE = {
+    "run": {"title": "t", "dt": 0.1, "duration": 6}, "domain": {"length": 16, "width": 8},
+    "ice": {"concentration": 0.3, "size": 1, "thickness": 0.1, "shape": "polygons"},
+    "body": {"shape": "disc", "length": 1.5, "draft": 0.3, "mass": 500, "x": 2},
+    "tow": {"mode": "speed", "speed": 0.5, "ramp": 1}, "output": {"window_start": 2}
+}
+
+
+@pytest.mark.parametrize("paired", [True, False])
+def test_the_interval_of_a_change_holds_the_true_one(paired):
+    """Fields with a mean of their own, which a comparison field by field takes out: 1.2 times the first variant."""
+    rng = np.random.default_rng(5)
+    held, half = 0, []
+    for _ in range(1500):
+        field = rng.normal(100, 20, 10)
+        other = field if paired else rng.normal(100, 20, 10)
+        base = dict(enumerate(field + rng.normal(0, 3, 10)))
+        means = dict(enumerate(1.2 * (other + rng.normal(0, 3, 10))))
+        change, width = plot_variants.relative_change(means, base, paired)
+        held += abs(change - 20) <= width
+        half.append(width)
+    assert 0.93 < held / 1500 < 0.97, held / 1500
+    assert np.median(half) < 5 if paired else 15 < np.median(half) < 40
+
+
+def test_too_few_fields_have_no_interval():
+    assert np.isnan(plot_variants.relative_change({1: 2.0}, {1: 1.0}, True)).all()
+    assert np.isnan(plot_variants.relative_change({1: 2.0}, {1: 1.0, 2: 3.0}, False)).all()
+
+
+@pytest.mark.parametrize("fields", ["common", "own"])
+def test_variants_of_a_study_are_drawn(tmp_path, fields):
+    write_case(tmp_path, BASE, "base.yml")
+    study = {
+        "base": "base.yml", "repeats": 3, "fields": fields,
+        "parameters": {"ice.concentration": [0.3, 0.5]},
+        "variants": {"first": {"ice.friction": 0.35}, "smooth": {"ice.friction": 0.05}, "thick": {"ice.thickness": 0.2}}
+    }
+    (tmp_path / "study.yml").write_text(yaml.safe_dump(study, sort_keys=False))
+    result = call("ensemble", "study.yml", "-o", "out", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    e = Ensemble(tmp_path / "out")
+    some = plot_variants.panels(e)
+    assert [words for words, *_ in some] == ["concentration 0.3", "concentration 0.5"]
+    for k, (_, first, mean, changes) in enumerate(some):
+        rows = {name: [m for m in e.used if e.parameters["variant"][m] == name and
+                       e.parameters["ice.concentration"][m] == (0.3, 0.5)[k]] for name in ("first", "smooth", "thick")}
+        means = {name: e.summary["mean_ice_resistance_n"][m].mean() for name, m in rows.items()}
+        assert (first, [name for name, *_ in changes]) == ("first", ["smooth", "thick"])
+        np.testing.assert_allclose(mean, means["first"], rtol=1e-12)
+        for name, of, change, half in changes:
+            np.testing.assert_allclose([of, change], [means[name], 100 * (means[name] / mean - 1)], rtol=1e-9)
+            assert half > 0
+        assert changes[1][2] > 20, "twice the mass of ice loads the body more"
+    plot_ensemble.main([str(tmp_path / "out")])
+    assert (tmp_path / "out/variants.png").stat().st_size > 10000
