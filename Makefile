@@ -58,8 +58,8 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale validation partition-study \
-        test test-long lint tidy validate asan tsan valgrind coverage fuzz
+.PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
+        validation test test-long lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)

@@ -140,16 +140,17 @@ def arching_case():
 
 def test_the_critical_concentration_is_found_again():
     """Fields that arch with the probability of a known law."""
-    rng, a, b, n = np.random.default_rng(5), 0.1, 6.0, 1.5
+    rng, a, b, n = np.random.default_rng(5), 0.035, 6.0, 1.5
     rows = []
     for ratio in (0.1, 0.15, 0.2, 0.25):
         for c in (0.2, 0.3, 0.4, 0.5, 0.6):
-            p = 1 / (1 + np.exp(-b * np.log(c / (a * ratio**-n * 0.35))))
-            rows.append({"ratio": ratio, "concentration": c, "runs": [{"arrest": bool(v)} for v in rng.random(400) < p]})
+            p = 1 / (1 + np.exp(-b * np.log(c / (a * ratio**-n))))
+            arrests = [{"arrest": bool(v)} for v in rng.random(400) < p]
+            rows.append({"ratio": ratio, "concentration": c, "runs": arrests})
     q = np.array(arching.critical(rows))
     assert q[2] / q[1] == pytest.approx(n, rel=0.06) and q[1] == pytest.approx(b, rel=0.1)
     for ratio in (0.1, 0.25):
-        assert arching.at_half(q, ratio) == pytest.approx(a * 0.35 * ratio**-n, rel=0.05)
+        assert arching.at_half(q, ratio) == pytest.approx(a * ratio**-n, rel=0.05)
 
 
 def test_wilson():
