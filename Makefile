@@ -59,7 +59,7 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 EXTENDED := $(BUILD)/tests/examples/extended
 
 .PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
-        test test-long lint tidy validate asan tsan valgrind coverage fuzz
+        validation test test-long lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -207,6 +207,12 @@ bench: deps ## time per floe and step over sizes, threads, ranks (BENCH=quick: a
 fullscale: deps ## resistance of an 80 m berg in 20 to 95 % ice beside the estimates: table, picture in out/fullscale
 	@$(AGAIN) CONFIG=release all
 	$(PYTHON) cases/fullscale/study.py concentration
+
+validation: deps ## the comparisons of cases/validation: tables, pictures in out/validation; an hour of one core
+	@$(AGAIN) CONFIG=release all
+	$(PYTHON) cases/validation/arching.py
+	$(PYTHON) cases/validation/barrier.py
+	$(PYTHON) cases/validation/ship.py
 
 lint: all ## names of external symbols, licence lines, length of lines, syntax; cppcheck, shellcheck, pyflakes
 	@tests/lint.sh
