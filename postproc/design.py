@@ -73,7 +73,7 @@ def _of_the_case(e, rows, case, tow):
         out.append(("the tow holds its speed whatever it takes: no vessel slows down, no line stretches", ""))
     narrow = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows)
     if narrow:
-        out.append(("the domain is narrow for this ice: the value belongs to its width, and `bergtow converge` says "
+        out.append(("the domain is narrow for this ice: the value belongs to its width, and bergtow converge says "
                     "how much", f"{narrow} of {len(rows)} members"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",

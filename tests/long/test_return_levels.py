@@ -3,7 +3,6 @@
 postproc/README.md (make test-long; half an hour on one core)."""
 import pytest
 
-import harness  # noqa: F401  (puts tests/ on the path)
 from signals_known import AR1, EAR1, POISSON, coverage
 
 TRIALS, TIMES = 200, (0.1, 1.0, 10.0, 40.0)
