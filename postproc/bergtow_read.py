@@ -456,6 +456,17 @@ class Run:
         "max_load", ... [P] N."""
         return self._once("panels", lambda: self._group("panels", "loads by panel were not kept"))
 
+    @property
+    def panel_series(self):
+        """{"units": of the loads on panels, "load": [S, P] their series where the run kept it (output.panels)}."""
+        group = self._file.get("panels")
+        if not isinstance(group, h5py.Group) or "mean_load" not in group:
+            return {}
+        out = {"units": str(_plain(group["mean_load"].attrs.get("units", "")))}
+        if "load" in group:
+            out["load"] = self._read("panels/load", ndim=2)
+        return out
+
     # ---- frames
 
     @property

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Statistics of an ensemble: means with intervals, estimates beside them, distributions, extreme peaks, sensitivity; as
-text, CSV and JSON.
+"""Statistics of an ensemble: the design tow force, loads with return levels, means with intervals, estimates beside
+them, distributions, peaks of collisions, sensitivity; as text, CSV and JSON.
 
 Printed as tables; statistics.csv (a row a condition) and statistics.json (everything) go into the ensemble's folder.
 Where members of the study are in no number (they wait, failed, are not sound, or have no mean), all is written, they
@@ -12,7 +12,9 @@ import json
 from pathlib import Path
 
 import command
+import design
 import ensemble_text
+import loads
 import soundness
 import stat_extreme
 import stat_fit
@@ -132,7 +134,7 @@ def condition(e, c, members, options):
     fields = stat_mean.between_fields(means, errors, options.error)
     values, none, pooled = samples(e, rows, members)
     quantiles = {str(p): np.percentile(pooled, p) for p in (5, 25, 50, 75, 95, 99)} if len(pooled) else {}
-    return {
+    out = {
         "index": c.index, "label": c.label, "values": c.values, "units": c.units, "members": {
             "all": len(c.members), "used": len(rows), "failed": c.failed, "waiting": c.waiting, "excluded": c.excluded,
             "doubts": {kind: sum(kind in e.doubts(m) for m in rows)
@@ -142,8 +144,10 @@ def condition(e, c, members, options):
         "fits_of_means": [stat_fit.as_dict(f) for f in stat_fit.fit_all(means, options.resamples)], "samples": {
             "independent": len(pooled), "not_above_zero": none, "percentiles": quantiles, "fitted": len(values),
             "fits": [stat_fit.as_dict(f) for f in stat_fit.fit_all(values, options.resamples)]
-        }, "extremes": extremes(e, rows, options)
+        }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options),
+        "panels": loads.panels(e, rows)
     }
+    return out | {"design": design.statement(e, rows, out)}
 
 
 def sensitivity(e, members):
@@ -223,7 +227,27 @@ def plain(value):
     return value
 
 
-def csv_row(c):
+def load_columns(c, names):
+    """Columns of the loads; the unit ends their names, as in summary.json."""
+    out = {}
+    for name, units in names.items():
+        x = c["loads"].get(name)
+        def column(what, value, name=name, units=units):
+            out[f"{name}_{what}_{units.lower()}"] = value
+        column("mean", x and x["mean"]["value"])
+        for k, end in enumerate(("low", "high")):
+            column(f"mean_{end}", x and x["mean"]["interval_95"][k])
+        column("sd", x and x["sd"]["value"])
+        column("p99", x and x["quantiles"]["99"]["value"])
+        column("largest", x and x["largest"])
+        column("design", x and x["design"].get("value"))
+        for k, end in enumerate(("low", "high")):
+            column(f"design_{end}", x and x["design"].get("interval_95", (None, None))[k])
+        out[f"{name}_time_scale_s"] = x and x["time_scale_s"]
+    return out
+
+
+def csv_row(c, load_names):
     """Flat columns of a condition; forces in N."""
     r = c["resistance"]
     row = {
@@ -241,6 +265,7 @@ def csv_row(c):
         row[name], row[f"{name}_valid"] = estimate["force"], estimate["valid"]
         if not estimate["on_top"]:
             row[f"simulated_over_{name}"] = estimate["ratio"]
+    row |= load_columns(c, load_names)
     return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
 
 
@@ -250,7 +275,8 @@ def write(s, folder):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "statistics.json").write_text(json.dumps(plain(s), indent=1, allow_nan=False) + "\n",
                                                 encoding="utf-8")
-        rows = [csv_row(c) for c in s["conditions"]]
+        names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
+        rows = [csv_row(c, names) for c in s["conditions"]]
         with open(folder / "statistics.csv", "w", newline="", encoding="utf-8") as f:
             table = csv.DictWriter(f, list(rows[0]))
             table.writeheader()
@@ -272,6 +298,31 @@ def whole(text):
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text} is below 1")
     return value
+
+
+def share(text):
+    value = float(text)
+    if not 0 < value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is not between 0 and 1")
+    return value
+
+
+def add_load_options(p):
+    """Options of the statistics of loads; their defaults are those of loads.py."""
+    p.add_argument("--time-scale",
+                   type=positive,
+                   metavar="S",
+                   help="loads are moving means over this time, s (default: 30 at full scale, by Froude's law at model "
+                        "scale: loads.py says why)")
+    p.add_argument("--tow-hours",
+                   type=positive,
+                   metavar="H",
+                   help="length of the tow that the design values are for, h (default: 24 at full scale)")
+    p.add_argument("--probability",
+                   type=share,
+                   default=loads.PROBABILITY,
+                   metavar="P",
+                   help="with which the design value is exceeded in such a tow (default %(default)s)")
 
 
 def main(argv=None):
@@ -298,7 +349,8 @@ def main(argv=None):
                    nargs="+",
                    default=[1.0, 10.0, 100.0],
                    metavar="T",
-                   help="return times of peaks, hours of tow (default 1 10 100)")
+                   help="return times of loads and peaks, hours of tow (default 1 10 100)")
+    add_load_options(p)
     p.add_argument("--threshold",
                    type=float,
                    metavar="N",

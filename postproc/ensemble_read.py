@@ -67,6 +67,10 @@ def short_key(key):
     return plain if name in ("concentration", "thickness") or section in ("", "run") else f"{section} {plain}"
 
 
+def _text(value):
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
 def listed(names, most=8):
     """Names in a row, the first of many."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
@@ -104,20 +108,22 @@ class Ensemble:
             self.parameters, self.units = {}, {}
             for key, data in f["parameters"].items():
                 self.parameters[key] = data[()] if data.dtype.kind == "f" else np.array(data.asstr()[()], dtype=object)
-                unit = data.attrs.get("units", "1")
-                self.units[key] = unit.decode() if isinstance(unit, bytes) else str(unit)
+                self.units[key] = _text(data.attrs.get("units", "1"))
             self.summary = {key: data[()] for key, data in f["summary"].items()}
             self.meaning = {
                 key: {k: v.decode() if isinstance(v, bytes) else v
                       for k, v in data.attrs.items()}
                 for key, data in f["summary"].items()
             }
-            self._series = {key: f[f"series/{key}"][()] for key in ("time", "ice_resistance")}
+            self._series = {key: data[()] for key, data in f["series"].items()}
+            self._told = {
+                key: [_text(data.attrs.get(what, "")) for what in ("label", "units", "description")]
+                for key, data in f["series"].items()
+            }
             self.study = f["study_resolved" if "study_resolved" in f else "study"][()]
-        self.study = self.study.decode() if isinstance(self.study, bytes) else str(self.study)
+        self.study = _text(self.study)
         self.n = len(self.name)
-        title = self.attributes.get("title", b"")
-        self.title = (title.decode() if isinstance(title, bytes) else str(title)) or self.path.resolve().name
+        self.title = _text(self.attributes.get("title", b"")) or self.path.resolve().name
 
     def _unsound(self):
         """{name: why} of members whose results are missing in part or damaged; from here on they wait."""
@@ -169,11 +175,20 @@ class Ensemble:
     def folder(self, m):
         return self.path / "members" / self.name[m]
 
-    def series(self, m):
-        """(time s, ice resistance N) of a member's whole run."""
-        time, ice = (self._series[key][m] for key in ("time", "ice_resistance"))
+    def has(self, name):
+        """Does ensemble.h5 hold this series of the members?"""
+        return name in self._series
+
+    def told(self, name):
+        """(label, units, description) of a series."""
+        label, *rest = self._told[name]
+        return (label or name.replace("_", " "), *rest)
+
+    def series(self, m, name="ice_resistance"):
+        """(time s, values) of a series over a member's whole run."""
+        time, x = (self._series[key][m] for key in ("time", name))
         there = np.isfinite(time)
-        return time[there], ice[there]
+        return time[there], x[there]
 
     def steady(self, m):
         """Ice resistance over the steady window that the member's summary names, N; empty where it names none."""
@@ -191,6 +206,10 @@ class Ensemble:
         except (OSError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
+
+    def texts(self, m):
+        """Warnings of a member in its own words; [] where its folder is not there."""
+        return [str(w) for w in self._texts(m).get("warnings") or []]
 
     @cached_property
     def _doubts(self):

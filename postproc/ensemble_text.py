@@ -2,33 +2,12 @@
 """The statistics of an ensemble as tables of text or Markdown."""
 import numpy as np
 
+import loads_text
 import style
 from ensemble_read import listed
+from text_table import number, pair, table
 
 DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
-
-
-def table(head, rows, markdown):
-    """Columns of a head and rows of texts; the first is left-aligned, the others right."""
-    if markdown:
-        return "\n".join("| " + " | ".join(cells) + " |"
-                         for cells in (head, ["---"] + ["---:"] * (len(head) - 1), *rows))
-    width = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
-    def line(cells):
-        return "  ".join([cells[0].ljust(width[0])] + [c.rjust(w) for c, w in zip(cells[1:], width[1:])]).rstrip()
-    return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
-
-
-def number(value, digits=3):
-    return "–" if value is None or not np.isfinite(value) else style.short(
-        value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
-
-
-def pair(values, factor=1.0):
-    low, high = values
-    if np.isnan([low, high]).any():
-        return "–"
-    return " to ".join("no bound" if np.isinf(v) else number(v / factor) for v in (low, high))
 
 
 def doubts(c):
@@ -232,9 +211,12 @@ def counted(n):
 def report(s, markdown=False):
     """Everything, section by section."""
     mark = "## " if markdown else ""
+    def heading(title):
+        return f"#{mark}{title}" if markdown else title
     n, whole = (sum(c["members"][key] for c in s["conditions"]) for key in ("used", "all"))
     lines = [
-        f"{mark}{s['title']}", "",
+        f"{mark}{s['title']}", "", heading("Design tow force"), "", loads_text.design(s, markdown), "",
+        heading("Members"), "",
         (f"{n} of " if n < whole else "") + f"{counted(whole)} in {len(s['conditions'])} conditions."
     ]
     if s["waiting"]:
@@ -289,7 +271,8 @@ def report(s, markdown=False):
     ]
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
-    for title, part in (("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
-                        ("Extreme peaks", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
-        lines += ["", f"#{mark}{title}" if markdown else title, "", part(s, markdown)]
+    for title, part in (("Loads", loads_text.signals), ("Return levels of loads", loads_text.returns),
+                        ("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
+                        ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
+        lines += ["", heading(title), "", part(s, markdown)]
     return "\n".join(lines)

@@ -4,6 +4,8 @@
     sweep-KEY.png     mean ice resistance against a number that was varied, a panel for each combination of the
                       others: every field, mean with 95 %, median, jams; the estimates beside concentration, the
                       law V^2 beside speed. A Latin hypercube: one panel, every member
+    returns-LOAD.png  level of each load that is exceeded once in a time, a line a condition, with the fitted tail and
+                      the design value
     exceedance.png    how often a peak of a collision is exceeded, a line a condition, with the fitted tail
     map.png           mean and its relative uncertainty over two numbers of a grid
     variants.png      what each variant does to the mean, against the first one (plot_variants.py)
@@ -14,13 +16,14 @@ import sys
 from pathlib import Path
 
 import command
+import loads
 import plot_resistance
 import plot_variants
 import stat_extreme
 import stat_mean
 import style
 from bergtow_read import RunError
-from ensemble import extremes, member, nothing_to_count, sensitivity
+from ensemble import add_load_options, extremes, member, nothing_to_count, sensitivity
 from ensemble_read import DOUBTS, Ensemble, short_key
 
 import matplotlib.pyplot as plt
@@ -404,6 +407,72 @@ def draw_exceedance(e, options):
     return figure
 
 
+def tail(f, hours):
+    """Levels of return times by the fitted tail of peaks over a threshold."""
+    return f["threshold"] + f["scale"] * stat_extreme.growth(f["shape"], np.maximum(f["rate_per_hour"] * hours, 1.0))
+
+
+def draw_return_line(axes, x, label, colour, factor, beside):
+    """Maxima of clusters at their empirical return times, the fitted tail, the design value `beside` its return
+    time."""
+    f = x["over_threshold"]
+    axes.plot(x["hours"] / np.arange(1, len(f["maxima"]) + 1), f["maxima"] / factor, ".", color=colour, markersize=4,
+              alpha=0.6)
+    ends = np.array([1 / f["rate_per_hour"], x["hours"], max(level["hours"] for level in f["levels"])])
+    for low, high, dashes in ((ends[0], min(ends[1:]), (None, None)), (ends[1], ends[2], (4, 2))):
+        if high > low:
+            t = np.geomspace(low, high, 100)
+            axes.plot(t, tail(f, t) / factor, color=colour, linewidth=1.4, dashes=dashes,
+                      label=label if dashes == (None, None) else None)
+    d = x["design"]
+    low, high = np.minimum(d["interval_95"], 1e3 * abs(d["value"])) / factor
+    axes.plot([d["return_hours"] * beside] * 2, [low, high], color=colour, linewidth=1.4)
+    axes.plot(d["return_hours"] * beside, d["value"] / factor, "D", color=colour, markersize=6)
+
+
+def draw_returns(e, conditions, name):
+    """Figure of the return levels of a load; None where no condition has a tail."""
+    some = [c for c in conditions if name in c["loads"] and "refused" not in c["loads"][name]["over_threshold"]]
+    if not some:
+        return None
+    step = max(1, -(-len(some) // MOST_LINES))
+    shown, first = some[::step], some[0]["loads"][name]
+    values = [c["loads"][name]["design"]["value"] for c in shown]
+    factor, unit = style.scale([np.median(values)], first["units"])
+    figure, axes = plt.subplots(figsize=(10.5, 6.4))
+    figure.subplots_adjust(left=0.09, right=0.66, top=0.86, bottom=0.14)
+    for k, (colour, c) in enumerate(zip(CYCLE, shown)):
+        x = c["loads"][name]
+        draw_return_line(axes, x, f"{c['label']}\n{x['fields']} fields, {x['hours']:.3g} h", colour, factor,
+                         1.1 ** (k - (len(shown) - 1) / 2))
+    axes.set_xscale("log")
+    floor = min(c["loads"][name]["over_threshold"]["threshold"] for c in shown) / factor
+    if wants_log(np.array(values) / factor) and floor > 0:
+        axes.set_yscale("log")
+        axes.set_ylim(0.8 * floor, 4 * max(values) / factor)
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    else:
+        axes.set_ylim(min(0.0, floor), 2.5 * max(values) / factor)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlabel("return time (hours of tow)")
+    axes.set_ylabel(f"{first['label']} ({unit}), mean over {first['time_scale_s']:.3g} s" if not first["conversion"] else
+                    f"{first['label']} ({unit}), collisions as {first['conversion']}")
+    axes.grid(True)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
+    d = first["design"]
+    notes = ["dots: clusters of the fields together", "lines: tail fitted to them (GPD), dashed",
+             "beyond the hours simulated",
+             f"diamond, side by side: exceeded with {100 * d['probability']:g} %",
+             f"in a tow of {d['tow_hours']:.3g} h; bars: 95 %"]
+    if step > 1:
+        notes.append(f"one in {step} of {len(some)} conditions is shown")
+    if len(some) < len(conditions):
+        notes.append(f"{len(conditions) - len(some)} without such a tail left out")
+    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    headline(figure, e, f"return levels of {first['label']}")
+    return figure
+
+
 def draw_map(e, first, second):
     """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 %
     interval over it."""
@@ -503,10 +572,19 @@ def draw_sensitivity(e, x):
     return figure
 
 
-def pictures(e, options):
-    """(name, function that draws it) of the pictures that the study supports."""
+def conditions_with_loads(e, options):
+    """What draw_returns needs of the conditions."""
+    return [{"label": c.label, "loads": loads.statistics(e, c.finished, options)} for c in e.conditions()]
+
+
+def pictures(e, options, conditions):
+    """(name, function that draws it) of the pictures that the study supports. conditions: with "label" and "loads", as
+    ensemble.py has them."""
     keys = numeric(e)
-    out = [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key))
+    names = dict.fromkeys(name for c in conditions for name, x in c["loads"].items()
+                          if "refused" not in x["over_threshold"])
+    out = [(f"returns-{name.replace('_', '-')}", lambda name=name: draw_returns(e, conditions, name)) for name in names]
+    out += [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key))
            for key in keys]
     if not e.sampled and len(keys) >= 2:
         out.append(("map", lambda: draw_map(e, keys[0], keys[1])))
@@ -532,8 +610,9 @@ def main(argv=None):
                    choices=sorted(DOUBTS),
                    default=[],
                    help="leave out members with this doubt; may be repeated")
+    add_load_options(p)
     a = p.parse_args(argv)
-    a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0], None, None, None, 1
+    a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0, 10.0, 100.0], None, None, None, 1
     e = Ensemble(a.folder)
     dropped = e.exclude(a.exclude) if a.exclude else {}
     for name, kinds in dropped.items():
@@ -542,7 +621,7 @@ def main(argv=None):
         raise nothing_to_count(e, dropped)
     if e.holes():
         print(f"plot_ensemble.py: warning: {e.holes()}", file=sys.stderr)
-    drawn = pictures(e, a)
+    drawn = pictures(e, a, conditions_with_loads(e, a))
     if not drawn:
         raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")
     for name, draw in drawn:

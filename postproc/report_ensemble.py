@@ -12,6 +12,8 @@ from itertools import groupby
 
 import ensemble
 import ensemble_text
+import loads
+import loads_text
 import plot_ensemble
 import report_case
 import report_run
@@ -22,11 +24,12 @@ from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
 import numpy as np
 
 STATUS = {FINISHED: "finished", FAILED: "failed"}
+WARNED = "WARNING: "
 MOST_FIGURES = 8  #: conditions whose means stand at the head of the page
 #: as ensemble.py has them
 OPTIONS = {
     "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
-    "resamples": stat_fit.RESAMPLES
+    "resamples": stat_fit.RESAMPLES, "time_scale": None, "tow_hours": None, "probability": loads.PROBABILITY
 }
 
 
@@ -36,7 +39,7 @@ def cells(line):
 
 def blocks(markdown):
     """The Markdown that ensemble_text writes as [{"kind": "heading", "text"}, {"kind": "table", "head", "rows"},
-    {"kind": "text", "lines"}]."""
+    {"kind": "text", "lines", "warnings"}]."""
     out = []
     lines = [line for line in markdown.splitlines() if line.strip()]
     for kind, some in groupby(lines,
@@ -48,31 +51,36 @@ def blocks(markdown):
         elif kind == "table":
             out.append({"kind": kind, "head": cells(some[0]), "rows": [cells(line) for line in some[2:]]})
         else:
-            out.append({"kind": kind, "lines": some})
+            warned = [line[len(WARNED):] for line in some if line.startswith(WARNED)]
+            out.append({"kind": kind, "lines": [line for line in some if not line.startswith(WARNED)],
+                        "warnings": warned})
     return out
 
 
 def sections(markdown):
-    """(lines that stand before the first section but for the title, [(heading, its blocks)])."""
+    """(lines of the section on the members, [(heading, blocks)] of all others)."""
     found = blocks(markdown)
     starts = [k for k, b in enumerate(found) if b["kind"] == "heading"]
-    intro = [line for b in found[starts[0] + 1:starts[1]] for line in b["lines"]]
-    return intro, [(found[a]["text"], found[a + 1:b]) for a, b in zip(starts[1:], [*starts[2:], len(found)])]
+    parts = [(found[a]["text"], found[a + 1:b]) for a, b in zip(starts[1:], [*starts[2:], len(found)])]
+    intro = [line for title, some in parts if title == "Members" for b in some for line in b["lines"]]
+    return intro, [part for part in parts if part[0] != "Members"]
 
 
 def figures(s):
-    """Means of the conditions for the head of the page: (label, number, what stands below it)."""
+    """Design tow forces of the conditions for the head of the page: (label, number, what stands below it)."""
     out = []
     for c in s["conditions"]:
-        r = c["resistance"]
-        if not r["n"]:
-            out.append((c["label"], "–", "no field finished"))
+        d = c["design"]["tow"]
+        if d is None:
+            out.append((c["label"], "–", "no field finished" if not c["resistance"]["n"] else "no tow force"))
             continue
-        low, high = r["t_95"]
-        between = f"95 % interval of the mean {report_run.force(low)} to {report_run.force(high)}, " if np.isfinite(
-            [low, high]).all() else ""
-        out.append((c["label"], report_run.force(r["mean"]),
-                    f"{between}median {report_run.force(r['median'])}, {r['n']} field{'s' if r['n'] > 1 else ''}"))
+        fields = f"{d['fields']} field{'s' if d['fields'] > 1 else ''}, mean {report_run.force(d['mean'])}"
+        if "refused" in d:
+            out.append((c["label"], "–", f"no value; largest simulated {report_run.force(d['largest'])}, {fields}"))
+            continue
+        low, high = (report_run.force(x) if np.isfinite(x) else "no bound" for x in d["interval_95"])
+        out.append((c["label"], report_run.force(d["value"]),
+                    f"95 % interval {low} to {high}{', extrapolated' if d['beyond_data'] else ''}; {fields}"))
     return out if len(out) <= MOST_FIGURES else []
 
 
@@ -139,18 +147,18 @@ def caption(name):
     """Words for a picture of plot_ensemble.py by its name, "sweep-ice-concentration"."""
     if name.startswith("sweep-"):
         return "Mean ice resistance against " + name[6:].replace("-", ".", 1)
+    if name.startswith("returns-"):
+        return f"How often the {name[8:].replace('-', ' ')} is exceeded"
     return {
         "map": "Mean ice resistance over two parameters, and its interval",
         "sensitivity": "What the mean ice resistance depends on", "exceedance": "How often a peak is exceeded"
     }.get(name, name)
 
 
-def pictures(e, options):
+def pictures(e, options, s):
     """The pictures of plot_ensemble.py that the study supports."""
-    return [
-        p for p in (report_run.picture(name, caption(name), draw) for name, draw in plot_ensemble.pictures(e, options))
-        if p
-    ]
+    drawn = plot_ensemble.pictures(e, options, s["conditions"])
+    return [p for p in (report_run.picture(name, caption(name), draw) for name, draw in drawn) if p]
 
 
 def context(folder):
@@ -165,7 +173,8 @@ def context(folder):
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     return {
         "title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []),
-        "figures": figures(s), "sections": found, "pictures": pictures(e, options), "members": members(e, s),
+        "figures": figures(s), "asked": loads_text.asked(s), "sections": found, "pictures": pictures(e, options, s),
+        "members": members(e, s),
         "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "key_values": key_values(e),
         "kinds": report_case.KINDS, "study": e.study, "provenance": rows
     }

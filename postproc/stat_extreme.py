@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Extreme peaks: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD), return levels with
-intervals.
+"""Extremes of peaks or of a signal: how often a level is exceeded, block maxima (GEV), peaks over a threshold (GPD),
+return levels with intervals.
+
+A field is a dict: time s [n] and peak [n], in order, start s, hours. The peaks are those of collisions, or all samples
+of a signal (stat_load.py): what follows is the same, since clusters count and not samples.
 
 A level z of return time T hours of tow is exceeded once in T hours on the average.
     empirical        rate(z) = number of peaks above z / hours
@@ -9,6 +12,8 @@ A level z of return time T hours of tow is exceeded once in T hours on the avera
                      is GPD of scale s and shape k: z = u + s ((L T)^k - 1)/k, L T > 1
 [Coles 2001, An introduction to statistical modeling of extreme values, ch. 3-5]
 Peaks above u closer to each other than the gap are one cluster: a floe that is pushed along hits again and again.
+A level that is exceeded with probability p in a tow of T hours is that of the return time T / -ln(1 - p), since
+clusters far up come like a Poisson process.
 
 Intervals: by profile likelihood, widened for dependence within a field and scatter between fields (stat_profile.py).
 With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
@@ -84,31 +89,40 @@ def block_maxima(time, peak, start, hours, blocks):
     return out
 
 
+def return_hours(probability, hours):
+    """Return time of the level that is exceeded with this probability in a tow of so many hours."""
+    return hours / -np.log1p(-probability)
+
+
 def _excesses(fields, threshold, gap):
     return [clusters(f["time"], f["peak"], threshold, gap) - threshold for f in fields]
 
 
-def choose_threshold(fields, pooled, gap):
+def choose_threshold(fields, pooled, gap, clusters_wanted=None):
     """The level that the share SHARE of the peaks exceeds, or lower, up to half of them, until there are LEAST_EXCESSES
-    clusters; None if there never are."""
-    ordered, count = np.sort(pooled)[::-1], max(int(SHARE * len(pooled)), LEAST_EXCESSES)
+    clusters; None if there never are. clusters_wanted, for a signal: the highest level with so many, or that with the
+    most of them."""
+    ordered, wanted = np.sort(pooled)[::-1], clusters_wanted or LEAST_EXCESSES
+    count, best = max(0 if clusters_wanted else int(SHARE * len(pooled)), wanted), (0, None)
     while count <= len(pooled) // 2:
         threshold = float(ordered[count])
-        if sum(len(y) for y in _excesses(fields, threshold, gap)) >= LEAST_EXCESSES:
+        found = sum(len(y) for y in _excesses(fields, threshold, gap))
+        if found >= wanted:
             return threshold
-        count = int(1.1 * count) + 1
-    return None
+        best = max(best, (found, threshold))
+        count = int((1.05 if clusters_wanted else 1.1) * count) + 1
+    return best[1] if best[0] >= LEAST_EXCESSES else None
 
 
-def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLES):
-    """Peaks over a threshold as a dict; {"refused": why} where there are too few. fields: dicts of time, peak, start,
-    hours."""
+def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAMPLES, what="collisions",
+                   clusters_wanted=None):
+    """Peaks over a threshold as a dict; {"refused": why} where there are too few. what: the peaks, in words."""
     pooled, hours = np.concatenate([f["peak"] for f in fields]), sum(f["hours"] for f in fields)
     if threshold is None:
-        threshold = choose_threshold(fields, pooled, gap)
+        threshold = choose_threshold(fields, pooled, gap, clusters_wanted)
         if threshold is None:
             return {
-                "refused": f"{len(pooled)} collisions do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
+                "refused": f"{len(pooled)} {what} do not make {LEAST_EXCESSES} clusters {gap:.3g} s apart above "
                            f"any threshold that half of them exceed at most; run longer, more fields, or a shorter "
                            f"--gap"
             }
@@ -120,7 +134,8 @@ def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLE
                        f"fields, or choose a lower --threshold"
         }
     scale, shape = gpd(excess)
-    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape, return_hours)
+    levels, shape_range = gpd_intervals(each, [f["hours"] for f in fields], threshold, scale, shape,
+                                        hours_of_levels)
     def refit(y):
         s, k = gpd(y)
         return stats.genpareto(k, scale=s)
@@ -133,7 +148,7 @@ def over_threshold(fields, return_hours, gap, threshold=None, resamples=RESAMPLE
         "p_value": stat_fit.p_value(statistic, frozen, len(excess), refit,
                                     resamples), "interval": interval_note(len(fields)),
         "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > hours)}
-                   for T, (z, ends) in zip(return_hours, levels)]
+                   for T, (z, ends) in zip(hours_of_levels, levels)]
     }
 
 
@@ -155,7 +170,7 @@ def gpd_minus_log_likelihood(log_scale, shape, y):
     return len(y) * log_scale + (1 + 1 / shape) * np.log(inside).sum()
 
 
-def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
+def gpd_intervals(each, hours, threshold, scale, shape, hours_of_levels):
     """([(level, (low, high)) of each return time], (low, high) of the shape). each: excesses by field.
 
     The rate of clusters stays at its estimate in the profile; its own error, from the counts of the fields, is in the
@@ -175,7 +190,7 @@ def gpd_intervals(each, hours, threshold, scale, shape, return_hours):
     def alone(theta):
         return np.sum(by_field(np.append(theta, best[2])))
     levels = []
-    for T in return_hours:
+    for T in hours_of_levels:
         if rate * T <= 1:
             levels.append((np.nan, (np.nan, np.nan)))
             continue
@@ -214,35 +229,41 @@ def rate_share(alone, by_field, level, best):
     return share if np.isfinite(share) and share >= 1 else 1.0
 
 
-def by_blocks(fields, return_hours, blocks=None, resamples=RESAMPLES):
-    """Block maxima as a dict; {"refused": why} where there are too few, or blocks without a collision."""
+def _blocks(fields, blocks):
+    """(maxima of the blocks of each field, hours of a block). Blocks are of one length: so many in the middle one of
+    the fields by length. What a field has beyond its whole blocks is left out."""
+    length, out = float(np.median([f["hours"] for f in fields])) / blocks, []
+    for f in fields:
+        count = int(f["hours"] / length + 0.01)
+        within = f["time"] <= f["start"] + 3600 * count * length * (1 + 1e-9)
+        out.append(block_maxima(f["time"][within], f["peak"][within], f["start"], count * length, count))
+    return out, length
+
+
+def by_blocks(fields, hours_of_levels, blocks=None, resamples=RESAMPLES, what="a collision"):
+    """Block maxima as a dict; {"refused": why} where there are too few, or blocks without a peak. blocks: of a field;
+    without it so many that there are LEAST_BLOCKS. what: a peak, in words."""
     n = len(fields)
-    blocks = blocks or int(np.ceil(LEAST_BLOCKS / n))
-    lengths = np.array([f["hours"] for f in fields]) / blocks
-    if np.ptp(lengths) > 0.01 * lengths.mean():
-        return {"refused": "the runs are of different lengths: blocks would be, too"}
-    each = [block_maxima(f["time"], f["peak"], f["start"], f["hours"], blocks) for f in fields]
+    each, length = _blocks(fields, blocks or int(np.ceil(LEAST_BLOCKS / n)))
     maxima = np.concatenate(each)
     empty = np.isnan(maxima)
     if len(maxima) < LEAST_BLOCKS:
         return {"refused": f"{len(maxima)} blocks, needs {LEAST_BLOCKS}; raise --blocks"}
     if empty.mean() > EMPTY:
-        return {
-            "refused": f"{empty.sum()} of {len(maxima)} blocks are without a collision; lower --blocks, or run longer"
-        }
-    length, total = float(lengths.mean()), sum(f["hours"] for f in fields)
+        return {"refused": f"{empty.sum()} of {len(maxima)} blocks are without {what}; lower --blocks, or run longer"}
+    total = sum(f["hours"] for f in fields)
     there = [x[np.isfinite(x)] for x in each]
     fitted = stat_fit.fit("GEV", np.concatenate(there), resamples)
     if fitted.refused:
         return {"refused": f"block maxima: {fitted.refused}"}
     location, scale, shape = (fitted.parameters[k] for k in ("location", "scale", "shape"))
-    levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in return_hours])
+    levels, shape_range = gev_intervals(there, location, scale, shape, [length / T for T in hours_of_levels])
     return {
         "blocks": len(maxima), "block_hours": length, "empty": int(empty.sum()), "location": location, "scale": scale,
         "shape": shape, "shape_95": shape_range, "irregular": bool(shape < IRREGULAR),
         "anderson_darling": fitted.anderson_darling, "p_value": fitted.p_value, "interval": interval_note(n),
         "levels": [{"hours": T, "level": z, "level_95": ends, "beyond_data": bool(T > total)}
-                   for T, (z, ends) in zip(return_hours, levels)]
+                   for T, (z, ends) in zip(hours_of_levels, levels)]
     }
 
 

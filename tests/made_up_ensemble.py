@@ -30,11 +30,12 @@ def told(name):
 
 
 def member(series, parameters, condition, **changes):
-    """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N)."""
+    """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N); more: further
+    series of result.h5, told: {name: attributes} of them; case: its text."""
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
         "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
-        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None
+        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {}, "told": {}, "case": None
     } | changes
 
 
@@ -86,7 +87,10 @@ def write_member(folder, m):
                 "stopped": None
             }))
     with h5py.File(folder / "result.h5", "w") as f:
-        f["case"] = f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
+        f["case"] = m["case"] or f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
+        for name, x in ({"time": np.arange(1.0, len(m["series"]) + 1)} | m["more"] if m["more"] else {}).items():
+            f[f"series/{name}"] = x
+            f[f"series/{name}"].attrs.update(m["told"].get(name, {"units": "s"}))
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
         f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
         f["impacts"].attrs["conversion"] = m["conversion"]
@@ -135,11 +139,12 @@ def write(folder, members, title="made up", sampling="grid"):
             f[f"summary/{key}"] = np.array([s.get(key, np.nan) for s in summaries])
             for name in (n for n in members[0]["estimates"] if key.startswith(f"estimates_{n}_")):
                 f[f"summary/{key}"].attrs.update({"estimate": name, "order": list(ESTIMATES).index(name), **told(name)})
-        time, ice = np.full((n, longest), np.nan), np.full((n, longest), np.nan)
+        time, ice, tow = (np.full((n, longest), np.nan) for _ in range(3))
         for i, (m, ok) in enumerate(zip(members, done)):
             if ok:
                 time[i, :len(m["series"])], ice[i, :len(m["series"])] = np.arange(1, len(m["series"]) + 1), m["series"]
-        for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", ice)):
+                tow[i, :len(m["series"])] = m["more"].get("tow_force", m["series"])
+        for key, values in (("time", time), ("ice_resistance", ice), ("tow_force", tow)):
             f.create_dataset(f"series/{key}", data=values).attrs["units"] = "s" if key == "time" else "N"
         f["study"], f["study_resolved"] = np.bytes_("{}"), np.bytes_(study)
         f.attrs["title"], f.attrs["program"], f.attrs["n_members"], f.attrs["complete"] = title, "bergtow", n, int(

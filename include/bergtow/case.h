@@ -232,7 +232,7 @@ typedef struct bt_case {
     } impact;
     struct {
         int64_t sample_every;    ///< steps per entry of the series
-        double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration
+        double frame_interval;   ///< s between frames; 0 becomes a 200th of the duration; negative: no frames
         double window_start;     ///< s, start of the steady window; negative = found from the series
         double progress;         ///< s of wall time between progress lines
         int64_t checkpoint_steps;///< steps between checkpoints, 0 = none by steps

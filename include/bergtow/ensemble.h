@@ -43,6 +43,8 @@ typedef struct bt_ensemble_options {
     bool retry;               ///< failed members are tried again
     /// end when nothing is left to begin, even if other processes are still at work on members
     bool leave;
+    int64_t max_steps;        ///< of each member in this call, 0 = all
+    double max_wall;          ///< of this call, s; 0 = no limit
     const char *command_line;
 } bt_ensemble_options;
 

@@ -20,6 +20,9 @@
 //     the same ice
 //     ranks: 1                             # MPI ranks that work on one member
 //
+// The keys, with defaults and ranges: src/case/study_keys.c, bergtow --list-keys. Members write no frames unless the
+// study sets output.frame_interval: eighty members of 300,000 floes with the frames of a single run would fill 630 GB.
+//
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
 // from (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later
 // without changing a member.
@@ -86,7 +89,14 @@ typedef struct bt_member {
 /// Read and check a study file; every error of the file is appended with file, line, key and remedy. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
+
+/// Values in place of those that the study or its base says, [n] "key=value", for all members. It is another study
+/// then. Errors: BT_ERR_CASE, also for a key that the study varies.
+bt_status bt_study_override(bt_study *s, const char *const *set, int n, bt_errors *err);
 void bt_study_free(bt_study *s);
+
+/// Are there ranks enough for a member? Errors: BT_ERR_CASE.
+bt_status bt_study_fits(const bt_study *s, int ranks, bt_errors *err);
 
 static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_conditions * s->repeats; }
 

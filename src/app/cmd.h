@@ -17,8 +17,9 @@ int bt_cmd_ensemble(int argc, char **argv);
 int bt_cmd_resume(int argc, char **argv);
 int bt_cmd_diff(int argc, char **argv);
 
-/// The case file and the overrides that every command takes.
+/// The case file, or the study, and the overrides that every command takes.
 typedef struct bt_cmd_case {
+    bool study;       ///< messages ask for a study
     const char *path;
     const char **set; ///< [n_set]
     int n_set;

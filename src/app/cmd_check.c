@@ -345,13 +345,11 @@ static bt_status print_twin(bt_case *c, double ratio, bt_errors *err)
     return BT_OK;
 }
 
-// What changes one case says nothing of which of a study's it changes.
 static bt_status check_study(const options *o, bt_errors *err)
 {
-    if (o->file.n_set == 0 && !(o->scale > 0)) return bt_check_study(o->file.path, err);
-    bt_errors_add(err, "%s: is a study, and %s is for a case; %s", o->file.path, o->scale > 0 ? "--scale" : "--set",
-                  o->scale > 0 ? "scale its base case, and give that as `base`"
-                               : "write what holds for all its members under `set` in the file");
+    if (!(o->scale > 0)) return bt_check_study(&o->file, bt_comm_world()->size, err);
+    bt_errors_add(err, "%s: is a study, and --scale is for a case; scale its base case, and give that as `base`",
+                  o->file.path);
     return BT_ERR_USAGE;
 }
 

@@ -3,6 +3,7 @@
 #ifndef BERGTOW_CMD_CHECK_H
 #define BERGTOW_CMD_CHECK_H
 
+#include "app/cmd.h"
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 #include "field/lead.h"
@@ -38,8 +39,8 @@ double bt_check_seconds(const bt_case *c, const bt_check_ice *n);
 /// Has the file a key `base` at its top, as no case has? False where it cannot be read. Pipes, which can be read only
 /// once, are cases.
 bool bt_check_is_study(const char *path);
-/// Check a study and the case of the first member of each condition; print what follows when all are valid. Errors:
-/// BT_ERR_CASE, BT_ERR_IO.
-bt_status bt_check_study(const char *path, bt_errors *err);
+/// Check a study and the case of the first member of each condition; print what follows when all are valid, on so many
+/// ranks. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err);
 
 #endif

@@ -263,7 +263,28 @@ static void print_range(const bt_study *s, const numbers *x)
     else printf("time step            ok\n");
 }
 
-static void print_study(const bt_study *s, const numbers *x)
+/// How many members run at a time, and what all of it takes then. ranks: that this call was started on, or 1.
+static void print_work(const bt_study *s, double memory, double disk, double seconds, int ranks)
+{
+    char text[CELL];
+    const int64_t groups = ranks / s->ranks;
+    if (groups < 1) printf("ranks                %" PRId64 " a member: start with mpirun -n %" PRId64 " or more\n",
+                           s->ranks, s->ranks);
+    else if (ranks > 1)
+        printf("ranks                %d: %" PRId64 " member%s at a time, %" PRId64 " rank%s each%s\n", ranks, groups,
+               groups > 1 ? "s" : "", s->ranks, s->ranks > 1 ? "s" : "",
+               ranks % s->ranks ? "; some ranks are left over" : "");
+    printf("memory               about %.3g MB for one member", memory / 1e6);
+    if (groups > 1) printf(", %.3g MB for %" PRId64 " at a time", memory / 1e6 * (double)groups, groups);
+    printf("\ndisk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9),
+           disk < 1e9 ? "MB" : "GB");
+    printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
+    if (groups >= 1 && ranks > 1)
+        printf("                     %s on %" PRId64 " ranks, each with a core\n",
+               duration(seconds / (double)(groups * s->ranks), text), groups * s->ranks);
+}
+
+static void print_study(const bt_study *s, const numbers *x, int ranks)
 {
     double seconds = 0, memory = 0, disk = 0;
     int64_t warned = 0;
@@ -289,22 +310,20 @@ static void print_study(const bt_study *s, const numbers *x)
     printf("\n");
     if (s->n_conditions <= MOST_ROWS) print_table(s, x);
     else print_range(s, x);
-    char text[CELL];
-    printf("memory               about %.3g MB for one member\n", memory / 1e6);
-    printf("disk                 about %.3g %s for all members and ensemble.h5\n", disk / (disk < 1e9 ? 1e6 : 1e9),
-           disk < 1e9 ? "MB" : "GB");
-    printf("wall time            rough estimate %s on one core for all members\n", duration(seconds, text));
+    print_work(s, memory, disk, seconds, ranks);
     if (warned) printf("%s: %s; `bergtow check` of the base with --set says which\n", s->path, verdict_of_all);
 }
 
-bt_status bt_check_study(const char *path, bt_errors *err)
+bt_status bt_check_study(const bt_cmd_case *file, int ranks, bt_errors *err)
 {
     bt_study s;
-    bt_status status = bt_study_read(&s, path, err);
+    bt_status status = bt_study_read(&s, file->path, err);
+    if (status == BT_OK) status = bt_study_override(&s, file->set, file->n_set, err);
+    if (status == BT_OK && ranks > 1) status = bt_study_fits(&s, ranks, err);
     if (status == BT_OK) {
         numbers *x = bt_alloc((size_t)s.n_conditions, sizeof *x);
         status = check_conditions(&s, x, err);
-        if (status == BT_OK) print_study(&s, x);
+        if (status == BT_OK) print_study(&s, x, ranks);
         free(x);
     }
     bt_study_free(&s);

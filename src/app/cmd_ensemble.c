@@ -8,16 +8,17 @@
 #include <string.h>
 
 typedef struct {
-    const char *path;
+    bt_cmd_case file; ///< the study, and what replaces values of it
     bt_ensemble_options run;
 } options;
 
-enum { KEY_RETRY = 256, KEY_LEAVE };
+enum { KEY_RETRY = 256, KEY_LEAVE, KEY_STEPS, KEY_WALL };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
     options *o = state->input;
     switch (key) {
+    case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
     case 'o':
         if (!*arg) argp_error(state, "-o: the name of the folder is empty; give one");
         o->run.dir = arg;
@@ -26,13 +27,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     case 'q': o->run.quiet = true; return 0;
     case KEY_RETRY: o->run.retry = true; return 0;
     case KEY_LEAVE: o->run.leave = true; return 0;
-    case ARGP_KEY_ARG:
-        if (o->path) argp_error(state, "%s: one study at a time; options with a value are written --option value", arg);
-        o->path = arg;
-        return 0;
-    case ARGP_KEY_END:
-        if (!o->path) argp_error(state, "no study file given; name one, as in cases/studies/basin.yml");
-        return 0;
+    case KEY_STEPS: o->run.max_steps = bt_cmd_number(state, "--steps", arg, 1, 1000000000); return 0;
+    case KEY_WALL: o->run.max_wall = bt_cmd_duration(state, "--max-wall", arg); return 0;
     default: return ARGP_ERR_UNKNOWN;
     }
 }
@@ -43,16 +39,23 @@ static const struct argp_option ensemble_options[] = {
      "OpenMP threads of each rank, default run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node "
      "shared by its ranks; results do not depend on it",
      0},
+    {"steps", KEY_STEPS, "N", 0, "stop each member after N steps of this call; the same call goes on", 0},
+    {"max-wall", KEY_WALL, "TIME", 0,
+     "write checkpoints of the members at hand and stop after this wall time, as in 2h, 90min or 600; the same call "
+     "goes on",
+     0},
     {"quiet", 'q', NULL, 0, "no line for each member", 0},
     {"retry-failed", KEY_RETRY, NULL, 0, "try failed members again", 0},
     {"no-wait", KEY_LEAVE, NULL, 0,
      "end when nothing is left to begin, with code 6 if other calls are still at work on members of the folder", 0},
     {0},
 };
+static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
 static const struct argp ensemble_argp = {
     .options = ensemble_options,
     .parser = parse,
     .args_doc = "STUDY.yml",
+    .children = children,
     .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one "
            "ended, however it "
            "ended. Results that are missing or damaged are run again; the exit code is 0 only when every member is "
@@ -61,18 +64,20 @@ static const struct argp ensemble_argp = {
 
 int bt_cmd_ensemble(int argc, char **argv)
 {
-    options o = {0};
+    options o = {.file = {.study = true}};
     char *command_line = bt_cmd_join(argc, argv);
     o.run.command_line = command_line;
     bt_cmd_parse(&ensemble_argp, argc, argv, &o);
     const bt_comm *comm = bt_comm_world();
-    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.path);
+    char *folder = o.run.dir ? NULL : bt_cmd_default_folder(o.file.path);
     if (folder) o.run.dir = folder;
     bt_study s;
     bt_errors err = {0};
-    bt_status status = bt_comm_agree(comm, bt_study_read(&s, o.path, &err));
+    bt_status status = bt_comm_agree(comm, bt_study_read(&s, o.file.path, &err));
+    if (status == BT_OK) status = bt_comm_agree(comm, bt_study_override(&s, o.file.set, o.file.n_set, &err));
     if (status == BT_OK) status = bt_ensemble_run(comm, &s, &o.run, &err);
     bt_study_free(&s);
+    free(o.file.set);
     free(folder);
     free(command_line);
     return bt_cmd_end(comm, status, &err);

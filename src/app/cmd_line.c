@@ -81,11 +81,15 @@ static error_t parse_case(int key, char *arg, struct argp_state *state)
         c->set[c->n_set++] = arg;
         return 0;
     case ARGP_KEY_ARG:
-        if (c->path) argp_error(state, "%s: one case at a time; options with a value are written --option value", arg);
+        if (c->path)
+            argp_error(state, "%s: one %s at a time; options with a value are written --option value", arg,
+                       c->study ? "study" : "case");
         c->path = arg;
         return 0;
     case ARGP_KEY_END:
-        if (!c->path) argp_error(state, "no case file given; name one, as in cases/basin/basin-80.yml");
+        if (!c->path)
+            argp_error(state, "no %s file given; name one, as in cases/%s", c->study ? "study" : "case",
+                       c->study ? "studies/basin.yml" : "basin/basin-80.yml");
         return 0;
     default: return ARGP_ERR_UNKNOWN;
     }

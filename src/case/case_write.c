@@ -71,6 +71,7 @@ static void list_keys(FILE *out, const bt_key *keys, int n)
         const char *unit = bt_units_bare(k->unit), *range = k->range ? k->range : "-";
         if (k->type == BT_KEY_INT) unit = "integer";
         if (k->type == BT_KEY_TEXT) unit = "text";
+        if (k->type == BT_KEY_MAP) unit = "map";
         if (k->type == BT_KEY_BOOL) unit = "bool", range = "true | false";
         if (k->type == BT_KEY_CHOICE) {
             unit = "choice";
@@ -96,6 +97,10 @@ void bt_case_list_keys(void *stream)
           "floes: is a list of floes given by hand, each a map with the keys\n\n",
           out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
+    fputs("\nA study file, for bergtow ensemble, has these keys in place of sections; maps are shown in "
+          "cases/studies/*.yml\n\n",
+          out);
+    list_keys(out, bt_study_keys, bt_n_study_keys);
     bt_largest_print(out);
 }
 
@@ -115,7 +120,8 @@ static void json_range(bt_json *j, const bt_key *k)
 static void json_keys(bt_json *j, const char *name, const bt_key *keys, int n)
 {
     static const char *const types[] = {[BT_KEY_REAL] = "real", [BT_KEY_INT] = "integer",   [BT_KEY_BOOL] = "bool",
-                                        [BT_KEY_TEXT] = "text", [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points"};
+                                        [BT_KEY_TEXT] = "text", [BT_KEY_CHOICE] = "choice", [BT_KEY_POINTS] = "points",
+                                        [BT_KEY_MAP] = "map"};
     bt_json_open(j, name, '[');
     for (int i = 0; i < n; i++) {
         const bt_key *k = &keys[i];
@@ -146,6 +152,7 @@ void bt_case_list_keys_json(void *stream)
     bt_json_open(&j, NULL, '{');
     json_keys(&j, "keys", bt_case_keys, bt_n_case_keys);
     json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
+    json_keys(&j, "study_keys", bt_study_keys, bt_n_study_keys);
     bt_json_close(&j, '}');
     fputs(j.text, stream);
     bt_json_free(&j);

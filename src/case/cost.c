@@ -81,6 +81,7 @@ static double entries_of(const bt_case *c)
 
 double bt_cost_frames(const bt_case *c)
 {
+    if (c->output.frame_interval < 0) return 0;
     const double steps = (double)bt_case_steps(c),
                  due = c->output.frame_interval > 0 ? c->run.duration / c->output.frame_interval : 0,
                  whole = floor(due * (1 + 1e-12));

@@ -57,7 +57,8 @@ static void refuse_range(const bt_case *c, const bt_key *k, double value, double
 static void scale_real(const bt_case *c, const bt_key *k, double *v, double ratio, bt_errors *err)
 {
     // A negative start of the window means that it is looked for.
-    if (isnan(*v) || (!strcmp(k->name, "output.window_start") && *v < 0)) return;
+    const bool found = !strcmp(k->name, "output.window_start") || !strcmp(k->name, "output.frame_interval");
+    if (isnan(*v) || (found && *v < 0)) return; // no time, but a word for one
     *v *= factor(k, ratio);
     bt_range r;
     bt_value_range(k, &r);
@@ -105,7 +106,8 @@ static void scale_members(const bt_case *c, const bt_key *keys, int n, void *bas
         }
         case BT_KEY_INT:
         case BT_KEY_BOOL:
-        case BT_KEY_CHOICE: break;
+        case BT_KEY_CHOICE:
+        case BT_KEY_MAP: break;
         }
     }
 }

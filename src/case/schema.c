@@ -409,8 +409,9 @@ bt_key bt_case_keys[] = {
         "axis"),
 
     INT("output.sample_every", output.sample_every, "1", "[1, 1e6]", "steps per entry of the series"),
-    REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[0, 1e9]",
-         "time between frames; 0 = a 200th of the duration"),
+    REAL("output.frame_interval", output.frame_interval, TIME, "0 s", "[-1, 1e9]",
+         "time between frames; 0 = a 200th of the duration, negative = no frames; the members of a study write none "
+         "unless it sets this key"),
     REAL("output.window_start", output.window_start, TIME, "-1 s", "[-1, 1e9]",
          "start of the window of all means, peaks, collisions and panel loads; negative = found from the series"),
     REAL("output.progress", output.progress, TIME, "5 s", "[0.01, 1e6]", "wall time between lines of progress"),

@@ -13,6 +13,7 @@ typedef enum {
     BT_KEY_TEXT,   ///< char *, owned; NULL = none
     BT_KEY_CHOICE, ///< an enum, index into choices
     BT_KEY_POINTS, ///< double *, owned, [count][2]; count is an int
+    BT_KEY_MAP,    ///< keys and what goes with them; of a study alone
 } bt_key_type;
 
 typedef struct bt_key {
@@ -34,6 +35,8 @@ extern bt_key bt_case_keys[];        ///< the keys of bt_case; written by bt_sch
 extern int bt_n_case_keys;
 extern const bt_key bt_floe_keys[];  ///< the keys of one entry of the list `floes:`
 extern const int bt_n_floe_keys;
+extern const bt_key bt_study_keys[]; ///< the keys of a study file; read by src/run/study.c
+extern const int bt_n_study_keys;
 
 /// Add a key with a real value to bt_case_keys, before any case is read: the member bt_case.extra[its result] holds the
 /// value. The texts stay the caller's and must outlive every case. offset and type are set here. −1 with the reason in

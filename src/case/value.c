@@ -173,7 +173,8 @@ bool bt_value_read(const bt_key *k, void *base, const char *text, bool plain, ch
     case BT_KEY_INT: return read_int(k, base, text, why);
     case BT_KEY_BOOL: return read_bool(k, base, text, why);
     case BT_KEY_CHOICE: return read_choice(k, base, text, why);
-    case BT_KEY_POINTS: break;
+    case BT_KEY_POINTS:
+    case BT_KEY_MAP: break;
     }
     snprintf(why, BT_WHY, "needs a list of points; give it as [[x, y], [x, y], ...]");
     return false;
@@ -236,6 +237,7 @@ void bt_value_write(const bt_key *k, const void *base, FILE *out)
         else fputs("none", out);
         break;
     }
+    case BT_KEY_MAP: break;
     case BT_KEY_POINTS: {
         const double *p;
         int n;

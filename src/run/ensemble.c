@@ -32,6 +32,7 @@ typedef struct {
     char *folder;
     double cost;   ///< estimated, s of one core
     bool settled;  ///< finished or failed, as far as this process knows
+    bool paused;   ///< has done the steps that this call was to do
     int attempts;  ///< starts without an end
 } entry;
 
@@ -42,7 +43,7 @@ typedef struct {
     entry *list;        ///< [n] in the order in which they are taken
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
-    int n_groups, threads, lock; ///< lock: descriptor held for the member at hand
+    int n_groups, of_group, threads, lock; ///< lock: descriptor held for the member at hand
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded
@@ -71,6 +72,12 @@ static void journal(const ensemble *e, const char *event, const bt_member *m, do
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
     close(fd);
+}
+
+/// The wall time that is left, s; infinite where none was given.
+static double left_of_wall(const ensemble *e)
+{
+    return e->o->max_wall > 0 ? e->o->max_wall - (bt_clock() - e->began) : INFINITY;
 }
 
 // --- the list --------------------------------------------------------------------------------------------------------
@@ -301,13 +308,19 @@ static int lock_member(ensemble *e, entry *x)
     return -1;
 }
 
+/// With a limit of steps each group has members of its own: one that has paused looks like one that waits.
+static bool is_for_another(const ensemble *e, const entry *x)
+{
+    return e->o->max_steps > 0 && (x->paused || x->index % e->n_groups != e->of_group);
+}
+
 /// Take the lock of the next member that is free; −1 = none. On the first rank of a group.
 static int64_t claim(ensemble *e)
 {
     for (int64_t i = 0; i < e->n; i++) {
         entry *x = &e->list[i];
         look(x);
-        if (x->settled || (suspect(x) && !may_take_suspects(e))) continue;
+        if (x->settled || is_for_another(e, x) || (suspect(x) && !may_take_suspects(e))) continue;
         const int fd = lock_member(e, x);
         if (fd < 0) continue;
         look(x); // it may have been finished between the look and the lock
@@ -359,6 +372,7 @@ static bt_status run_member(ensemble *e, entry *x)
     const double t0 = bt_clock();
     bt_errors why = {0};
     bt_status status = BT_OK;
+    int64_t n_steps = 0;
     if (first && x->attempts >= BT_MAX_ATTEMPTS) {
         bt_errors_add(&why, "%s: its process died in each of %d attempts; run the case alone to see why", x->m.name,
                       x->attempts);
@@ -375,10 +389,13 @@ static bt_status run_member(ensemble *e, entry *x)
         bt_case c;
         status = bt_member_case(e->s, &x->m, &c, &why);
         status = bt_comm_agree(e->group, status);
+        if (status == BT_OK) n_steps = bt_case_steps(&c);
         const bt_run_options o = {.dir = x->folder,
                                   .threads = e->threads,
                                   .quiet = true,
                                   .dump_step = -1,
+                                  .max_steps = e->o->max_steps,
+                                  .max_wall = e->o->max_wall > 0 ? bt_max(1e-3, left_of_wall(e)) : 0,
                                   .told = &told,
                                   .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
@@ -388,17 +405,19 @@ static bt_status run_member(ensemble *e, entry *x)
     if (first) {
         const double wall = bt_clock() - t0;
         bt_member_forget_attempts(x->folder);
-        if (status == BT_OK) {
+        x->paused = status == BT_OK && e->o->max_steps > 0 && !bt_member_is_whole(x->folder, n_steps);
+        if (status == BT_OK && !x->paused) {
             status = bt_member_record_write(&e->records, x->index, x->m.name, x->folder, &why);
             if (status == BT_OK) bt_checkpoint_remove(x->folder);
         }
         if (status != BT_OK && status != BT_ERR_SIGNAL) settle_failed(e, x, status, &why);
         journal(e,
-                status == BT_OK           ? "finished"
+                x->paused                 ? "stopped"
+                : status == BT_OK         ? "finished"
                 : status == BT_ERR_SIGNAL ? "stopped"
                                           : "failed",
                 &x->m, wall, (int)status);
-        if (status != BT_ERR_SIGNAL) say(e, x, status, wall);
+        if (status != BT_ERR_SIGNAL && !x->paused) say(e, x, status, wall);
     }
     bt_errors_free(&why);
     return status;
@@ -407,7 +426,7 @@ static bt_status run_member(ensemble *e, entry *x)
 static bt_status work(ensemble *e)
 {
     for (;;) {
-        const bool stop = bt_comm_any(e->group, told != 0);
+        const bool stop = bt_comm_any(e->group, told != 0 || left_of_wall(e) <= 0);
         if (stop) return BT_ERR_SIGNAL;
         int64_t i = e->group->rank == 0 ? claim(e) : 0;
         bt_comm_bcast(e->group, &i, sizeof i);
@@ -482,8 +501,8 @@ static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
     if (n.unsound > MOST_TOLD)
         bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
     if (status == BT_ERR_SIGNAL)
-        bt_errors_add(err, "stopped by a signal; the same call goes on with the %" PRId64 " members that are left",
-                      n.left);
+        bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
+                      left_of_wall(e) <= 0 ? "the limit of wall time" : "a signal", n.left);
     else if (n.at_work)
         bt_errors_add(
             err,
@@ -542,14 +561,7 @@ static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt
 
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
 {
-    bt_status status = BT_OK;
-    if (s->ranks > comm->size) {
-        bt_errors_add(err,
-                      "%s: ranks: a member asks for %" PRId64
-                      " ranks and there are %d; start more with mpirun -n, or lower it",
-                      s->path, s->ranks, comm->size);
-        status = BT_ERR_CASE;
-    }
+    bt_status status = bt_study_fits(s, comm->size, err);
     bt_member_records records = {0};
     int threads = 1;
     if (status == BT_OK) status = choose_threads(comm, s, o, &threads, err);
@@ -572,6 +584,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
                   .gathered = bt_clock(),
                   .err = err,
                   .n_groups = comm->size / (int)s->ranks,
+                  .of_group = comm->rank / (int)s->ranks,
                   .alone = -1};
     e.threads = threads;
     e.records = records;
@@ -597,7 +610,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         if (!idle) status = work(&e);
         bt_comm_rest(comm);
         status = bt_comm_agree(comm, status);
-        others = status == BT_OK && !o->leave && wait_for_others(&e, others);
+        others = status == BT_OK && !o->leave && o->max_steps == 0 && wait_for_others(&e, others);
     } while (others);
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
     if (e.alone >= 0) close(e.alone);

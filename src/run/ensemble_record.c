@@ -95,6 +95,16 @@ static bt_status check_summary(const char *folder, bt_errors *err)
     return status;
 }
 
+bool bt_member_is_whole(const char *folder, int64_t n_steps)
+{
+    char *path = bt_file_join(folder, "summary.json");
+    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
+    const bool whole = json_integer_value(json_object_get(root, "n_steps")) >= n_steps;
+    json_decref(root);
+    free(path);
+    return whole;
+}
+
 bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err)
 {
     char text[MOST_TEXT], *result = bt_file_join(folder, "result.h5"), *path = bt_file_join(folder, RECORD);

@@ -36,6 +36,9 @@ void bt_member_records_end(bt_member_records *r);
 /// a run leaves, or it cannot be written.
 bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
 
+/// Does the summary in this folder tell of so many steps? A run that was limited to fewer has one, too.
+bool bt_member_is_whole(const char *folder, int64_t n_steps);
+
 /// Do the files fit the record? They are read whole, once: later only when their stamp has changed. Errors:
 /// BT_ERR_CASE, they are missing or damaged; BT_ERR_IO, the system does not let them be read, which says nothing of
 /// them.

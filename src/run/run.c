@@ -150,6 +150,7 @@ static void measure_memory(run *r)
 /// A frame at the first step at or after each multiple of the interval, and at the end.
 static bt_status frame_if_due(run *r, double time, bt_errors *err)
 {
+    if (!bt_running_draws(r->c)) return BT_OK;
     const double interval = bt_running_frame_interval(r->c);
     const bool due = time >= (double)r->frames_due * interval * (1 - 1e-12), whole = r->w->step == bt_case_steps(r->c);
     if (!due && r->w->step != r->end_step) return BT_OK;
@@ -254,8 +255,9 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
     bt_halt_begin(&r->halt);
     r->began = bt_clock();
     if (!kept) {
-        r->frames = r->frames_due = 1;
-        status = record_frame(r, err);
+        r->frames_due = 1;
+        r->frames = bt_running_draws(r->c);
+        if (r->frames) status = record_frame(r, err);
     }
     if (status == BT_OK) status = loop(r, err);
     bt_progress_end(&r->progress);

@@ -44,6 +44,8 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
 
 /// Time between frames, s.
 double bt_running_frame_interval(const bt_case *c);
+/// Does the case ask for frames at all?
+static inline bool bt_running_draws(const bt_case *c) { return c->output.frame_interval >= 0; }
 
 /// The case and the field of a checkpoint. Errors: BT_ERR_CASE.
 bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err);

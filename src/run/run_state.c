@@ -117,17 +117,27 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
     return s->faulty ? BT_ERR_CASE : BT_OK;
 }
 
-/// What the loop of the run goes by.
-static void check_counters(const bt_running *r, bt_snapshot *s)
+static void check_frames(const bt_running *r, bt_snapshot *s)
 {
-    const bt_phases *p = &r->totals.phases;
-    const bt_stall *t = &r->totals.stall;
+    if (!bt_running_draws(r->c)) {
+        bt_snapshot_want(s, r->frames_due == 1, "run/frames_due", -1, "is not that of a run without frames");
+        bt_snapshot_want(s, r->frames == 0, "record/frames", -1, "is not that of a run without frames");
+        return;
+    }
     const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12),
                  time = (double)bt_snapshot_int(s, "world/step") * r->c->run.dt, due = (double)r->frames_due;
     bt_snapshot_want(s, r->frames_due >= 1 && (due - 1) * interval <= time && time < due * interval, "run/frames_due",
                      -1, "is not the number of the next frame");
     bt_snapshot_want(s, r->frames >= 1 && r->frames <= r->frames_due + 1, "record/frames", -1,
                      "is no number of frames up to here");
+}
+
+/// What the loop of the run goes by.
+static void check_counters(const bt_running *r, bt_snapshot *s)
+{
+    const bt_phases *p = &r->totals.phases;
+    const bt_stall *t = &r->totals.stall;
+    check_frames(r, s);
     bt_snapshot_want(s, r->guard.in_a_row >= 0 && r->guard.in_a_row <= BT_MOST_STEPS, "run/unconverged_in_a_row", -1,
                      "is no number of steps");
     bt_snapshot_want(s,

@@ -16,14 +16,13 @@
 #include "base/tree.h"
 #include "case/value.h"
 
-static const char *const words[] = {"title",   "base",    "set",  "parameters", "variants", "with", "sampling",
-                                    "samples", "repeats", "seed", "fields",     "ranks",    NULL};
-static const char *const samplings[] = {"grid", "latin-hypercube", NULL};
-static const char *const fields[] = {"own", "common", NULL};
+/// Members write no frames unless the study sets this: what it says comes later, and counts.
+static const char no_frames[] = "output.frame_interval=-1 s";
 
 typedef struct {
     bt_study *s;
     bt_errors *err;
+    const char *place; ///< of what is read, in place of file and line; or NULL
 } reader;
 
 #define COMPLAIN(r, line, ...) complain(r, line, __VA_ARGS__)
@@ -35,7 +34,8 @@ static void complain(const reader *r, int line, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    bt_errors_add(r->err, "%s:%d: %s", r->s->path, line, text);
+    if (r->place) bt_errors_add(r->err, "%s: %s", r->place, text);
+    else bt_errors_add(r->err, "%s:%d: %s", r->s->path, line, text);
 }
 
 static char *print(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
@@ -216,12 +216,19 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
     }
 }
 
+/// The place of `key` in the list of `set`; −1 where it is not there.
+static int find_set(const bt_study *s, const char *key)
+{
+    const size_t n = strlen(key);
+    for (int i = 0; i < s->n_set; i++)
+        if (!strncmp(s->set[i], key, n) && s->set[i][n] == '=') return i;
+    return -1;
+}
+
 static bt_study_parameter *add_parameter(const reader *r, int line, const char *name, int key)
 {
     bt_study *s = r->s;
-    for (int i = 0; i < s->n_set; i++)
-        if (!strncmp(s->set[i], name, strlen(name)) && s->set[i][strlen(name)] == '=')
-            COMPLAIN(r, line, "%s: is varied and stands in `set` too; remove it there", name);
+    if (find_set(s, name) >= 0) COMPLAIN(r, line, "%s: is varied and stands in `set` too; remove it there", name);
     if (s->n_parameters == BT_MAX_PARAMETERS) {
         COMPLAIN(r, line, "more than %d parameters; make several studies", BT_MAX_PARAMETERS);
         return NULL;
@@ -359,11 +366,28 @@ static const bt_node *entry(const bt_node *root, const char *word, int *line)
     return NULL;
 }
 
-/// Place of the word given for a key in its list of two, 0 where there is none.
-static int read_choice(const reader *r, const bt_node *root, const char *key, const char *const *list)
+static const bt_key *row_of(const char *key)
+{
+    return &bt_study_keys[bt_schema_find(bt_study_keys, bt_n_study_keys, key)];
+}
+
+/// The whole number given for a key, within the range of its row; out is left alone where there is none.
+static bool read_number(const reader *r, const bt_node *root, const char *key, int64_t *out)
 {
     int line;
     const bt_node *node = entry(root, key, &line);
+    bt_range range;
+    if (!node || !bt_value_range(row_of(key), &range)) return false;
+    read_whole(r, node, line, key, (int64_t)range.lo, (int64_t)range.hi, out);
+    return true;
+}
+
+/// Place of the word given for a key in its list of two, 0 where there is none.
+static int read_choice(const reader *r, const bt_node *root, const char *key)
+{
+    int line;
+    const bt_node *node = entry(root, key, &line);
+    const char *const *list = row_of(key)->choices;
     if (!node || !scalar(r, node, line, key)) return 0;
     for (int k = 0; list[k]; k++)
         if (!strcmp(list[k], node->text)) return k;
@@ -371,18 +395,35 @@ static int read_choice(const reader *r, const bt_node *root, const char *key, co
     return 0;
 }
 
+static void check_words(const reader *r, const bt_node *root)
+{
+    for (int i = 0; i < root->n; i++) {
+        if (bt_schema_find(bt_study_keys, bt_n_study_keys, root->key[i]) >= 0) continue;
+        char buffer[64];
+        const char *near = bt_schema_suggest(bt_study_keys, bt_n_study_keys, root->key[i], buffer);
+        COMPLAIN(r, root->key_line[i], "%.60s: unknown key of a study; %s%s", root->key[i],
+                 near ? "did you mean " : "see bergtow --list-keys", near ? near : "");
+    }
+}
+
+/// Put "key=value" at the end of `set`, or at its beginning, where all that the study says comes later.
+static void add_set(bt_study *s, const char *text, const char *at, bool first)
+{
+    s->set = bt_realloc(s->set, (size_t)s->n_set + 1, sizeof *s->set);
+    s->set_at = bt_realloc(s->set_at, (size_t)s->n_set + 1, sizeof *s->set_at);
+    const int k = first ? 0 : s->n_set;
+    memmove(s->set + k + 1, s->set + k, (size_t)(s->n_set - k) * sizeof *s->set);
+    memmove(s->set_at + k + 1, s->set_at + k, (size_t)(s->n_set - k) * sizeof *s->set_at);
+    s->set[k] = strdup(text);
+    s->set_at[k] = at ? strdup(at) : NULL;
+    s->n_set++;
+}
+
 static void read_entries(const reader *r, const bt_node *root)
 {
     bt_study *s = r->s;
     int line = 1;
-    for (int i = 0; i < root->n; i++) {
-        bool known = false;
-        for (int j = 0; words[j] && !known; j++) known = !strcmp(words[j], root->key[i]);
-        if (known) continue;
-        const char *near = bt_suggest(root->key[i], words);
-        COMPLAIN(r, root->key_line[i], "%.60s: unknown key of a study; %s%s", root->key[i],
-                 near ? "did you mean " : "see include/bergtow/study.h", near ? near : "");
-    }
+    check_words(r, root);
     const bt_node *node = entry(root, "title", &line);
     if (node && scalar(r, node, line, "title")) s->title = strdup(node->text);
     if ((node = entry(root, "base", &line)) && scalar(r, node, line, "base")) {
@@ -398,15 +439,14 @@ static void read_entries(const reader *r, const bt_node *root)
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
     if ((node = entry(root, "with", &line))) read_with(r, node, line);
-    s->sampling = (bt_sampling)read_choice(r, root, "sampling", samplings);
-    s->common_fields = read_choice(r, root, "fields", fields) == 1;
-    const int64_t most = BT_MAX_MEMBERS;
-    if ((node = entry(root, "samples", &line))) read_whole(r, node, line, "samples", 1, most, &s->samples);
-    else if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
+    s->sampling = (bt_sampling)read_choice(r, root, "sampling");
+    s->common_fields = read_choice(r, root, "fields") == 1;
+    if (!read_number(r, root, "samples", &s->samples) && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
         bt_errors_add(r->err, "%s: samples: missing; a Latin hypercube needs the number of its conditions", s->path);
-    if ((node = entry(root, "repeats", &line))) read_whole(r, node, line, "repeats", 1, most, &s->repeats);
-    if ((node = entry(root, "seed", &line))) read_whole(r, node, line, "seed", 0, INT64_MAX, &s->seed);
-    if ((node = entry(root, "ranks", &line))) read_whole(r, node, line, "ranks", 1, 1 << 20, &s->ranks);
+    read_number(r, root, "repeats", &s->repeats);
+    read_number(r, root, "seed", &s->seed);
+    read_number(r, root, "ranks", &s->ranks);
+    if (find_set(s, "output.frame_interval") < 0) add_set(s, no_frames, NULL, true);
 }
 
 bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
@@ -416,7 +456,7 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
     size_t size;
     bt_status status = bt_file_read(path, "a study file", &s->text, &size, err);
     if (status != BT_OK) return status;
-    const reader r = {s, err};
+    const reader r = {.s = s, .err = err};
     bt_node *root = bt_tree_parse(s->text, size, path, err);
     if (root && (root->kind != BT_NODE_MAP || !root->n))
         bt_errors_add(err, "%s: is not a study; it needs at least base: CASE.yml", path);
@@ -425,6 +465,73 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
     if (err->n == before) count_conditions(&r);
     if (err->n == before && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) draw_strata(s);
     return err->n == before ? BT_OK : BT_ERR_CASE;
+}
+
+/// What the study varies, or sets for some members alone, would win over `set`: where that is, NULL = nowhere.
+static const char *varied(const bt_study *s, const char *key)
+{
+    const size_t n = strlen(key);
+    for (int p = 0; p < s->n_parameters; p++)
+        if (!strcmp(s->parameter[p].name, key)) return "parameters";
+    for (int k = 0; k < 2; k++) {
+        const bt_study_variant *v = k ? s->with : s->variant;
+        for (int i = 0; i < (k ? s->n_with : s->n_variants); i++)
+            for (int j = 0; j < v[i].n_set; j++)
+                if (!strncmp(v[i].set[j], key, n) && v[i].set[j][n] == '=') return k ? "with" : "variants";
+    }
+    return NULL;
+}
+
+/// One "key=value" in place of, or beside, what `set` says.
+static void take_override(bt_study *s, const char *text, bt_errors *err)
+{
+    const char *equals = strchr(text, '=');
+    if (!equals || equals == text) {
+        bt_errors_add(err, "--set %.80s: is not key=value; write --set run.duration=600", text);
+        return;
+    }
+    char place[140], name[96];
+    snprintf(place, sizeof place, "--set %.120s", text);
+    const size_t n = strcspn(text, " =");
+    snprintf(name, sizeof name, "%.*s", n < 90 ? (int)n : 90, text);
+    const char *value = equals + 1 + strspn(equals + 1, " ");
+    const reader r = {.s = s, .err = err, .place = place};
+    const int key = find_key(&r, 0, "", name);
+    const bt_node node = {.kind = BT_NODE_SCALAR, .text = (char *)value, .plain = true};
+    if (key < 0 || !check_value(&r, 0, name, key, &node)) return;
+    const char *where = varied(s, name);
+    if (where) {
+        COMPLAIN(&r, 0, "%s: stands under `%s` of %s, which would win; change it there", name, where, s->path);
+        return;
+    }
+    const int k = find_set(s, name);
+    if (k >= 0) {
+        free(s->set[k]);
+        free(s->set_at[k]);
+        s->set[k] = print("%s=%s", name, value);
+        s->set_at[k] = strdup("--set: ");
+        return;
+    }
+    char *given = print("%s=%s", name, value);
+    add_set(s, given, "--set: ", false);
+    free(given);
+}
+
+bt_status bt_study_override(bt_study *s, const char *const *set, int n, bt_errors *err)
+{
+    const size_t before = err->n;
+    for (int i = 0; i < n; i++) take_override(s, set[i], err);
+    return err->n == before ? BT_OK : BT_ERR_CASE;
+}
+
+bt_status bt_study_fits(const bt_study *s, int ranks, bt_errors *err)
+{
+    if (s->ranks <= ranks) return BT_OK;
+    bt_errors_add(err,
+                  "%s: ranks: a member asks for %" PRId64
+                  " ranks and there are %d; start more with mpirun -n, or lower it",
+                  s->path, s->ranks, ranks);
+    return BT_ERR_CASE;
 }
 
 static void free_texts(char **text, int n)
@@ -548,7 +655,7 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     if (!out) abort();
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
                  "study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, samplings[s->sampling],
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, row_of("sampling")->choices[s->sampling],
             s->n_conditions, s->common_fields ? "fields: common\n" : "");
     for (int p = 0; p < s->n_parameters; p++) {
         fprintf(out, "%s:", s->parameter[p].name);

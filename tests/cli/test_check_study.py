@@ -46,7 +46,7 @@ def test_the_study_in_numbers(tmp_path):
     text = checked(tmp_path, STUDY)
     assert text.startswith("study.yml: valid, with warnings in 2 of 6 conditions\n")  # at 70 % arches reach the walls
     assert line(text, "title") == "three ices" and line(text, "base") == "base.yml" and line(
-        text, "set") == "ice.friction=0.2"
+        text, "set") == "output.frame_interval=-1 s, ice.friction=0.2"
     assert line(text, "ice.concentration") == "0.2, 0.5, 0.7" and line(text, "tow.speed") == "0.1, 0.2" and line(
         text, "members") == "6 conditions x 7 fields = 42"
     head, table = rows(text)
@@ -164,7 +164,6 @@ def test_what_a_condition_reads_is_looked_at(tmp_path):
 
 
 def test_options_of_a_case_are_refused(tmp_path):
-    assert "is a study, and --set is for a case" in checked(tmp_path, STUDY, USAGE, "--set", "run.dt=0.1")[0]
     assert "is a study, and --scale is for a case" in checked(tmp_path, STUDY, USAGE, "--scale", "30")[0]
 
 
@@ -197,5 +196,44 @@ def test_under_mpirun_it_is_said_once(tmp_path):
                                 text=True,
                                 timeout=60)
         assert result.returncode == code
-        assert result.stdout == (alone if code == DONE else
-                                 "") and result.stderr.count("bergtow: study.yml: base: ") == (code != DONE)
+        said = alone.splitlines() if code == DONE else []
+        # what is said of the ranks comes on top
+        assert [x for x in said if x not in result.stdout.splitlines()] == [x for x in said if x.startswith("memory")]
+        assert result.stderr.count("bergtow: study.yml: base: ") == (code != DONE)
+
+
+def under(ranks, *arguments, cwd):
+    env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    return subprocess.run(["mpirun", "--oversubscribe", "-n", str(ranks), BERGTOW, *arguments],
+                          cwd=cwd, env=env, capture_output=True, text=True, timeout=60)
+
+
+def test_its_ranks_are_counted(tmp_path):
+    """How many members at a time, what they take then, and whether there are enough."""
+    study = {"base": "base.yml", "ranks": 2, "set": {"run.duration": 10}}
+    alone = checked(tmp_path, study)
+    assert line(alone, "ranks") == "2 a member: start with mpirun -n 2 or more"
+    text = under(5, "check", "study.yml", cwd=tmp_path).stdout
+    assert line(text, "ranks") == "5: 2 members at a time, 2 ranks each; some ranks are left over"
+    one, two = map(float, re.match(r"about ([\d.]+) MB for one member, ([\d.]+) MB for 2 at a time",
+                                   line(text, "memory")).groups())
+    assert two == pytest.approx(2 * one, rel=0.01) and line(text, "memory").startswith(line(alone, "memory"))
+    hours = re.search(r"^ {21}(.*) on 4 ranks", text, re.M)[1]
+    assert seconds(hours) == pytest.approx(seconds(line(text, "wall time").removeprefix("rough estimate ")) / 4, rel=.1)
+    (tmp_path / "study.yml").write_text(json.dumps(study | {"ranks": 3}))
+    result = under(2, "check", "study.yml", cwd=tmp_path)
+    assert result.returncode == CASE and "a member asks for 3 ranks and there are 2" in result.stderr
+
+
+def test_values_in_place_of_those_of_the_study(tmp_path):
+    """--set holds for all members; what the study varies stays as it is."""
+    text = checked(tmp_path, STUDY, DONE, "--set", "ice.friction=0.3", "--set", "run.dt = 0.05")
+    assert line(text, "set") == "output.frame_interval=-1 s, ice.friction=0.3, run.dt=0.05"
+    assert rows(text)[1][0][4] == "400"
+    for given, words in (("tow.speed=0.2", "--set tow.speed=0.2: tow.speed: stands under `parameters` of study.yml"),
+                         ("run.duration=9", "run.duration: stands under `with` of study.yml"),
+                         ("ice.sise=1", "--set ice.sise=1: ice.sise: unknown key; did you mean ice.size?"),
+                         ("run.dt=fast", "--set run.dt=fast: run.dt: "), ("run.dt", "--set run.dt: is not key=value"),
+                         ("ice.seed=4", "take their seeds from `seed`")):
+        found = checked(tmp_path, STUDY, CASE, "--set", given)
+        assert len(found) == 1 and words in found[0], found

@@ -80,7 +80,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
     assert rows[1][-1] == "1 J" and rows[0][-1] == "none"
     estimates = dict(zip(*found["Beside the estimates"][:2]))
     assert estimates["Lichey-Hellmer"].startswith("80") and "*" in estimates["compaction"]
-    assert {"Distributions", "Extreme peaks", "Members"} <= set(found)
+    assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
     cards = [e.text for e in page.find_elements("css selector", ".figures div")]
     assert len(cards) == 2 and "4 fields" in cards[0] and "concentration 0.2" in cards[0]
 

@@ -339,7 +339,7 @@ def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
     folder = made_up.write(tmp_path / "a", members, sampling="latin-hypercube")
     e = Ensemble(folder)
     assert e.sampled and plot_ensemble.numeric(e) == ["ice.concentration", "ice.thickness"] and [
-        n for n, _ in plot_ensemble.pictures(e, None)
+        n for n, _ in plot_ensemble.pictures(e, None, [])
     ][-1] == "sensitivity"
     dots = plot_ensemble.draw_scatter(e, "ice.thickness").axes[0].lines[0]
     assert list(dots.get_xdata()) == [m["parameters"]["ice.thickness"] for m in members]
@@ -383,8 +383,8 @@ def test_a_small_ensemble_of_the_program(tmp_path):
         assert c["resistance"]["mean"] == pytest.approx(
             np.mean([e.summary["mean_ice_resistance_n"][m] for m in e.conditions()[c["index"]].finished]))
         assert c["extremes"]["collisions"] > 0 and c["estimates"]["dilute_limit"]["force"] > 0
-    done(script("plot_ensemble.py", tmp_path / "all"), tmp_path / "all/sweep-ice-concentration.png",
-         tmp_path / "all/exceedance.png")
+    done(script("plot_ensemble.py", tmp_path / "all"), tmp_path / "all/returns-floe-force.png",
+         tmp_path / "all/sweep-ice-concentration.png", tmp_path / "all/exceedance.png")
     # what the made-up files claim to look like
     ours, theirs = flat_names(
         made_up.write(tmp_path / "made", [made_up.member(np.ones(30), {"ice.concentration": 0.2}, 0)]) /

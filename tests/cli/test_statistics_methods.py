@@ -309,7 +309,6 @@ def test_what_no_tail_is_fitted_to():
     assert "needs 30" in stat_extreme.over_threshold(few, [1.0], 0.0, threshold=1e9)["refused"]
     assert "without a collision" in stat_extreme.by_blocks(few, [1.0], blocks=30)["refused"]
     assert "raise --blocks" in stat_extreme.by_blocks(few, [1.0], blocks=2)["refused"]
-    assert "different lengths" in stat_extreme.by_blocks(few + poisson_fields(rng, 1, hours=2.0), [1.0])["refused"]
     seldom = stat_extreme.over_threshold(poisson_fields(rng, 6, rate=100), [0.001], 0.0, threshold=100.0, resamples=1)
     assert np.isnan(seldom["levels"][0]["level"])  # the threshold itself is exceeded less often than that
 

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""The loads of an ensemble that something is designed for, member by member and condition by condition.
+
+    tow_force, ice_resistance     and every series that the program registers as a load of line or vessel
+    floe_force                    largest force of one floe on the hull in a step, a push or the peak of a collision
+    panel_load                    load on that panel of the hull where it is largest (cases with output.panels)
+
+Names, units and labels come from the members' files. All but floe_force are filtered (stat_load.py); that one is local,
+acts for as long as a collision does, and is what it is by impact.conversion, which is named.
+
+Time scale. 30 s, unless it is given: over so long a time the readings of a bollard pull trial are averaged for the
+largest static pull, while the continuous pull, by which a towing vessel is chosen, is a mean of 10 min [IMO 1998,
+MSC/Circ.884, Guidelines for safe ocean towing]. So a tow force of 30 s is one that the vessel must hold by thrust and
+not by its inertia. Shorter loads reach neither: a berg of 80 m on 600 m of line has a period of minutes. At model scale
+Froude's law has it shorter by the root of the length scale (estimate.length_scale), as it has the hours of a tow.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+
+import stat_extreme
+import stat_load
+import stat_mean
+from bergtow_read import Run, RunError
+
+TIME_SCALE = 30.0     # s, full scale
+TOW_HOURS = 24.0      # h, full scale
+PROBABILITY = 0.05
+ALWAYS = ("tow_force", "ice_resistance")
+ROLE = "load"
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a load is, as the files tell it."""
+
+    name: str
+    label: str
+    units: str
+    description: str
+    conversion: str = ""  #: what the peak of a collision in it means; "" where no conversion has a part in it
+
+
+def _floe_force(run):
+    """(Load, values) of the largest force of one floe, None where collisions are not told apart."""
+    if not {"largest_push", "impact_peak"} <= set(run.series_names):
+        return None
+    push, peak = run["largest_push"], run["impact_peak"]
+    if not (np.isfinite(push).any() and np.isfinite(peak).any()):
+        return None
+    conversion = str(run.impacts["conversion"])
+    return Load("floe_force", "force of one floe", run.units("largest_push"),
+                "largest force of one floe on the towed body: a push as the mean over a step, or the peak of a "
+                "collision", conversion), np.maximum(push, peak)
+
+
+def _panel_load(run):
+    """(Load, values [n, panels]), None where a run has no series of them."""
+    if "load" not in run.panel_series:
+        return None
+    return Load("panel_load", "load on one hull panel", run.panel_series["units"],
+                "sum of the normal forces on a panel of the hull, the largest of all panels"), run.panel_series["load"]
+
+
+def of_run(run):
+    """[(Load, values)] of a run and the times of the values."""
+    out = []
+    for name in [n for n in ALWAYS if n in run] + run.by_role(ROLE):
+        if np.isfinite(run[name]).any():
+            out.append((Load(name, run.label(name), run.units(name), run.description(name)), run[name]))
+    return out + [found for found in (_floe_force(run), _panel_load(run)) if found], run["time"]
+
+
+def of_member(e, m):
+    """The same of a member of an ensemble; of one without its folder, what ensemble.h5 holds."""
+    try:
+        with Run(e.folder(m)) as run:
+            return of_run(run)
+    except RunError:
+        return [(Load(name, *e.told(name)), e.series(m, name)[1]) for name in ALWAYS if e.has(name)], e.series(m)[0]
+
+
+def scaling(e, rows):
+    """Time at full scale / time in a condition: the root of its length scale."""
+    found = e.summary.get("estimates_length_scale", np.ones(e.n))[rows]
+    return float(np.sqrt(found[0])) if len(found) and np.isfinite(found[0]) and found[0] > 0 else 1.0
+
+
+def _fields(e, rows, time_scale):
+    """{name: (Load, [field, ...])} of a condition, the fields as stat_load.field_of makes them. A load is left out
+    where it is constant, and where members convert its collisions in different ways."""
+    out = {}
+    for m in rows:
+        start, end = e.number("window_start_s", m), e.number("window_end_s", m)
+        some, time = of_member(e, m)
+        for load, x in some:
+            scale = 0.0 if load.conversion else time_scale
+            field = stat_load.field_of(time, x, start, end, scale) if np.isfinite([start, end]).all() else None
+            if field is not None and np.ptp(field["peak"]) > 0:
+                out.setdefault(load.name, []).append((load, field))
+    return {
+        name: (some[0][0], [field for _, field in some])
+        for name, some in out.items()
+        if len({load.conversion for load, _ in some}) == 1
+    }
+
+
+def _design(found, hours, total):
+    """The level of the last return time by peaks over a threshold, or by block maxima where there are too few."""
+    for kind, model in (("over_threshold", "GPD"), ("block_maxima", "GEV")):
+        level = found[kind].get("levels", [{"level": np.nan}])[-1]
+        if np.isfinite(level["level"]):
+            return {
+                "value": level["level"], "interval_95": level["level_95"], "model": model, "return_hours": hours,
+                "times_the_hours_simulated": hours / total, "beyond_data": bool(hours > total),
+                "shape": found[kind]["shape"], "irregular": found[kind]["irregular"]
+            }
+    return {
+        "refused": "; ".join(found[kind].get("refused", "no level") for kind in ("over_threshold", "block_maxima")),
+        "return_hours": hours
+    }
+
+
+def statistics(e, rows, options):
+    """{name: all statistics of a load} of the members of a condition; options: time_scale and tow_hours (None: the
+    default), probability, hours, resamples."""
+    shorter = scaling(e, rows)
+    tow_hours = options.tow_hours or TOW_HOURS / shorter
+    design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
+    for name, (load, fields) in _fields(e, rows, options.time_scale or TIME_SCALE / shorter).items():
+        gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
+        found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
+        out[name] = {
+            "label": load.label, "units": load.units, "description": load.description, "conversion": load.conversion,
+            "time_scale_s": float(np.median([f["scale"] for f in fields])),
+            "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
+            "fields": len(fields), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
+                "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)
+            }
+        }
+    return out
+
+
+def panels(e, rows):
+    """Means over the window and largest step means of every panel of the hull, over fields: {"mean", "mean_95",
+    "largest", "largest_95" [P], "units"}; None where members have none, or unlike numbers of them."""
+    mean, largest, units = [], [], ""
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                found, units = run.panels, run.panel_series["units"]
+        except RunError:
+            continue
+        mean.append(found["mean_load"])
+        largest.append(found["max_load"])
+    if not mean or len({len(x) for x in mean}) > 1 or not np.isfinite(mean).all():
+        return None
+    def over(x):
+        return np.array([stat_mean.t_interval(column) for column in np.array(x).T])
+    return {
+        "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
+        "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
+        "mean_of_largest_95": over(largest)
+    }

@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""The design statement and the statistics of loads as tables of text or Markdown."""
+import numpy as np
+
+import style
+from text_table import number, pair, table
+
+NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
+
+
+def _towed(s):
+    return [c for c in s["conditions"] if c["design"]["tow"]]
+
+
+def hours_text(hours):
+    return f"{hours:.3g} h" if hours >= 1 else f"{60 * hours:.3g} min"
+
+
+def asked(s):
+    """"Design tow force: exceeded with a probability of 5 % in a tow of 24 h, as the moving mean over 30 s"; the range
+    where conditions differ. "" where nothing is towed."""
+    some = [c["design"]["tow"] for c in _towed(s)]
+    if not some:
+        return ""
+    def span(key, text):
+        low, high = min(d[key] for d in some), max(d[key] for d in some)
+        return text(low) if high - low < 1e-6 * high else f"{text(low)} to {text(high)}"
+    return (f"Design tow force: exceeded with a probability of {100 * some[0]['probability']:g} % in a tow of "
+            f"{span('tow_hours', hours_text)}, as the moving mean over {span('time_scale_s', lambda v: f'{v:.3g} s')}")
+
+
+def value(d, factor):
+    return "–" if "refused" in d else number(d["value"] / factor) + ("*" if d["beyond_data"] else "")
+
+
+def ends(d, factor):
+    return "–" if "refused" in d else pair(d["interval_95"], factor)
+
+
+def design(s, markdown):
+    """The design statement: a row a condition, what it holds for, and the warnings."""
+    some = _towed(s)
+    if not some:
+        return "No design tow force. " + "\n".join(warnings(s))
+    found = [c["design"]["tow"] for c in some]
+    factor, unit = style.scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
+    lines = any(c["design"]["tension"] for c in some)
+    head = ["condition", f"design tow force, {unit}", "95 %", *([f"line tension, {unit}", "95 %"] if lines else []),
+            f"mean, {unit}", f"largest simulated, {unit}", "hours simulated", "return time, h", "fields", "tail"]
+    rows = []
+    for c in s["conditions"]:
+        d, t = c["design"]["tow"], c["design"]["tension"]
+        if d is None:
+            rows.append([c["label"], *["–"] * (len(head) - 1)])
+            continue
+        tension = ([value(t, factor), ends(t, factor)] if t else ["–", "–"]) if lines else []
+        rows.append([c["label"], value(d, factor), ends(d, factor), *tension, number(d["mean"] / factor),
+                     number(d["largest"] / factor), number(d["hours"]), number(d["return_hours"]), str(d["fields"]),
+                     d.get("model", "–")])
+    notes = [
+        f"{asked(s)}. 95 %: interval over fields, without what the warnings name. * beyond the hours "
+        f"simulated: extrapolated by the tail."
+    ]
+    held = sorted({c["design"]["holds_for"] for c in s["conditions"] if c["design"]["holds_for"]})
+    notes += [f"Holds for: {'; or '.join(held)}."] if held else []
+    return "\n\n".join([table(head, rows, markdown), "\n".join(notes + warnings(s))])
+
+
+def warnings(s):
+    """"WARNING: what is the matter: condition (how much); condition", each matter once."""
+    found, every = {}, len(s["conditions"])
+    for c in s["conditions"]:
+        for w in c["design"]["warnings"]:
+            found.setdefault(w["what"], []).append((c["label"], w["detail"]))
+    out = []
+    for what, where in found.items():
+        details = {detail for _, detail in where}
+        if len(where) == every and len(details) == 1:
+            detail = details.pop()
+            out.append(f"WARNING: {what}{f' ({detail})' if detail else ''}.")
+        else:
+            out.append(f"WARNING: {what}: " + "; ".join(label + (f" ({detail})" if detail else "")
+                                                        for label, detail in where) + ".")
+    return out
+
+
+def _rows_of(s, name, cells):
+    """A row for each condition that has the load."""
+    return [[c["label"], *cells(c["loads"][name])] for c in s["conditions"] if name in c["loads"]]
+
+
+def names(s):
+    """Loads of all conditions, in the order of the files."""
+    return list(dict.fromkeys(name for c in s["conditions"] for name in c["loads"]))
+
+
+def _unit(s, name):
+    some = [c["loads"][name] for c in s["conditions"] if name in c["loads"]]
+    factor, unit = style.scale([np.median([abs(x["quantiles"]["95"]["value"]) for x in some])], some[0]["units"])
+    return factor, unit, some[0]
+
+
+def signals(s, markdown):
+    """Mean, standard deviation and quantiles of every load."""
+    head = ["condition", "load", "mean", "interval", "sd", "5 %", "50 %", "95 %", "99 %", "largest", "unit", "over",
+            "hours"]
+    rows = []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        def cells(x, factor=factor, unit=unit, first=first):
+            q = {k: number(v["value"] / factor) for k, v in x["quantiles"].items()}
+            return [first["label"], number(x["mean"]["value"] / factor), pair(x["mean"]["interval_95"], factor),
+                    number(x["sd"]["value"] / factor), q["5"], q["50"], q["95"], q["99"],
+                    number(x["largest"] / factor), unit, f"{x['time_scale_s']:.3g} s", number(x["hours"])]
+        rows += _rows_of(s, name, cells)
+    if not rows:
+        return "No loads: no member has a window with a towed body."
+    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. "
+            "Interval: 95 %, of the mean over fields; those of all other numbers are in statistics.json.")
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
+
+
+def conversions(s):
+    told = sorted({(x["label"], x["conversion"]) for c in s["conditions"] for x in c["loads"].values()
+                   if x["conversion"]})
+    return [f"{label[0].upper()}{label[1:]}: a push is the mean over a step, the peak of a collision is by "
+            f"{conversion}." for label, conversion in told]
+
+
+def panel_lines(s):
+    """The hull panel that bears most, a sentence a condition."""
+    out = []
+    for c in s["conditions"]:
+        p = c["panels"]
+        if p is None:
+            continue
+        k, most = int(np.argmax(p["mean"])), int(np.argmax(p["largest"]))
+        factor, unit = style.scale([p["largest"][most]], p["units"])
+        out.append(f"Hull panels, {c['label']}: panel {k} has the largest mean, {number(p['mean'][k] / factor)} "
+                   f"{unit} "
+                   f"({pair(p['mean_95'][k], factor)}); the largest mean of a step is "
+                   f"{number(p['largest'][most] / factor)} {unit}, on panel {most}.")
+    return out
+
+
+def returns(s, markdown):
+    """Return levels of the whole signal by both models of the tail."""
+    hours = sorted({level["hours"] for c in s["conditions"] for x in c["loads"].values()
+                    for kind in NAMES for level in x[kind].get("levels", [])})
+    if not hours:
+        refused = sorted({x[kind]["refused"] for c in s["conditions"] for x in c["loads"].values() for kind in NAMES
+                          if "refused" in x[kind]})
+        return "No return levels" + (f": {'; '.join(refused)}." if refused else ".")
+    head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
+    rows, refused = [], []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        for kind, label in NAMES.items():
+            for c in s["conditions"]:
+                x = c["loads"].get(name)
+                if x is None:
+                    continue
+                f = x[kind]
+                if "refused" in f:
+                    refused.append(f"{first['label']}, {c['label']}, {label}: {f['refused']}.")
+                    continue
+                at = {level["hours"]: level for level in f["levels"]}
+                rows.append([c["label"], first["label"], label,
+                             f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
+                             number(f["p_value"], 2), *(_level(at.get(T), factor) for T in hours), unit,
+                             number(x["hours"])])
+    note = ("Levels of the whole signal, pushes and collisions together, that are exceeded once in so many hours of "
+            "tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
+            "likelihood. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
+            "than the largest value seen.")
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {r}" for r in refused)])
+
+
+def _level(level, factor):
+    if level is None or not np.isfinite(level["level"]):
+        return "–"
+    return (f"{number(level['level'] / factor)}{'*' if level['beyond_data'] else ''} "
+            f"({pair(level['level_95'], factor)})")

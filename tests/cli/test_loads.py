@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: MIT
+"""Loads and the design statement: extremes of signals whose extremes are known, filters by hand, made-up ensembles."""
+import argparse
+import csv
+import json
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+from scipy import stats
+
+import made_up_ensemble as made_up
+from signals_known import AR1, EAR1, POISSON, coverage, fields_of
+from test_postproc import script
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import loads  # noqa: E402
+import plot_ensemble  # noqa: E402
+import stat_extreme  # noqa: E402
+import stat_load  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
+
+TRIALS = 14
+
+
+# ---- filter and statistics over fields
+
+def test_the_filter_by_hand():
+    time, x = np.arange(1.0, 13.0), np.arange(12.0)
+    f = stat_load.field_of(time, x, 3.0, 12.0, 2.0)  # samples 2 to 11 are in the window, the filter holds two
+    assert list(f["peak"]) == [2.5 + k for k in range(9)] and list(f["time"]) == list(np.arange(4.0, 13.0))
+    assert (f["dt"], f["scale"], f["start"]) == (1.0, 2.0, 3.0) and f["hours"] == pytest.approx(9 / 3600)
+    assert stat_load.field_of(time, x, 3.0, 12.0, 3.0) is None  # the window is shorter than five of these
+    assert stat_load.field_of(time, np.where(x == 7, np.nan, x), 1.0, 12.0, 1.0) is None
+    assert stat_load.field_of(time, x, 1.0, 12.0, 0.2)["scale"] == 1.0  # no less than a sample
+    panels = np.array([[4.0, 0, 4, 0, 4, 0], [1.0, 1, 5, 1, 1, 1]]).T
+    assert list(stat_load.field_of(np.arange(1.0, 7.0), panels, 0.5, 6.0, 1.0)["peak"]) == [4, 1, 5, 1, 4, 1]
+    filtered = stat_load.moving_mean(panels, 2)
+    assert filtered.tolist() == [[2, 1], [2, 3], [2, 3], [2, 1], [2, 1]]  # each by itself, then the largest
+
+
+def test_the_filter_leaves_impulses_alone():
+    """What counts is the impulse: the same one in one step or in ten gives the same load over a long time."""
+    time, one, ten = np.arange(1.0, 101.0), np.zeros(100), np.zeros(100)
+    one[50], ten[46:56] = 10.0, 1.0
+    a, b = (stat_load.field_of(time, x, 1.0, 100.0, 20.0)["peak"].max() for x in (one, ten))
+    assert a == b == 0.5
+
+
+def test_intervals_over_fields_are_the_jackknife():
+    rng = np.random.default_rng(3)
+    samples = [rng.normal(m, 1, 50) for m in rng.normal(5, 2, 7)]
+    means = np.array([x.mean() for x in samples])
+    found = stat_load.over_fields(np.mean, samples)  # of a mean the jackknife is the usual interval
+    assert found["value"] == pytest.approx(means.mean()) and found["interval_95"] == pytest.approx(
+        stats.t.interval(0.95, 6, means.mean(), stats.sem(means)))
+    counts, hours = np.array([3, 0, 4, 4, 9]), np.full(5, 2.0)
+    found = stat_load.ratio_over_fields(counts, hours)
+    assert found["value"] == 2 and found["interval_95"] == pytest.approx(
+        stats.t.interval(0.95, 4, 2, stats.sem(counts / 2)))
+    assert np.isnan(stat_load.over_fields(np.mean, samples[:1])["interval_95"]).all()
+
+
+def test_blocks_of_fields_of_unlike_length():
+    fields = [{"time": np.arange(1.0, n + 1), "peak": np.arange(float(n)), "start": 0.0, "hours": n / 3600}
+              for n in (100, 110, 40, 250)]
+    each, length = stat_extreme._blocks(fields, 2)  # the middle field has 105 samples
+    assert length * 3600 == pytest.approx(52.5)
+    assert [len(x) for x in each] == [1, 2, 0, 4] and each[3].tolist() == [51, 103, 156, 209]
+
+
+def test_the_return_time_of_a_design_value():
+    assert stat_extreme.return_hours(0.05, 24) == pytest.approx(467.9, rel=1e-3)
+    assert stat_extreme.return_hours(1 - np.exp(-1), 10) == pytest.approx(10)
+
+
+# ---- extremes of known processes
+
+@pytest.mark.parametrize("process, fields, n", [(AR1(0.9), 12, 2000), (EAR1(0.7), 20, 480),
+                                                (EAR1(0.0), 8, 600), (POISSON(0.02), 8, 4000)],
+                         ids=lambda v: getattr(v, "name", None))
+def test_intervals_of_return_levels_of_signals_hold_them(process, fields, n):
+    """95 % of them do (tests/long and postproc/README.md have the numbers); of so few, no fewer than chance explains
+    for the 90 % that are asked for, and their middle is where the level is."""
+    found = coverage(process, fields, n, TRIALS, (1.0, 10.0), seed=21)
+    least = stats.binom.ppf(2e-3, TRIALS, 0.9)
+    for kind, (inside, ratio) in found.items():
+        assert min(inside) >= least and 0.75 < min(ratio) <= max(ratio) < 1.3, (kind, inside, ratio)
+
+
+def test_rates_of_exceedance_of_a_known_process():
+    process = EAR1(0.7)
+    fields = fields_of(process, 20, 3000, np.random.default_rng(8))
+    rows = stat_load.exceedance(fields, stat_load.gap_of(fields))
+    inside = [row["share_of_time"]["interval_95"][0] <= np.exp(-row["level"]) <= row["share_of_time"]["interval_95"][1]
+              for row in rows[:8]]  # marginally exponential
+    assert sum(inside) >= 6
+    row = min(rows, key=lambda r: abs(r["level"] - 7.0))
+    low, high = row["per_hour"]["interval_95"]
+    assert low < 3600 * process.rate(row["level"]) < high
+
+
+def test_a_correlated_signal_of_few_clusters_has_no_tail():
+    fields = fields_of(AR1(0.99), 3, 500, np.random.default_rng(1))
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)
+    assert "samples do not make 30 clusters" in found["over_threshold"]["refused"]
+    assert "run longer" in found["block_maxima"]["refused"]
+
+
+# ---- ensembles
+
+N = 2000
+SERIES = {
+    "tow_force": {"units": "N", "description": "towing force", "label": "tow force", "role": "balance", "order": 1},
+    "ice_resistance": {"units": "N", "description": "ice", "label": "ice resistance", "role": "balance", "order": 2},
+    "line_tension_1": {"units": "N", "description": "first branch", "label": "line tension", "role": "load",
+                       "order": 3},
+    "vessel_thrust": {"units": "N", "description": "thrust", "label": "vessel thrust", "role": "load", "order": 4},
+    "largest_push": {"units": "N", "description": "push", "label": "", "role": "", "order": 5},
+    "impact_peak": {"units": "N", "description": "peak", "label": "", "role": "", "order": 6},
+}
+CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load} N\nice:\n  thickness: 1 m\n"
+        "  crushing:\n    pressure: {pressure} Pa\n")
+
+
+def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None):
+    """Ensemble of AR(1) tow forces of mean 1 MN and 3 MN with a start-up jerk before the window, in 2 s samples."""
+    rng, members = np.random.default_rng(4), []
+    for c, a in enumerate(concentrations):
+        for _ in range(fields):
+            x = made_up.ar1(0.8, N, rng, 1e6 * (1 + 2 * c), 2e5)
+            x[:30] = 1e9
+            warned = ["domain.width: 15 body widths"] if a > 0.8 else []
+            series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
+                      "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
+                      "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
+            members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, warnings=warned,
+                                          more=series, told=SERIES, summary={"concentration": a},
+                                          case=text or CASE.format(pressure=pressure, load=load)))
+    return made_up.write(folder, members)
+
+
+@pytest.fixture(scope="module")
+def statement(tmp_path_factory):
+    folder = towed(tmp_path_factory.mktemp("towed") / "all")
+    result = script("ensemble.py", folder, "--resamples", 5, "--hours", 1, 10)
+    assert result.returncode == 0, result.stderr
+    return folder, result.stdout, json.loads((folder / "statistics.json").read_text())
+
+
+def test_every_load_is_there_with_its_unit_and_without_the_start(statement):
+    _, _, s = statement
+    for c, mean in zip(s["conditions"], (1e6, 3e6)):
+        assert list(c["loads"]) == ["tow_force", "ice_resistance", "line_tension_1", "floe_force"]  # no vessel
+        for name, factor in (("tow_force", 1.0), ("ice_resistance", 0.9), ("line_tension_1", 1.01)):
+            x = c["loads"][name]
+            assert x["units"] == "N" and x["label"] == SERIES[name]["label"] and x["time_scale_s"] == 30
+            low, high = x["mean"]["interval_95"]
+            assert low < factor * mean < high and x["mean"]["value"] == pytest.approx(factor * mean, rel=0.03)
+            assert x["largest"] < 1e8 and x["fields"] == 6 and x["hours"] == pytest.approx(6 * (N - 30 - 29) / 3600)
+            # AR(1) of 0.8, mean of 30 samples: sd^2 (2 tau/n - ...) with 2 tau = 9
+            assert x["sd"]["value"] == pytest.approx(factor * 2e5 * np.sqrt(9 / 30 - 2 * 0.8 / 0.04 / 900), rel=0.15)
+            assert x["quantiles"]["5"]["value"] < x["quantiles"]["50"]["value"] < x["quantiles"]["99"]["value"]
+        floe = c["loads"]["floe_force"]
+        assert floe["conversion"] == "half-sine of 0.1 s" and floe["time_scale_s"] == 1
+        assert 1e5 < floe["largest"] < 1e6  # a push of 1e5 at least, or the peak of a collision
+
+
+def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
+    folder, text, s = statement
+    lines = text.splitlines()
+    assert lines[2] == "Design tow force" and text.index("Design tow force") < text.index("Members\n")
+    assert "exceeded with a probability of 5 % in a tow of 24 h, as the moving mean over 30 s" in text
+    first, second = (c["design"] for c in s["conditions"])
+    for d in (first, second):
+        assert d["tow"]["return_hours"] == pytest.approx(467.9, rel=1e-3) and d["tow"]["beyond_data"]
+        assert d["tow"]["fields"] == 6 and d["tow"]["interval_95"][0] < d["tow"]["value"] < d["tow"]["interval_95"][1]
+        assert d["tension"]["value"] > d["tow"]["value"] and "1 m thick" in d["holds_for"]
+    told = {w["what"] for w in second["warnings"]}
+    assert any("no upper bound" in w for w in told) and any("domain is narrow" in w for w in told)
+    assert not any("no upper bound" in w["what"] or "narrow" in w["what"] for w in first["warnings"])
+    assert any("extrapolated to more than 10 times" in w["what"] for w in first["warnings"])
+    assert "WARNING: rigid floes at 75 % and more" in text and "concentration 0.9 (90 %)" in text
+    rows = list(csv.DictReader(open(folder / "statistics.csv")))
+    assert float(rows[1]["tow_force_design_n"]) == second["tow"]["value"] and float(
+        rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
+
+
+def test_options_of_the_design_value(statement, tmp_path):
+    folder, _, before = statement
+    result = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 60, "--tow-hours", 2,
+                    "--probability", 0.5)
+    s = json.loads((tmp_path / "statistics.json").read_text())
+    assert "exceeded with a probability of 50 % in a tow of 2 h, as the moving mean over 60 s" in result.stdout
+    for a, b in zip(s["conditions"], before["conditions"]):
+        assert a["design"]["tow"]["return_hours"] == pytest.approx(2 / np.log(2))
+        assert a["design"]["tow"]["value"] < b["design"]["tow"]["value"]
+        assert a["loads"]["tow_force"]["sd"]["value"] < b["loads"]["tow_force"]["sd"]["value"]
+    for option in ("--time-scale", "--tow-hours", "--probability"):
+        assert script("ensemble.py", folder, option, "0").returncode == 2
+    step = script("ensemble.py", folder, "-o", tmp_path, "--resamples", 1, "--time-scale", 0.5)
+    assert "a step mean is no peak (1 s)" in step.stdout
+
+
+def options(**changes):
+    return argparse.Namespace(**{"time_scale": None, "tow_hours": None, "probability": 0.05, "hours": [1.0],
+                                 "resamples": 1} | changes)
+
+
+def test_model_scale_and_limits_of_line_and_ice(tmp_path):
+    e = Ensemble(towed(tmp_path / "a", pressure=1e6, load=2e6))
+    e.summary["estimates_length_scale"] = np.full(e.n, 25.0)
+    x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
+    assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
+    found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
+    assert "no upper bound" not in found and "above the breaking load of the line: concentration 0.9 (2.00 MN" in found
+
+
+def test_too_little_is_told_and_not_guessed(tmp_path):
+    short = [made_up.member(np.arange(60.0), {}, 0, more={"tow_force": np.arange(60.0)}, told=SERIES)
+             for _ in range(2)]
+    result = script("ensemble.py", made_up.write(tmp_path / "s", short), "--resamples", 1)
+    assert result.returncode == 0 and "No design tow force" in result.stdout and "Traceback" not in result.stderr
+    some = towed(tmp_path / "two", concentrations=(0.5,), fields=2)
+    result = script("ensemble.py", some, "--resamples", 1, "--time-scale", 150)
+    s = json.loads((some / "statistics.json").read_text())
+    told = [w["what"] for w in s["conditions"][0]["design"]["warnings"]]
+    assert "no value" in told and "refused" in s["conditions"][0]["design"]["tow"]
+    assert any("fewer than 5 fields" in w for w in told)
+
+
+def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):
+    folder = towed(tmp_path / "a", concentrations=(0.5,))
+    (folder / "members/c001-r001").rename(folder / "elsewhere")
+    e = Ensemble(folder)
+    found = loads.statistics(e, e.conditions()[0].finished, options())
+    assert found["tow_force"]["fields"] == 6 and found["line_tension_1"]["fields"] == 5
+
+
+def test_the_picture_of_return_levels(statement):
+    folder, _, s = statement
+    e = Ensemble(folder)
+    assert [n for n, _ in plot_ensemble.pictures(e, None, s["conditions"])][:2] == ["returns-tow-force",
+                                                                                    "returns-ice-resistance"]
+    for c in s["conditions"]:  # as JSON has it
+        c["loads"]["tow_force"]["over_threshold"]["maxima"] = np.array(
+            c["loads"]["tow_force"]["over_threshold"]["maxima"])
+    axes = plot_ensemble.draw_returns(e, s["conditions"], "tow_force").axes[0]
+    f = s["conditions"][0]["loads"]["tow_force"]["over_threshold"]
+    dots = next(line for line in axes.lines if line.get_marker() == ".")
+    assert dots.get_ydata()[0] * 1e6 == pytest.approx(f["maxima"][0])
+    level = f["levels"][0]
+    assert plot_ensemble.tail(f, np.array([level["hours"]]))[0] == pytest.approx(level["level"])
+    matplotlib.pyplot.close("all")

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: MIT
+"""Do 95 % intervals of return levels hold the levels of signals whose extremes are known? The table of
+postproc/README.md (make test-long; half an hour on one core)."""
+import pytest
+
+from signals_known import AR1, EAR1, POISSON, coverage
+
+TRIALS, TIMES = 200, (0.1, 1.0, 10.0, 40.0)
+STUDIES = [(AR1(0.5), 20, 480), (AR1(0.9), 12, 2000), (AR1(0.95), 8, 3000), (EAR1(0.7), 20, 480), (EAR1(0.9), 8, 2000),
+           (EAR1(0.0), 8, 600), (POISSON(0.02), 8, 4000)]
+
+
+@pytest.mark.parametrize("process, fields, n", STUDIES, ids=lambda v: getattr(v, "name", None))
+def test_intervals_hold_the_levels(process, fields, n):
+    found = coverage(process, fields, n, TRIALS, TIMES, seed=1)
+    for kind, (inside, ratio) in found.items():
+        print(f"| {process.name}, {fields} fields of {n} | {kind} | " +
+              " | ".join(f"{100 * k / TRIALS:.0f} % ({r:.2f})" for k, r in zip(inside, ratio)) + " |")
+        # 95 % of 200, less three standard errors of the 92 % that short samples leave; more would be idle width
+        assert 0.87 <= min(inside) / TRIALS and max(inside) / TRIALS <= 1.0, (kind, inside)
