@@ -7,6 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #define BT_VERSION "0.1.0"
 
@@ -39,6 +40,15 @@ void bt_errors_free(bt_errors *e);
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size
 void *bt_alloc_aligned(size_t n, size_t size);     ///< zeroed, 64-byte aligned, release with free()
+
+/// A text of any length that is written as a file is; without memory for it the program ends as in bt_alloc.
+typedef struct bt_text {
+    FILE *out; ///< to here
+    char *text;
+    size_t size;
+} bt_text;
+void bt_text_begin(bt_text *t);
+char *bt_text_end(bt_text *t); ///< the text; the caller frees it
 
 /// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).
 double bt_clock(void);

@@ -275,6 +275,8 @@ bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
 /// Every key with its value and contact as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
+#define BT_CASE_RESOLVED_HEAD                                                                                          \
+    "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n"
 
 /// The same below comment lines of one's own. Caller frees.
 char *bt_case_text(const bt_case *c, const char *head);

@@ -67,6 +67,9 @@ bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
 /// are local. A complete file or none.
 bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 
+/// Has bt_field_write_outlines written this file?
+bool bt_field_outlines_ours(const char *path);
+
 /// Warnings of outlines that were read: properties that are nearly called thickness, what a projection leaves
 /// uncorrected.
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings);

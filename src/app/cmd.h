@@ -44,6 +44,10 @@ char *bt_cmd_default_folder(const char *path);
 /// it.
 char *bt_cmd_join(int argc, char **argv);
 
+/// May a command write this file? Never the case file itself; what is there and is not the command's own (ours) only
+/// with --force. Errors: BT_ERR_IO.
+bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err);
+
 /// Collective over c. Print all ranks' messages once, release them, and return the worst status as exit code.
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err);
 

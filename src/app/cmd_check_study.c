@@ -76,17 +76,16 @@ static void take_faults(faults *f, int64_t condition, bt_errors *err)
 static void tell_faults(faults *f, const bt_study *s, bt_errors *err)
 {
     for (size_t k = 0; k < f->n; k++) {
-        char *where = NULL;
-        size_t size;
-        FILE *out = open_memstream(&where, &size);
-        if (!out) abort();
+        bt_text text;
+        bt_text_begin(&text);
+        FILE *out = text.out;
         bt_member m;
         bt_study_member(s, f->list[k].first * s->repeats, &m);
         fprintf(out, "condition %" PRId64, f->list[k].first + 1);
         for (int p = 0; p < s->n_parameters; p++)
             fprintf(out, "%s %.40s %.40s", p ? "," : ":", s->parameter[p].name, m.value[p]);
         if (f->list[k].count > 1) fprintf(out, "; and %" PRId64 " more", f->list[k].count - 1);
-        fclose(out);
+        char *where = bt_text_end(&text);
         bt_errors_add(err, "%s (%s)", f->list[k].text, where);
         bt_member_free(&m);
         free(where);

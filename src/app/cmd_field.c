@@ -4,6 +4,7 @@
 #include "bergtow/field.h"
 #include "case/case_check.h"
 #include "app/cmd.h"
+#include "base/checksum.h"
 #include "case/cost.h"
 
 #include <stdio.h>
@@ -14,7 +15,10 @@
 typedef struct {
     bt_cmd_case file;
     const char *output;
+    bool force;
 } options;
+
+enum { KEY_FORCE = 256 };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
@@ -22,6 +26,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_INIT: state->child_inputs[0] = &o->file; return 0;
     case 'o': o->output = arg; return 0;
+    case KEY_FORCE: o->force = true; return 0;
     case ARGP_KEY_END:
         if (!o->output || !*o->output)
             argp_error(state, "no output file given; name one with -o FIELD.h5 or FIELD.geojson");
@@ -35,6 +40,7 @@ static const struct argp_option field_options[] = {
      "file to write: HDF5 (FIELD.h5), or outlines on the map (FIELD.geojson): degrees where ice.origin_lon says where "
      "the field is, otherwise metres east and north",
      0},
+    {"force", KEY_FORCE, NULL, 0, "replace a file of that name, whatever it is", 0},
     {0},
 };
 static const struct argp_child children[] = {{.argp = &bt_cmd_case_argp}, {0}};
@@ -69,6 +75,9 @@ int bt_cmd_field(int argc, char **argv)
                       o.file.path, c.ice.field);
         status = BT_ERR_CASE;
     }
+    const bool ours =
+        outlines ? bt_field_outlines_ours(o.output) : bt_checksum_there(o.output, BT_CHECKSUM_FIELD);
+    if (status == BT_OK) status = bt_cmd_may_write(o.output, o.file.path, ours, o.force, &err);
     double start = bt_clock();
     if (status == BT_OK) status = bt_cost_fits(&c, bt_case_expected_floes(&c), &bt_comm_alone, bt_cost_machine(), &err);
     if (status == BT_OK) status = bt_field_load(&c, &f, &err);

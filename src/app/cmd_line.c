@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 // Long names of a parser and its children.
@@ -134,10 +135,9 @@ char *bt_cmd_default_folder(const char *path)
 
 char *bt_cmd_join(int argc, char **argv)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) abort();
+    bt_text text;
+    bt_text_begin(&text);
+    FILE *out = text.out;
     fputs("bergtow", out);
     for (int i = 0; i < argc; i++) {
         bool safe =
@@ -150,8 +150,20 @@ char *bt_cmd_join(int argc, char **argv)
         }
         if (!safe) fputc('\'', out);
     }
-    fclose(out);
-    return text;
+    return bt_text_end(&text);
+}
+
+bt_status bt_cmd_may_write(const char *path, const char *case_path, bool ours, bool force, bt_errors *err)
+{
+    struct stat there, input;
+    if (stat(path, &there) != 0) return BT_OK; // what is wrong with the place shows when it is written to
+    if (stat(case_path, &input) == 0 && there.st_dev == input.st_dev && there.st_ino == input.st_ino)
+        bt_errors_add(err, "%s: is the case file itself; give the output another name", path);
+    else if (!ours && !force)
+        bt_errors_add(err, "%s: is there already, and not known as a file of this command; give another name, or "
+                           "--force to replace it", path);
+    else return BT_OK;
+    return BT_ERR_IO;
 }
 
 int bt_cmd_end(const bt_comm *c, bt_status status, bt_errors *err)

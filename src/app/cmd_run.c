@@ -4,6 +4,7 @@
 #include "bergtow/run.h"
 #include "app/cmd.h"
 #include "base/fileio.h"
+#include "output/folder.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,7 +60,7 @@ static const struct argp_option run_options[] = {
     {"max-wall", KEY_WALL, "TIME", 0,
      "write a checkpoint and stop after this wall time, as in 2h, 90min or 600; bergtow resume goes on", 0},
     {"quiet", 'q', NULL, 0, "no progress and no table at the end", 0},
-    {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds", 0},
+    {"force", KEY_FORCE, NULL, 0, "replace the result that the folder holds, and the file of --dump-contacts", 0},
     {"dump-contacts", KEY_DUMP, "STEP:FILE.h5", 0, "write the contact problem of this step in the FCLIB format", 0},
     {0},
 };
@@ -73,9 +74,9 @@ static const struct argp run_argp = {.options = run_options,
 // A long run must not take the place of another by a slip of the hand.
 static bt_status check_folder(const char *dir, bool force, bt_errors *err)
 {
-    const bool finished = bt_file_there(dir, "summary.json"),
-               begun = bt_file_there(dir, "result.part.h5") || bt_checkpoint_there(dir);
-    if (force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return BT_OK;
+    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_folder_begun(dir);
+    const bt_status foreign = bt_folder_check(dir, err);
+    if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun)
         bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
     else
@@ -101,6 +102,8 @@ int bt_cmd_run(int argc, char **argv)
     bt_errors err = {0};
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
     if (status == BT_OK && comm->rank == 0) status = check_folder(o.run.dir, o.force, &err);
+    if (status == BT_OK && comm->rank == 0 && o.run.dump_path)
+        status = bt_cmd_may_write(o.run.dump_path, o.file.path, false, o.force, &err);
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = bt_run(comm, &c, &o.run, &err);
     bt_case_free(&c);

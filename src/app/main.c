@@ -77,6 +77,17 @@ static void unbind(void)
     sched_setaffinity(0, sizeof all, &all);
 }
 
+// Before the constructors of any library, some of which take milliseconds; and an ignored signal stays so over the
+// second start, while a handler would not.
+static void ignore_signals(void)
+{
+    // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
+    signal(SIGUSR1, SIG_IGN);
+    // a file at its size limit is an error of the write, with a message, not the end of the program
+    signal(SIGXFSZ, SIG_IGN);
+}
+__attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = ignore_signals;
+
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some
 // microseconds, then sleep. And sweeps over memory miss the address cache with pages of 4 kB: with large ones, where
@@ -145,10 +156,6 @@ static int bergtow(int argc, char **argv)
 int main(int argc, char **argv)
 {
     start_with_settings(argv);
-    // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
-    signal(SIGUSR1, SIG_IGN);
-    // a file at its size limit is an error of the write, with a message, not the end of the program
-    signal(SIGXFSZ, SIG_IGN);
     bt_comm_start(&argc, &argv);
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;

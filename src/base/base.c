@@ -43,6 +43,20 @@ void *bt_alloc_aligned(size_t n, size_t size)
     return memset(p, 0, total);
 }
 
+void bt_text_begin(bt_text *t)
+{
+    *t = (bt_text){0};
+    t->out = open_memstream(&t->text, &t->size);
+    if (!t->out) out_of_memory(1, BUFSIZ);
+}
+
+char *bt_text_end(bt_text *t)
+{
+    const bool lost = ferror(t->out) != 0;
+    if (fclose(t->out) != 0 || lost) out_of_memory(1, t->size);
+    return t->text;
+}
+
 void bt_errors_add(bt_errors *e, const char *fmt, ...)
 {
     if (e->n == e->cap) {

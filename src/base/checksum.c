@@ -167,3 +167,19 @@ bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_e
     close(fd);
     return reason ? bt_file_fail(path, "read the file", reason, err) : status;
 }
+
+bool bt_checksum_there(const char *path, const char *kind)
+{
+    static const char zeros[BT_CHECKSUM_BYTES];
+    char block[BT_CHECKSUM_BYTES + sizeof hdf5_magic] = "", front[80];
+    snprintf(front, sizeof front, MAGIC "kind: %.*s", kind ? (int)strcspn(kind, " ") : 0, kind ? kind : "");
+    struct stat st;
+    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    const bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
+    const ssize_t n = regular ? pread(fd, block, sizeof block, 0) : -1;
+    if (fd >= 0) close(fd);
+    if (n < 0) return false;
+    if (!strncmp(block, front, strlen(front))) return true;
+    const bool blank = !memcmp(block, zeros, sizeof zeros), shorter = n < (ssize_t)sizeof block;
+    return !kind && blank && (shorter || !memcmp(block + BT_CHECKSUM_BYTES, hdf5_magic, sizeof hdf5_magic));
+}

@@ -5,7 +5,7 @@
 // block of 512 bytes, which readers of HDF5 skip (h5py, ParaView, h5dump), and is compared with it before HDF5 sees a
 // byte:
 //
-//     bergtow protected by a checksum file\nkind: checkpoint 2\nbytes: 123456\nxxh128: 0123...\n, then zeros
+//     bergtow sealed file\nkind: checkpoint 2\nbytes: 123456\nxxh128: 0123...\n, then zeros
 //
 // The block must be, to the last byte, what the file's length and digest (XXH3, 128 bits) make it: any flipped bit, any
 // cut, any swapped part is refused. It protects against damage, not against intent. Rejected: HDF5's Fletcher-32, which
@@ -33,6 +33,10 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err);
 /// Does the file have a sound checksum of this kind? bare: a file without checksum, one that begins as HDF5, is let
 /// through (or NULL). Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
 bt_status bt_checksum_check(const char *path, const char *kind, bool *bare, bt_errors *err);
+
+/// Is this a file that this program writes with a checksum, sound or not? kind: of this kind, in whatever version,
+/// or NULL. One that is not complete has zeros in the room, or nothing at all.
+bool bt_checksum_there(const char *path, const char *kind);
 
 /// Digest (XXH3, 128 bits) of n bytes, and of a whole file of any kind, in hexadecimal digits. Errors: BT_ERR_CASE,
 /// there is no regular file; BT_ERR_IO from the system.

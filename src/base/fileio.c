@@ -262,3 +262,16 @@ bool bt_file_there(const char *dir, const char *name)
     free(path);
     return there;
 }
+
+bool bt_file_begins(const char *path, const char *text)
+{
+    const size_t n = strlen(text);
+    char *front = bt_alloc(n + 1, 1);
+    struct stat st;
+    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    const bool same = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && pread(fd, front, n, 0) == (ssize_t)n &&
+                      !memcmp(front, text, n);
+    if (fd >= 0) close(fd);
+    free(front);
+    return same;
+}

@@ -45,6 +45,9 @@ bt_status bt_file_rename(const char *from, const char *to, bt_errors *err);
 /// Is there something of this name in the folder?
 bool bt_file_there(const char *dir, const char *name);
 
+/// Is this a regular file that begins with the text?
+bool bt_file_begins(const char *path, const char *text);
+
 /// dir/name in new memory; the caller frees it.
 char *bt_file_join(const char *dir, const char *name);
 

@@ -37,16 +37,14 @@ static void write_floes(const bt_case *c, FILE *out)
 
 char *bt_case_resolved(const bt_case *c)
 {
-    return bt_case_text(c, "# A case with every key, its value in SI units, and what it means. Running this file gives "
-                           "the same result.\n");
+    return bt_case_text(c, BT_CASE_RESOLVED_HEAD);
 }
 
 char *bt_case_text(const bt_case *c, const char *head)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) return NULL;
+    bt_text text;
+    bt_text_begin(&text);
+    FILE *out = text.out;
     fputs(head, out);
     const char *previous = "";
     for (int k = 0; k < bt_n_case_keys; k++) {
@@ -59,8 +57,7 @@ char *bt_case_text(const bt_case *c, const char *head)
         previous = key->name;
     }
     write_floes(c, out);
-    fclose(out);
-    return text;
+    return bt_text_end(&text);
 }
 
 static void list_keys(FILE *out, const bt_key *keys, int n)

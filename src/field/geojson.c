@@ -565,12 +565,16 @@ static void write_floe(FILE *out, const map *m, bt_idx i)
     fprintf(out, "]]}}");
 }
 
+/// By this a file is known again as one that this program has written.
+#define HEAD "{\"type\":\"FeatureCollection\",\n\"bergtow\":"
+
+bool bt_field_outlines_ours(const char *path) { return bt_file_begins(path, HEAD); }
+
 bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) return bt_file_fail(path, "write the outlines", errno, err);
+    bt_text lines;
+    bt_text_begin(&lines);
+    FILE *out = lines.out;
     const bt_outline_counts *o = &f->outlines;
     const bt_map_crs from = bt_map_crs_of(o->crs);
     const bool lonlat = o->read && isfinite(o->lon), projected = o->read && from.kind == BT_MAP_PLANE,
@@ -585,21 +589,20 @@ bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const cha
         .east0 = plane ? o->east : 0,
         .north0 = plane ? o->north : 0,
     };
-    fprintf(out, "{\"type\":\"FeatureCollection\",\n");
-    if (!known)
-        fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
-                projected ? o->crs : BT_MAP_LOCAL_NAME);
     fprintf(out,
-            "\"bergtow\":{\"version\":\"%s\",\"coordinates\":\"%s\",\"origin\":[%.17g,%.17g],\"frame\":\"%s\",\"ice_"
-            "area_m2\":%.17g},\n\"features\":[",
+            HEAD "{\"version\":\"%s\",\"coordinates\":\"%s\",\"origin\":[%.17g,%.17g],\"frame\":\"%s\",\"ice_"
+                 "area_m2\":%.17g},\n",
             BT_VERSION, known ? "longitude and latitude, degrees" : "east and north, metres",
             known ? m.lon0 / DEGREE : m.east0, known ? m.lat0 / DEGREE : m.north0,
             c->domain.frame == BT_FRAME_BASIN ? "basin" : "geographic", f->ice_area);
+    if (!known)
+        fprintf(out, "\"crs\":{\"type\":\"name\",\"properties\":{\"name\":\"%s\"}},\n",
+                projected ? o->crs : BT_MAP_LOCAL_NAME);
+    fprintf(out, "\"features\":[");
     for (bt_idx i = 0; i < f->n; i++) write_floe(out, &m, i);
     fprintf(out, "\n]}\n");
-    const bool whole = fclose(out) == 0;
-    const bt_status status =
-        whole ? bt_file_write(path, text, err) : bt_file_fail(path, "write the outlines", ENOMEM, err);
+    char *text = bt_text_end(&lines);
+    const bt_status status = bt_file_write(path, text, err);
     free(text);
     return status;
 }

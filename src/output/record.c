@@ -15,8 +15,10 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "bergtow/checkpoint.h"
 #include "base/fileio.h"
 #include "base/provenance.h"
+#include "output/folder.h"
 #include "output/record_parts.h"
 #include "output/summary_keys.h"
 #include "base/checksum.h"
@@ -109,20 +111,18 @@ bt_status bt_record_write_text(const bt_record *r, const char *name, const char 
     return status;
 }
 
-/// The folder, without what an earlier run left there, and the resolved case in it.
-/// A fresh run leaves nothing of an earlier one; one that goes on only takes the summary away, which is of its end.
+/// A run that goes on takes only the summary away, which is of its end, and what was under way.
 static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
 {
-    bt_status status = bt_file_make_dir(r->dir, err);
-    static const char *const stale[] = {
-        "summary.json",  BT_RESULT_FILE ".tmp",    "checkpoint.h5.tmp",     BT_RESULT_FILE, "frames.xdmf",
-        "checkpoint.h5", "checkpoint.previous.h5", "checkpoint.damaged.h5", "failure.h5",   "stop"};
-    for (size_t k = 0; k < (fresh ? sizeof stale / sizeof *stale : 3) && status == BT_OK; k++) {
+    if (fresh) return bt_folder_replace(r->dir, resolved, err);
+    static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", BT_CHECKPOINT_FILE ".tmp"};
+    bt_status status = BT_OK;
+    for (size_t k = 0; k < sizeof stale / sizeof *stale && status == BT_OK; k++) {
         char *path = bt_file_join(r->dir, stale[k]);
         status = bt_file_remove(path, err);
         free(path);
     }
-    return status == BT_OK && fresh ? bt_record_write_text(r, "case.resolved.yml", resolved, err) : status;
+    return status;
 }
 
 static bt_status open_record(bt_record **out, const bt_comm *comm, const char *dir, const bt_case *c,
@@ -133,6 +133,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     r->dir = strdup(dir);
     r->c = c;
     r->comm = comm;
+    r->fresh = fresh;
     r->n_floes = b->n_floes;
     r->towed = b->towed;
     r->last_flush = bt_clock();
@@ -164,6 +165,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
             bt_h5_give_up(&r->h5, status);
             close_file(r);
         }
+        if (status != BT_OK && fresh && comm->rank == 0) bt_folder_put_back(dir);
     }
     free(resolved);
     free(path);
@@ -311,7 +313,7 @@ static bt_status hand_in(const bt_record *r, bt_errors *err)
     return status;
 }
 
-bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
+bt_status bt_record_close(bt_record *r, const bt_run_totals *t, const bt_snapshot *last, bt_errors *err)
 {
     const bool first = r->comm->rank == 0;
     char *xdmf = first ? bt_record_xdmf(r) : NULL;
@@ -325,10 +327,12 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, bt_errors *err)
     }
     bt_h5_sync_raw(&r->h5);
     bt_status status = bt_comm_agree(r->comm, close_file(r));
-    // The summary comes last: where there is one, the rest is complete.
+    // The result before the checkpoint, which counts on it; the summary last: where there is one, the rest is complete.
     if (first && status == BT_OK) status = hand_in(r, err);
     if (first && status == BT_OK) status = bt_record_write_text(r, "frames.xdmf", xdmf, err);
+    if (first && status == BT_OK && last) status = bt_checkpoint_write(last, r->dir, BT_CHECKPOINT_FILE, err);
     if (first && status == BT_OK && t) status = write_summary(r, t, err);
+    if (first && status == BT_OK && t) bt_folder_settle(r->dir);
     status = bt_comm_agree(r->comm, status);
     free(xdmf);
     record_free(r);
@@ -341,6 +345,7 @@ void bt_record_abandon(bt_record *r)
     close_file(r);
     char *part = bt_file_join(r->dir, BT_RESULT_PART);
     if (r->comm->rank == 0) unlink(part);
+    if (r->comm->rank == 0 && r->fresh) bt_folder_put_back(r->dir);
     free(part);
     record_free(r);
 }

@@ -18,6 +18,7 @@ struct bt_record {
     char *dir;
     const bt_case *c;
     const bt_comm *comm;
+    bool fresh;            ///< a new run, in place of what the folder held
     bt_idx n_floes, towed; ///< of all ranks
     bt_history history;
     // series

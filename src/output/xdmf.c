@@ -53,11 +53,10 @@ static void block(FILE *f, const char *name, const char *kind, int64_t cells, in
 
 char *bt_xdmf_text(const bt_xdmf *x)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&text, &size);
-    fputs("<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"
-          "    <Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n", f);
+    bt_text text;
+    bt_text_begin(&text);
+    FILE *f = text.out;
+    fputs(BT_XDMF_HEAD, f);
     for (int64_t i = 0; i < x->n_frames; i++) {
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
                    "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);
@@ -66,6 +65,5 @@ char *bt_xdmf_text(const bt_xdmf *x)
         fputs("      </Grid>\n", f);
     }
     fputs("    </Grid>\n  </Domain>\n</Xdmf>\n", f);
-    fclose(f);
-    return text;
+    return bt_text_end(&text);
 }

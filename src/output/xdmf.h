@@ -16,6 +16,10 @@ typedef struct bt_xdmf {
 /// What stands before each polygon in XDMF's mixed topology: this, the number of its vertices, then the vertices.
 #define BT_XDMF_POLYGON 3
 
+#define BT_XDMF_HEAD                                                                                                   \
+    "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"                                      \
+    "    <Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n"
+
 /// frames.xdmf as text; the caller frees it.
 char *bt_xdmf_text(const bt_xdmf *x);
 

@@ -81,13 +81,11 @@ static char *record_path(const char *folder, int which)
 
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
 {
-    char *text = NULL;
-    size_t size;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) abort();
-    fprintf(out, "%d\n", (int)code);
-    for (size_t i = 0; i < why->n; i++) fprintf(out, "%s\n", why->text[i]);
-    fclose(out);
+    bt_text lines;
+    bt_text_begin(&lines);
+    fprintf(lines.out, "%d\n", (int)code);
+    for (size_t i = 0; i < why->n; i++) fprintf(lines.out, "%s\n", why->text[i]);
+    char *text = bt_text_end(&lines);
     bt_status status = BT_ERR_IO;
     for (int k = 0; k < 2 && status != BT_OK; k++) {
         char *path = record_path(folder, k);

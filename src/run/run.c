@@ -27,6 +27,7 @@
 #include "case/cost.h"
 #include "partition/domain.h"
 #include "base/fileio.h"
+#include "output/folder.h"
 #include "output/gather.h"
 #include "base/lock.h"
 #include "revision.h"
@@ -56,8 +57,10 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
     bt_record_bodies b;
     bt_status status = bt_gather_bodies(r->comm, r->w, &r->roster, &b, err);
     if (status != BT_OK) return status;
+    // steps that are made again leave the result that they belong to
+    const bool again = kept || r->until >= 0;
     status =
-        (kept ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
+        (again ? bt_record_reopen : bt_record_open)(&r->record, r->comm, r->o->dir, r->c, &b, r->o->command_line, err);
     bt_gather_free(&b);
     if (status != BT_OK) return status;
     if (r->w->impacts) status = bt_comm_agree(r->comm, bt_record_watch_impacts(r->record, r->w->impacts, err));
@@ -215,8 +218,7 @@ static bt_status look_last(run *r, bt_errors *err)
     return status;
 }
 
-/// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order. The result takes its
-/// place before the checkpoint, which counts on it.
+/// Collective. Record, summary and last checkpoint of a run whose steps came to an end in order.
 static bt_status finish(run *r, bt_errors *err)
 {
     char stopped[96] = "";
@@ -230,9 +232,9 @@ static bt_status finish(run *r, bt_errors *err)
         r->totals.stopped = stopped;
     }
     if (status == BT_OK && !r->o->quiet) bt_record_print_summary(r->record, &r->totals, err);
-    const bt_status closed = bt_record_close(r->record, status == BT_OK ? &r->totals : NULL, err);
-    if (status == BT_OK) status = closed;
-    if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, BT_CHECKPOINT_FILE, err);
+    const bool sound = status == BT_OK;
+    const bt_status closed = bt_record_close(r->record, sound ? &r->totals : NULL, sound ? &s : NULL, err);
+    if (sound) status = closed;
     bt_snapshot_free(&s);
     status = bt_comm_agree(r->comm, status);
     if (status == BT_OK && *stopped) {
@@ -268,7 +270,7 @@ static bt_status run_world(run *r, bt_snapshot *kept, bt_errors *err)
         status = finish(r, err);
     } else {
         bt_errors more = {0}; // after a failed write another one says nothing new
-        bt_record_close(r->record, NULL, status == BT_ERR_IO ? &more : err);
+        bt_record_close(r->record, NULL, NULL, status == BT_ERR_IO ? &more : err);
         bt_errors_free(&more);
     }
     r->failed = status == BT_ERR_NUMERIC && r->w->step > r->first_step;
@@ -328,6 +330,7 @@ static bt_status take_folder(const bt_comm *comm, const char *dir, int *lock, bt
     if (comm->rank == 0) {
         status = bt_file_make_dir(dir, err);
         if (status == BT_OK && (*lock = bt_lock_take(dir, err)) < 0) status = BT_ERR_IO;
+        if (status == BT_OK) bt_folder_recover(dir);
     }
     return bt_comm_agree(comm, status);
 }
@@ -426,6 +429,9 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run
     manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     const bt_status status = run_case(comm, c, o, &m, err);
     if (m.failed >= 0) keep_failure(comm, c, o, m.failed, err);
+    if (status != BT_OK && m.lock >= 0 && bt_folder_keeps(o->dir))
+        bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", o->dir, o->dir,
+                      BT_FOLDER_REPLACED);
     bt_lock_drop(o->dir, m.lock);
     return status;
 }
@@ -478,7 +484,10 @@ static bt_status go_on(const bt_comm *comm, bt_snapshot *s, const bt_run_options
     bt_case c;
     bt_status status = bt_comm_agree(comm, bt_running_load_case(&c, s, err));
     const int64_t step = bt_snapshot_int(s, "world/step");
-    const bool finished = status == BT_OK && step >= bt_case_steps(&c);
+    // without its summary it was stopped between its last checkpoint and that: no step is left, but the end is
+    int ended = comm->rank == 0 && bt_file_there(o->dir, "summary.json");
+    bt_comm_bcast(comm, &ended, sizeof ended);
+    const bool finished = status == BT_OK && ended && step >= bt_case_steps(&c);
     if (finished && comm->rank == 0 && !o->quiet)
         printf("%s is finished: all %" PRId64 " steps are done\n", o->dir, step);
     if (status == BT_OK && !finished) status = run_guarded(comm, &c, o, s, true, start, err);
@@ -494,14 +503,18 @@ bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors 
     bt_status status = BT_OK;
     int lock = -1, fresh = 0;
     if (comm->rank == 0) {
-        fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
-                !bt_file_there(o->dir, "summary.json");
         if (!bt_file_there(o->dir, ".")) {
             bt_errors_add(err, "%s: there is no such folder; give the result folder of a run", o->dir);
             status = BT_ERR_IO;
         } else if ((lock = bt_lock_take(o->dir, err)) < 0) {
             status = BT_ERR_IO;
-        } else if (!fresh) {
+        } else {
+            bt_folder_recover(o->dir);
+            fresh = !o->from && !bt_checkpoint_there(o->dir) && bt_file_there(o->dir, "case.resolved.yml") &&
+                    !bt_file_there(o->dir, "summary.json");
+        }
+        if (status == BT_OK && fresh) status = bt_folder_check(o->dir, err);
+        else if (status == BT_OK) {
             status = o->from ? bt_snapshot_read(&s, o->from, err) : bt_checkpoint_read(&s, o->dir, &path, &said, err);
             if (status == BT_OK) tell(&s, said);
         }

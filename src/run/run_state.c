@@ -11,6 +11,7 @@
 #include "base/largest.h"
 #include "revision.h"
 #include "run/run_parts.h"
+#include "output/folder.h"
 #include "output/state.h"
 #include "base/table.h"
 
@@ -75,6 +76,7 @@ bt_status bt_running_checkpoint(bt_running *r, const char *name, bt_errors *err)
     bt_snapshot s = {0};
     status = bt_running_save(r, &s, err);
     if (status == BT_OK && r->comm->rank == 0) status = bt_checkpoint_write(&s, r->o->dir, name, err);
+    if (status == BT_OK && r->comm->rank == 0 && r->until < 0) bt_folder_settle(r->o->dir);
     bt_snapshot_free(&s);
     bt_halt_saved(&r->halt);
     return bt_comm_agree(r->comm, status);

@@ -647,12 +647,12 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
 {
     bt_case c;
     const bt_status status = bt_study_base_case(s, &c, err);
-    char *base = status == BT_OK ? bt_case_resolved(&c) : NULL, *text = NULL;
+    char *base = status == BT_OK ? bt_case_resolved(&c) : NULL;
     bt_case_free(&c);
     if (!base) return NULL;
-    size_t size;
-    FILE *out = open_memstream(&text, &size);
-    if (!out) abort();
+    bt_text text;
+    bt_text_begin(&text);
+    FILE *out = text.out;
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
                  "study.\n");
     fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, row_of("sampling")->choices[s->sampling],
@@ -672,7 +672,6 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     for (int i = 0; i < s->n_with; i++)
         for (int k = 0; k < s->with[i].n_set; k++) fprintf(out, "with %s: %s\n", s->with[i].name, s->with[i].set[k]);
     fprintf(out, "# base case with `set`\n%s", base);
-    fclose(out);
     free(base);
-    return text;
+    return bt_text_end(&text);
 }

@@ -202,7 +202,7 @@ static void check_end(scene *k, bt_record *r, const char *dir, bt_errors *err)
     k->closed[0] = (bt_impact){.time = 5, .peak = 1e6, .panel = 1};
     k->m.n_closed = 1;
     const bt_run_totals t = totals(STEPS);
-    assert_int_equal(bt_record_close(r, &t, err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, err), BT_OK);
     char path[200], wanted[200];
     snprintf(path, sizeof path, "%s/summary.json", dir);
     char *json = slurp(path);

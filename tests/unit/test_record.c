@@ -153,7 +153,7 @@ static void samples_merge_by_the_rule_of_their_field(void **state)
         bt_record_sample(r, &s, &err);
     }
     const bt_run_totals t = totals(10);
-    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
 
     const hid_t f = H5Fopen(in_folder("merge/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     double x[3];
@@ -240,7 +240,7 @@ static void an_empty_field_can_be_recorded(void **state)
     const bt_frame_row row = {.x = 1, .y = 2, .yaw = 3, .speed = 1};
     assert_int_equal(bt_record_frame(r, 0, &row, &err), BT_OK);
     const bt_run_totals t = totals(0);
-    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
     assert_int_equal(err.n, 0);
     char *xdmf = slurp(in_folder("empty/frames.xdmf"));
     assert_null(strstr(xdmf, "Name=\"floes\""));
@@ -275,7 +275,7 @@ static void many_floes_are_packed(void **state)
     assert_int_equal(bt_record_open(&r, &bt_comm_alone, in_folder("many"), &c, &b, NULL, &err), BT_OK);
     assert_int_equal(bt_record_frame(r, 0, rows, &err), BT_OK);
     const bt_run_totals t = totals(0);
-    assert_int_equal(bt_record_close(r, &t, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, &t, NULL, &err), BT_OK);
     const hid_t f = H5Fopen(in_folder("many/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     hsize_t d[3];
     read_all(f, "/xdmf/000000/floe_points", H5T_NATIVE_FLOAT, d, points, sizeof points);

@@ -25,7 +25,7 @@ static void a_failed_run_leaves_no_old_summary(void **state)
     assert_int_not_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const bt_sample s = sample(0);
     bt_record_sample(r, &s, &err);
-    assert_int_equal(bt_record_close(r, NULL, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, NULL, NULL, &err), BT_OK);
     assert_int_not_equal(access(in_folder("again/summary.json"), F_OK), 0);
     const hid_t f = H5Fopen(in_folder("again/result.h5"), H5F_ACC_RDONLY, H5P_DEFAULT);
     assert_int_equal(int_attribute(f, "/", "complete"), 0);

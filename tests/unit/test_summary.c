@@ -82,7 +82,7 @@ static char *summary_of(bt_case *c, int steps, const bt_run_totals *t, bt_idx to
         if (spoil) spoil(&s, i);
         bt_record_sample(r, &s, &err);
     }
-    assert_int_equal(bt_record_close(r, t, &err), BT_OK);
+    assert_int_equal(bt_record_close(r, t, NULL, &err), BT_OK);
     assert_int_equal(err.n, 0);
     return slurp(in_folder("s/summary.json"));
 }

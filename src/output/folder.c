@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// Replacing the result of a folder; the states it passes through are in folder.h.
+#include "output/folder.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/checksum.h"
+#include "base/fileio.h"
+#include "bergtow/case.h"
+#include "bergtow/checkpoint.h"
+#include "output/record_parts.h"
+#include "output/xdmf.h"
+
+#define CASE_FILE "case.resolved.yml"
+
+static bool is_summary(const char *path) { return bt_file_begins(path, "{\n  \"title\": "); }
+static bool is_frames(const char *path) { return bt_file_begins(path, BT_XDMF_HEAD); }
+static bool is_case(const char *path) { return bt_file_begins(path, BT_CASE_RESOLVED_HEAD); }
+
+static bool is_sealed(const char *path) { return bt_checksum_there(path, NULL); }
+
+static bool is_request(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 && S_ISREG(st.st_mode) && st.st_size == 0;
+}
+
+/// What a run leaves in its folder, or takes notice of; the case is first to go and last to come.
+static const struct {
+    const char *name;
+    bool (*ours)(const char *path);
+} files[] = {
+    {CASE_FILE, is_case},
+    {"summary.json", is_summary},
+    {BT_RESULT_FILE, is_sealed},
+    {BT_RESULT_PART, is_sealed},
+    {BT_RESULT_FILE ".tmp", is_sealed},
+    {"frames.xdmf", is_frames},
+    {BT_CHECKPOINT_FILE, is_sealed},
+    {BT_CHECKPOINT_FILE ".tmp", is_sealed},
+    {BT_CHECKPOINT_BEFORE, is_sealed},
+    {BT_CHECKPOINT_DAMAGED, NULL}, // what it holds has been found not to be sound
+    {BT_FAILURE_FILE, is_sealed},
+    {"stop", is_request},
+};
+enum { N_FILES = sizeof files / sizeof *files };
+
+static char *aside_of(const char *dir) { return bt_file_join(dir, BT_FOLDER_REPLACED); }
+
+static bool is_there(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0;
+}
+
+/// Is file k in the folder, and this program's?
+static bool holds(const char *dir, int k)
+{
+    char *path = bt_file_join(dir, files[k].name);
+    const bool yes = is_there(path) && (!files[k].ours || files[k].ours(path));
+    free(path);
+    return yes;
+}
+
+bt_status bt_folder_check(const char *dir, bt_errors *err)
+{
+    bt_status status = BT_OK;
+    for (int k = 0; k < N_FILES; k++) {
+        char *path = bt_file_join(dir, files[k].name);
+        if (is_there(path) && !holds(dir, k)) {
+            bt_errors_add(err,
+                          "%s: is no file that this program has written, and a run would replace it; move it away, or "
+                          "give another folder with -o",
+                          path);
+            status = BT_ERR_IO;
+        }
+        free(path);
+    }
+    return status;
+}
+
+bool bt_folder_begun(const char *dir)
+{
+    return bt_file_there(dir, CASE_FILE) || bt_file_there(dir, BT_RESULT_PART) || bt_checkpoint_there(dir) ||
+           bt_folder_keeps(dir);
+}
+
+bool bt_folder_keeps(const char *dir) { return bt_file_there(dir, BT_FOLDER_REPLACED); }
+
+/// File k of one folder to the same name in another.
+static bt_status move(const char *from, const char *to, int k, bt_errors *err)
+{
+    if (!holds(from, k)) return BT_OK;
+    char *old = bt_file_join(from, files[k].name), *new = bt_file_join(to, files[k].name);
+    const bt_status status = bt_file_rename(old, new, err);
+    free(old);
+    free(new);
+    return status;
+}
+
+/// Remove all of the program's files.
+static bt_status clear(const char *dir, bt_errors *err)
+{
+    bt_status status = BT_OK;
+    for (int k = 0; k < N_FILES && status == BT_OK; k++) {
+        if (!holds(dir, k)) continue;
+        char *path = bt_file_join(dir, files[k].name);
+        status = bt_file_remove(path, err);
+        free(path);
+    }
+    return status;
+}
+
+static bool stands(const char *dir) { return bt_checkpoint_there(dir) || bt_file_there(dir, "summary.json"); }
+
+/// What is in the folder to the one aside. If that is there already, what it holds is the last result that stood, and
+/// the run in its place never did: that one goes.
+static bt_status make_room(const char *dir, bt_errors *err)
+{
+    if (stands(dir)) bt_folder_settle(dir);
+    if (bt_folder_keeps(dir)) return clear(dir, err);
+    bool any = false;
+    for (int k = 0; k < N_FILES && !any; k++) any = holds(dir, k);
+    if (!any) return BT_OK;
+    char *aside = aside_of(dir);
+    bt_status status = bt_file_make_dir(aside, err);
+    for (int k = 0; k < N_FILES && status == BT_OK; k++) status = move(dir, aside, k, err);
+    free(aside);
+    return status;
+}
+
+bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
+{
+    char *ready = bt_file_join(dir, CASE_FILE ".new"), *path = bt_file_join(dir, CASE_FILE);
+    bt_status status = bt_file_write(ready, resolved, err); // where the disk is full, nothing has changed
+    if (status == BT_OK) {
+        status = make_room(dir, err);
+        if (status == BT_OK) status = bt_file_rename(ready, path, err);
+        if (status != BT_OK) bt_folder_put_back(dir);
+    }
+    unlink(ready);
+    free(ready);
+    free(path);
+    return status;
+}
+
+void bt_folder_put_back(const char *dir)
+{
+    if (!bt_folder_keeps(dir)) return;
+    bt_errors unheard = {0}; // what cannot be moved stays where it is, and the next call tries again
+    char *aside = aside_of(dir), *path = bt_file_join(dir, CASE_FILE), *part = bt_file_join(dir, BT_RESULT_PART);
+    unlink(path);
+    unlink(part);
+    bt_status status = BT_OK;
+    for (int k = N_FILES - 1; k >= 0 && status == BT_OK; k--) status = move(aside, dir, k, &unheard);
+    rmdir(aside);
+    free(aside);
+    free(path);
+    free(part);
+    bt_errors_free(&unheard);
+}
+
+void bt_folder_recover(const char *dir)
+{
+    if (!bt_file_there(dir, CASE_FILE)) bt_folder_put_back(dir);
+}
+
+void bt_folder_settle(const char *dir)
+{
+    if (!bt_folder_keeps(dir)) return;
+    bt_errors unheard = {0}; // the next result that stands tries again
+    char *aside = aside_of(dir);
+    clear(aside, &unheard);
+    rmdir(aside);
+    free(aside);
+    bt_errors_free(&unheard);
+}
