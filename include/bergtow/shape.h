@@ -60,13 +60,13 @@ int bt_shape_named(const char *name, double l, double w, double *v);
 
 /// A waterline of length l (x) and width w (y), m, bow on +x, convex and anticlockwise, about any origin: it is moved
 /// to its centroid. v: [2*BT_MAX_VERTICES]; returns the number of vertices, at most BT_MAX_VERTICES.
-typedef int bt_shape_outline(double l, double w, double *v);
+typedef int (*bt_shape_outline)(double l, double w, double *v);
 
 enum { BT_MAX_ADDED_SHAPES = 4 };
 
 /// Add a shape of the towed body, `body.shape: NAME`, before a case is read and from one thread; how:
 /// docs/how-to-add-a-body-shape.md. Name and function must stay where they are. Errors: BT_ERR_USAGE with reason and
 /// remedy: a name that is taken or none, no convex outline of 2 × 1 m, no room.
-bt_status bt_shape_register(const char *name, bt_shape_outline *outline, bt_errors *err);
+bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err);
 
 #endif

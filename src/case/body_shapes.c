@@ -7,7 +7,7 @@
 #include "case/law_keys.h"
 
 const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
-static bt_shape_outline *added[BT_MAX_ADDED_SHAPES];
+static bt_shape_outline added[BT_MAX_ADDED_SHAPES];
 static int n_added;
 
 int bt_body_shape_named(bt_body_shape shape, double length, double width, double *v)
@@ -17,7 +17,7 @@ int bt_body_shape_named(bt_body_shape shape, double length, double width, double
     return bt_shape_named(bt_body_shapes[shape], length, shape == BT_BODY_SQUARE ? length : width, v);
 }
 
-bt_status bt_shape_register(const char *name, bt_shape_outline *outline, bt_errors *err)
+bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err)
 {
     const size_t before = err->n;
     if (!name || !bt_law_is_name(name))

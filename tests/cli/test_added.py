@@ -3,8 +3,6 @@
 
 By themselves: tests/unit/test_added.c, tests/physics/test_force_law.c. Here: the list of keys, the resolved case, a
 tow, a resumed one, the balance on the console, the pages.
-
-Red with (tried): the added name written to the resolved case as the one before it; the pages' code changed.
 """
 import json
 import re

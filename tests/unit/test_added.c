@@ -70,7 +70,7 @@ static int line(double l, double w, double *v)
 static void what_will_not_do_is_refused(void **state)
 {
     (void)state;
-    const struct { const char *name; bt_shape_outline *outline; const char *says; } bad[] = {
+    const struct { const char *name; bt_shape_outline outline; const char *says; } bad[] = {
         {"ship", capsule, "a shape of this name"}, {"capsule", capsule, "a shape of this name"},
         {"none", capsule, "a shape of this name"}, {"Big barge", capsule, "lower-case letters"},
         {"barge", NULL, "no function"},            {"stick", line, "it is no outline"},
