@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-#include "case/law_keys.h"
+#include "base/name.h"
 
 const char *bt_body_shapes[BT_OWN_SHAPES + BT_MAX_ADDED_SHAPES + 1] = {BT_SHAPE_NAMES, "polygon", "none", NULL};
 static bt_shape_outline added[BT_MAX_ADDED_SHAPES];
@@ -20,7 +20,7 @@ int bt_body_shape_named(bt_body_shape shape, double length, double width, double
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err)
 {
     const size_t before = err->n;
-    if (!name || !bt_law_is_name(name))
+    if (!name || !bt_is_name(name, BT_MOST_LAW_NAME))
         bt_errors_add(err, "shape \"%s\": the name must be of lower-case letters, digits and _, at most 40",
                       name ? name : "");
     for (int k = 0; err->n == before && bt_body_shapes[k]; k++)

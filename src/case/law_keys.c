@@ -1,20 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Keys that a program adds; see bergtow/law_key.h.
-#include "case/law_keys.h"
+#include "bergtow/law_key.h"
 
-#include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "case/schema.h"
-
-bool bt_law_is_name(const char *s)
-{
-    for (const char *p = s; *p; p++)
-        if (!islower((unsigned char)*p) && *p != '_' && !(p > s && isdigit((unsigned char)*p))) return false;
-    return *s && strlen(s) <= 40;
-}
 
 static int unit_of(const char *symbol)
 {

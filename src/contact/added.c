@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "case/law_keys.h"
 #include "contact/row.h"
 #include "contact/work.h"
 
@@ -15,48 +14,11 @@ static int n_added;
 int bt_n_contact_laws(void) { return n_added; }
 const bt_contact_law *bt_contact_law_of(int k) { return added[k]; }
 
-// --- registration ----------------------------------------------------------------------------------------------------
-
-static bool is_known(const char *name)
+bool bt_added_add(const bt_contact_law *law)
 {
-    for (int law = 0; law < BT_LAWS; law++)
-        if (!strcmp(bt_laws[law].name, name)) return true;
-    for (int k = 0; k < n_added; k++)
-        if (!strcmp(added[k]->name, name)) return true;
-    return false;
-}
-
-static void check_numbers(const bt_contact_law *law, const char *name, bt_errors *err)
-{
-    if (law->n_numbers < 0 || law->n_numbers > BT_MAX_CONTACT_NUMBERS)
-        bt_errors_add(err, "contact law %s: it has %d numbers, at most %d fit", name, law->n_numbers,
-                      BT_MAX_CONTACT_NUMBERS);
-    else
-        for (int k = 0; k < law->n_numbers; k++)
-            if (law->numbers[k].state ? !law->count : !law->remember)
-                bt_errors_add(err, "contact law %s: nothing adds to its number %s; give it `%s`", name,
-                              law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
-}
-
-bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
-{
-    const size_t before = err->n;
-    const char *name = law->name ? law->name : "";
-    if (!bt_law_is_name(name))
-        bt_errors_add(err, "contact law \"%s\": the name must be of lower-case letters, digits and _, at most 40",
-                      name);
-    else if (is_known(name))
-        bt_errors_add(err, "contact law %s: there is a law of this name; choose another", name);
-    if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
-    if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "contact law %s: say in a line what it is (`doc`)", name);
-    if (law->n_keys < 0 || law->n_keys > BT_MAX_CONTACT_OWN)
-        bt_errors_add(err, "contact law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_CONTACT_OWN);
-    check_numbers(law, name, err);
-    if (n_added == BT_MAX_ADDED_LAWS)
-        bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name, n_added);
-    if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
+    if (n_added == BT_MAX_ADDED_LAWS) return false;
     added[n_added++] = law;
-    return BT_OK;
+    return true;
 }
 
 void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN])

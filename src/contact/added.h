@@ -10,6 +10,9 @@
 #include "bergtow/contact.h"
 #include "contact/law.h"
 
+/// A law that has been checked (register.c), after those that are there. False: there is no room.
+bool bt_added_add(const bt_contact_law *law);
+
 /// False where there is no law of this number.
 bool bt_added_on(const bt_params *p, int law);
 bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b);

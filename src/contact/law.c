@@ -80,13 +80,6 @@ void bt_laws_reserve(bt_cell *t)
     t->laws.limits = bt_alloc_aligned((size_t)t->laws.cap_limits, sizeof *t->laws.limits);
 }
 
-void bt_law_narrow(bt_limit *l, int i, double c, int law)
-{
-    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = law;
-    l->flat[i] = bt_min(l->flat[i], c);
-    l->most[i] = bt_min(l->most[i], c);
-}
-
 void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, const bt_manifold *m)
 {
     bt_limit *l = &t->laws.limits[j];

@@ -94,9 +94,6 @@ bool bt_law_on(const bt_params *p, int law);
 /// And those of this pair?
 bool bt_law_applies(const bt_world *w, int law, bt_idx a, bt_idx b);
 
-/// A flat bound c of this law on point i, whatever bounds it now, N s.
-void bt_law_narrow(bt_limit *l, int i, double c, int law);
-
 /// Is the pair of a record still near: at most BT_LAW_MEMORY mean floe sizes apart?
 bool bt_law_near(const bt_world *w, const bt_memory *r);
 
@@ -126,6 +123,14 @@ static inline bt_memory bt_law_names(const bt_world *w, const bt_pair *p, int la
 {
     const bt_gid *gid = w->bodies.gid;
     return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .law = (uint16_t)law};
+}
+
+/// A flat bound c of this law on point i, whatever bounds it now, N s.
+static inline void bt_law_narrow(bt_limit *l, int i, double c, int law)
+{
+    if (c < l->cap[i]) l->cap[i] = c, l->by[i] = law;
+    l->flat[i] = bt_min(l->flat[i], c);
+    l->most[i] = bt_min(l->most[i], c);
 }
 
 #endif

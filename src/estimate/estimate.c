@@ -2,10 +2,10 @@
 // Estimates of broken-ice resistance; equations and sources in bergtow/estimate.h.
 #include "bergtow/estimate.h"
 
-#include <ctype.h>
 #include <math.h>
 #include <string.h>
 
+#include "base/name.h"
 #include "force/environment.h"
 #include "bergtow/shape.h"
 
@@ -146,17 +146,11 @@ static int n_estimates = BT_N_OWN_ESTIMATES;
 int bt_n_estimates(void) { return n_estimates; }
 const bt_estimate_def *bt_estimate_of(int k) { return &estimates[k]; }
 
-static bool is_name(const char *s)
-{
-    const size_t n = strspn(s, "abcdefghijklmnopqrstuvwxyz0123456789_");
-    return n > 0 && n <= 40 && !s[n] && !isdigit((unsigned char)*s) && strcmp(s, "curves");
-}
-
 bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = d->name ? d->name : "";
-    if (!is_name(name))
+    if (!bt_is_name(name, BT_MOST_LAW_NAME) || !strcmp(name, "curves")) // the summary has curves of them all
         bt_errors_add(err, "estimate \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     for (int k = 0; k < n_estimates; k++)
         if (!strcmp(estimates[k].name, name))

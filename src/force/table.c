@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "case/law_keys.h"
+#include "base/name.h"
 #include "force/laws.h"
 
 #define POINTER(name) &bt_law_##name,
@@ -63,7 +63,7 @@ bt_status bt_force_register(const bt_force_law *law, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = law->name ? law->name : "";
-    if (!bt_law_is_name(name))
+    if (!bt_is_name(name, BT_MOST_LAW_NAME))
         bt_errors_add(err, "force law \"%s\": the name must be of lower-case letters, digits and _, at most 40", name);
     else if (bt_force_series_find(name) >= 0)
         bt_errors_add(err, "force law %s: there is a force of this name; choose another", name);

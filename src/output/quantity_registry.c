@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/name.h"
 #include "output/record.h"
 
 const char *const bt_keep_names[BT_KEEP_KINDS] = {"last", "mean", "max", "sum"};
@@ -38,13 +39,6 @@ static bool is_taken(const char *name)
     return false;
 }
 
-static bool is_name(const char *s)
-{
-    for (const char *p = s; *p; p++)
-        if (!islower((unsigned char)*p) && *p != '_' && !(p > s && isdigit((unsigned char)*p))) return false;
-    return *s && strlen(s) <= MOST_NAME;
-}
-
 /// mean_NAME_n for a mean in N: the units as the other keys of summary.json end with them.
 static void make_key(const bt_quantity *q, char key[MOST_KEY])
 {
@@ -70,7 +64,7 @@ bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err)
 {
     const size_t before = err->n;
     const char *name = q->name ? q->name : "";
-    if (!is_name(name))
+    if (!bt_is_name(name, MOST_NAME))
         bt_errors_add(err, "quantity \"%s\": the name must be of lower-case letters, digits and _, at most %d", name,
                       MOST_NAME);
     else if (is_taken(name))

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "bergtow/case.h"
-#include "case/law_keys.h"
+#include "bergtow/law_key.h"
 
 #include "examples/body_shape.c"
 #include "examples/key.c"

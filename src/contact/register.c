@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+// What a contact law must have to be added; bergtow/contact.h.
+#include <string.h>
+
+#include "base/name.h"
+#include "contact/added.h"
+
+static bool is_known(const char *name)
+{
+    for (int law = 0; law < BT_LAWS; law++)
+        if (!strcmp(bt_laws[law].name, name)) return true;
+    for (int k = 0; k < bt_n_contact_laws(); k++)
+        if (!strcmp(bt_contact_law_of(k)->name, name)) return true;
+    return false;
+}
+
+static void check_numbers(const bt_contact_law *law, const char *name, bt_errors *err)
+{
+    if (law->n_numbers < 0 || law->n_numbers > BT_MAX_CONTACT_NUMBERS)
+        bt_errors_add(err, "contact law %s: it has %d numbers, at most %d fit", name, law->n_numbers,
+                      BT_MAX_CONTACT_NUMBERS);
+    else
+        for (int k = 0; k < law->n_numbers; k++)
+            if (law->numbers[k].state ? !law->count : !law->remember)
+                bt_errors_add(err, "contact law %s: nothing adds to its number %s; give it `%s`", name,
+                              law->numbers[k].name, law->numbers[k].state ? "count" : "remember");
+}
+
+bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
+{
+    const size_t before = err->n;
+    const char *name = law->name ? law->name : "";
+    if (!bt_is_name(name, BT_MOST_LAW_NAME))
+        bt_errors_add(err, "contact law \"%s\": the name must be of lower-case letters, digits and _, at most 40",
+                      name);
+    else if (is_known(name))
+        bt_errors_add(err, "contact law %s: there is a law of this name; choose another", name);
+    if (!law->on || !law->bound) bt_errors_add(err, "contact law %s: it needs the functions `on` and `bound`", name);
+    if (!law->doc || strlen(law->doc) < 8) bt_errors_add(err, "contact law %s: say in a line what it is (`doc`)", name);
+    if (law->n_keys < 0 || law->n_keys > BT_MAX_CONTACT_OWN)
+        bt_errors_add(err, "contact law %s: it has %d keys, at most %d fit", name, law->n_keys, BT_MAX_CONTACT_OWN);
+    check_numbers(law, name, err);
+    if (bt_n_contact_laws() == BT_MAX_ADDED_LAWS)
+        bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name,
+                      BT_MAX_ADDED_LAWS);
+    if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
+    bt_added_add(law);
+    return BT_OK;
+}
