@@ -121,7 +121,14 @@ $(EXTENDED): tests/examples/extended.c $(BIN_OBJ) $(BUILD)/libbergtow.a $(STAMP)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -Itests $< $(BIN_OBJ) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
 
-tests: $(TEST_BIN) $(RANK_BIN) $(EXTENDED) $(BUILD)/triad ## build the test programs
+# Preloaded by Python tests.
+FAULT := $(BUILD)/tests/fault/fault.so
+$(FAULT): tests/fault/fault.c $(STAMP)
+	@mkdir -p $(@D)
+	@echo '  TEST $@'
+	@$(CC) $(CFLAGS) -shared -fPIC $< -ldl -o $@
+
+tests: $(TEST_BIN) $(RANK_BIN) $(EXTENDED) $(FAULT) $(BUILD)/triad ## build the test programs
 
 $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 	@mkdir -p $(@D)
@@ -253,4 +260,4 @@ clean: ## remove build/ and out/
 	rm -rf build out
 
 -include $(patsubst %.o,%.d,$(LIB_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
--include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d
+-include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d $(FAULT:.so=.d)

@@ -111,8 +111,8 @@ def draw(run, kind="speed", times=(), window="auto"):
     if run.n_floes:
         colouring.bar(figure, scene.mappable, figure.add_axes(inches(cax)), orientation)
     if rafted:
-        figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right", fontsize=10.5,
-                    color=style.RAFTED)
+        figure.text(1 - 0.2 / size[0], 1 - 0.42 / size[1], "■ floes over each other", va="top", ha="right",
+                    fontsize=10.5, color=style.RAFTED)
     style.headline(figure, run, "ice field", 0.2 / size[0])
     return figure
 

@@ -14,6 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergtow"))
 # Assertions, checks of the division among ranks, and threads in every parallel loop: make validate.
 VALIDATE = os.path.abspath(os.environ.get("BERGTOW_VALIDATE", ROOT / "build/validate/bergtow"))
+FAULT = pathlib.Path(BERGTOW).parent / "tests/fault/fault.so"  # tests/fault/fault.c
 DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 # A tow through loose ice, some 140 floes, done in a fraction of a second.
@@ -80,6 +81,12 @@ def environment(**extra):
 def call(*arguments, cwd=None, env=None, timeout=120, **more):
     return subprocess.run([BERGTOW, *map(str, arguments)], cwd=cwd, env=env or environment(OMP_NUM_THREADS=1),
                           capture_output=True, text=True, timeout=timeout, **more)
+
+
+def faulty(**what):
+    """The environment of a program whose calls of the system fail as BT_FAULT says (tests/fault/fault.c)."""
+    assert FAULT.exists(), "make tests builds it"
+    return environment(OMP_NUM_THREADS=1, LD_PRELOAD=FAULT, **what)
 
 
 class Run:

@@ -137,7 +137,7 @@ static inline bt_status write_run(const char *dir, const bt_case *c, int steps, 
     }
     const bt_run_totals t = totals(steps);
     if (print_summary) bt_record_print_summary(r, &t, err);
-    return bt_record_close(r, &t, err);
+    return bt_record_close(r, &t, NULL, err);
 }
 
 static inline char *in_folder(const char *name)

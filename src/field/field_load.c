@@ -37,8 +37,8 @@ void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *wa
                       (long long)o->unnamed, (long long)o->read, o->nearly, c->ice.thickness);
     if (o->split && c->ice.rafting_kappa > 0)
         bt_errors_add(warnings,
-                      "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; ice.nonconvex: "
-                      "hull lets them raft, with their hulls' outlines",
+                      "ice.rafting: %lld floes are not convex and made of convex parts: they stay rigid; "
+                      "ice.nonconvex: hull lets them raft, with their hulls' outlines",
                       (long long)o->split);
     const bt_map_crs crs = bt_map_crs_of(o->crs);
     if (crs.kind != BT_MAP_PLANE) return;

@@ -58,11 +58,13 @@ static bool is_there(const char *path)
     return lstat(path, &st) == 0;
 }
 
-/// Is file k in the folder, and this program's?
+/// Is file k in the folder, and this program's? A link is replaced and never followed: what it leads to stays.
 static bool holds(const char *dir, int k)
 {
     char *path = bt_file_join(dir, files[k].name);
-    const bool yes = is_there(path) && (!files[k].ours || files[k].ours(path));
+    struct stat st;
+    const bool there = lstat(path, &st) == 0;
+    const bool yes = there && (S_ISLNK(st.st_mode) || !files[k].ours || files[k].ours(path));
     free(path);
     return yes;
 }
@@ -134,6 +136,19 @@ static bt_status make_room(const char *dir, bt_errors *err)
     return status;
 }
 
+/// The case last: until it is there, the next call goes on with this.
+static void move_back(const char *dir)
+{
+    if (!bt_folder_keeps(dir)) return;
+    bt_errors unheard = {0}; // what cannot be moved stays where it is, and the next call tries again
+    char *aside = aside_of(dir);
+    bt_status status = BT_OK;
+    for (int k = N_FILES - 1; k >= 0 && status == BT_OK; k--) status = move(aside, dir, k, &unheard);
+    rmdir(aside);
+    free(aside);
+    bt_errors_free(&unheard);
+}
+
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
 {
     char *ready = bt_file_join(dir, CASE_FILE ".new"), *path = bt_file_join(dir, CASE_FILE);
@@ -141,7 +156,7 @@ bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *er
     if (status == BT_OK) {
         status = make_room(dir, err);
         if (status == BT_OK) status = bt_file_rename(ready, path, err);
-        if (status != BT_OK) bt_folder_put_back(dir);
+        if (status != BT_OK) move_back(dir); // a case that is there is still the old one
     }
     unlink(ready);
     free(ready);
@@ -152,17 +167,12 @@ bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *er
 void bt_folder_put_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    bt_errors unheard = {0}; // what cannot be moved stays where it is, and the next call tries again
-    char *aside = aside_of(dir), *path = bt_file_join(dir, CASE_FILE), *part = bt_file_join(dir, BT_RESULT_PART);
+    char *path = bt_file_join(dir, CASE_FILE), *part = bt_file_join(dir, BT_RESULT_PART);
     unlink(path);
     unlink(part);
-    bt_status status = BT_OK;
-    for (int k = N_FILES - 1; k >= 0 && status == BT_OK; k--) status = move(aside, dir, k, &unheard);
-    rmdir(aside);
-    free(aside);
+    move_back(dir);
     free(path);
     free(part);
-    bt_errors_free(&unheard);
 }
 
 void bt_folder_recover(const char *dir)

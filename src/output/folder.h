@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
-// The folder of a run: which of its files are the program's, and how a new result takes the place of an old one.
+// The folder of a run: which of its files are the program's, and how a new one takes the place of an old result.
 //
 // The old result is moved into DIR/replaced, name by name, before the new run writes anything but its case, and is
-// removed when the new one stands: when it has a checkpoint or a summary. Every moment between leaves one of two states:
+// removed when the new one stands: when it has a checkpoint or a summary. Every moment between leaves one of two
+// states:
 //
-//     replaced/ and no case.resolved.yml     the exchange was cut short: bt_folder_put_back makes the folder what it was
+//     replaced/ and no case.resolved.yml     the exchange was cut short: bt_folder_recover makes the folder what it was
 //     replaced/ and case.resolved.yml        the new run has begun: `resume` runs it, from the start if it must
 //
 // so the name case.resolved.yml, given by one rename, decides. Rejected: to delete first (a full disk then leaves

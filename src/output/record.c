@@ -114,9 +114,9 @@ bt_status bt_record_write_text(const bt_record *r, const char *name, const char 
 /// A run that goes on takes only the summary away, which is of its end, and what was under way.
 static bt_status prepare_dir(const bt_record *r, const char *resolved, bool fresh, bt_errors *err)
 {
-    if (fresh) return bt_folder_replace(r->dir, resolved, err);
+    bt_status status = bt_file_make_dir(r->dir, err);
+    if (fresh) return status == BT_OK ? bt_folder_replace(r->dir, resolved, err) : status;
     static const char *const stale[] = {"summary.json", BT_RESULT_FILE ".tmp", BT_CHECKPOINT_FILE ".tmp"};
-    bt_status status = BT_OK;
     for (size_t k = 0; k < sizeof stale / sizeof *stale && status == BT_OK; k++) {
         char *path = bt_file_join(r->dir, stale[k]);
         status = bt_file_remove(path, err);
@@ -146,6 +146,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
     char *resolved = bt_case_resolved(c), *path = bt_file_join(dir, BT_RESULT_PART);
     bt_status status = comm->rank == 0 ? bt_summary_check_added(err) : BT_OK;
     if (status == BT_OK && comm->rank == 0) status = prepare_dir(r, resolved, fresh, err);
+    const bool replaced = status == BT_OK && fresh && comm->rank == 0;
     status = bt_comm_agree(comm, status);
     if (status == BT_OK) status = bt_h5_create_shared(&r->h5, comm, path, err);
     if (status == BT_OK) {
@@ -165,8 +166,8 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
             bt_h5_give_up(&r->h5, status);
             close_file(r);
         }
-        if (status != BT_OK && fresh && comm->rank == 0) bt_folder_put_back(dir);
     }
+    if (status != BT_OK && replaced) bt_folder_put_back(dir);
     free(resolved);
     free(path);
     if (status != BT_OK) {

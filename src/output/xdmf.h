@@ -17,7 +17,7 @@ typedef struct bt_xdmf {
 #define BT_XDMF_POLYGON 3
 
 #define BT_XDMF_HEAD                                                                                                   \
-    "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"                                      \
+    "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<Xdmf Version=\"2.0\">\n  <Domain>\n"                                \
     "    <Grid Name=\"frames\" GridType=\"Collection\" CollectionType=\"Temporal\">\n"
 
 /// frames.xdmf as text; the caller frees it.

@@ -165,7 +165,7 @@ def test_links_in_the_output_folder_are_not_followed(tmp_path):
     names = [
         "result.h5", "result.part.h5", "result.h5.tmp", "checkpoint.h5", "checkpoint.h5.tmp", "checkpoint.previous.h5",
         "stop", "summary.json", "summary.json.tmp", "frames.xdmf", "frames.xdmf.tmp", "case.resolved.yml",
-        "case.resolved.yml.tmp"
+        "case.resolved.yml.new", "case.resolved.yml.new.tmp"
     ]
     outside, out = tmp_path / "outside", tmp_path / "out"
     outside.mkdir()
