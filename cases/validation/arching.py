@@ -195,7 +195,7 @@ def table(rows):
         way = [r["after"] for r in found if r["arrest"]]
         low, high = wilson(k, n)
         lines.append("| " + " | ".join(str(row[key]) for key in names) + f" | {k} of {n} | {low:.2f} to {high:.2f} | "
-                     + (f"{min(way)} to {max(way)}" if way else "–") +
+                     + (f"{min(way)} to {max(way)}" if len(way) > 1 else str(*way) or "–") +
                      f" | {sum(r['unconverged_steps'] for r in found)} of {sum(r['n_steps'] for r in found)} |")
     return "\n".join(lines)
 
@@ -252,6 +252,7 @@ def draw_arch(ax, folder):
         gap = width - r.value("body.width")
     ax.set(xlim=(-gap, 2 * gap), ylim=(width / 2 - 1.5 * gap, width / 2 + 1.5 * gap), aspect="equal",
            facecolor=style.WATER, xlabel="x from the boom (m)", ylabel="y (m)", title="An arch, block/gap 0.15")
+    ax.locator_params(nbins=5)
 
 
 def draw(out, parts):

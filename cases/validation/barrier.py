@@ -20,7 +20,7 @@ from bergtow_read import Run
 
 import matplotlib.pyplot as plt
 import numpy as np
-from scipy.optimize import curve_fit
+from scipy.optimize import minimize_scalar
 
 LENGTHS = (2, 4, 8, 12, 24)  # of the cover as it comes, in widths
 #: (width in m, friction of the walls): the longest cover, in widths; floes are 0.4 m
@@ -84,10 +84,11 @@ def share(length, scale):
 
 
 def fit(rows):
-    """Length scale l of rows of one width and friction, m: least squares of F / F_0."""
-    length, found = (np.array([r[key] for r in rows]) for key in ("length", "force"))
-    found = found / np.array([r["drag"] for r in rows])
-    return curve_fit(share, length, found, p0=length.max() / 2, bounds=(1e-3, 1e6))[0][0]
+    """Length scale l of rows of one width and friction, m: least squares of F / F_0, over l from L / 100 to 100 L."""
+    length, force, drag = (np.array([r[key] for r in rows]) for key in ("length", "force", "drag"))
+    ends = np.log(length.mean()) + np.array([-1, 1]) * np.log(100)
+    return np.exp(minimize_scalar(lambda s: np.sum((share(length, np.exp(s)) - force / drag)**2), bounds=ends,
+                                  method="bounded", options={"xatol": 1e-9}).x)
 
 
 def redrawn(rows, rng):

@@ -165,7 +165,7 @@ def test_wilson():
 
 def test_the_length_scale_of_made_up_loads_is_found_again(monkeypatch):
     monkeypatch.setattr(barrier, "DRAWS", 10)
-    rows = [{"kappa": 0, "width": w, "friction": mu, "lengths": n, "length": n * w, "drag": 3.0 * n * w,
+    rows = [{"kappa": 0, "width": w, "friction": mu, "lengths": n, "length": n * w, "drag": 3.0 * w * n * w,
              "force": 3.0 * w * (w / (0.4 * mu)) * (1 - np.exp(-n * w / (w / (0.4 * mu))))}
             for w, mu in barrier.CHANNELS for n in (2, 4, 8)]
     found = barrier.fits(rows)
