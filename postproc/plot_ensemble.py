@@ -453,8 +453,8 @@ def draw_returns(e, conditions, name):
         axes.set_ylim(min(0.0, floor), 2.5 * max(values) / factor)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel("return time (hours of tow)")
-    axes.set_ylabel(f"{first['label']} ({unit}), mean over {first['time_scale_s']:.3g} s" if not first["conversion"] else
-                    f"{first['label']} ({unit}), collisions as {first['conversion']}")
+    kind = f"collisions as {first['conversion']}" if first["conversion"] else f"mean over {first['time_scale_s']:.3g} s"
+    axes.set_ylabel(f"{first['label']} ({unit}), {kind}")
     axes.grid(True)
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
     d = first["design"]

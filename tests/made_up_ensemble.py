@@ -35,7 +35,8 @@ def member(series, parameters, condition, **changes):
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
         "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
-        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {}, "told": {}, "case": None
+        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None,
+        "more": {}, "told": {}, "case": None
     } | changes
 
 

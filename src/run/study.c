@@ -655,8 +655,8 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
     if (!out) abort();
     fprintf(out, "# bergtow study: what its members are. More repeats may be asked for later; anything else is another "
                  "study.\n");
-    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed, row_of("sampling")->choices[s->sampling],
-            s->n_conditions, s->common_fields ? "fields: common\n" : "");
+    fprintf(out, "seed: %" PRId64 "\nsampling: %s\nconditions: %" PRId64 "\n%s", s->seed,
+            row_of("sampling")->choices[s->sampling], s->n_conditions, s->common_fields ? "fields: common\n" : "");
     for (int p = 0; p < s->n_parameters; p++) {
         fprintf(out, "%s:", s->parameter[p].name);
         if (s->parameter[p].continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
