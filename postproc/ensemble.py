@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 
 import command
+import converge_text
 import design
 import ensemble_text
 import loads
@@ -208,7 +209,8 @@ def statistics(e, options):
         "died": e.reasons(WAITING), "behind": e.behind, "members_without_folder": e.without_folder,
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
         "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions,
-        "sensitivity": sensitivity(e, members), "members": list(members.values())
+        "sensitivity": sensitivity(e, members), "members": list(members.values()),
+        "convergence": converge_text.of_folder(e.path)
     }
 
 

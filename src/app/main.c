@@ -24,6 +24,8 @@ static const struct {
     {"field", "make the ice field of a case only", bt_cmd_field, false},
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
      true},
+    {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
+     bt_cmd_converge, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},

@@ -103,6 +103,13 @@ def test_rates_of_exceedance_of_a_known_process():
     assert low < 3600 * process.rate(row["level"]) < high
 
 
+def test_the_threshold_of_a_signal_leaves_sixty_clusters():
+    """A tenth of the samples, as of collisions, is far too much of a correlated signal for the tail to be GPD."""
+    fields = fields_of(AR1(0.9), 12, 2000, np.random.default_rng(3))
+    found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)["over_threshold"]
+    assert 60 <= found["clusters"] < 75 and found["excesses"] < 0.03 * 12 * 2000
+
+
 def test_a_correlated_signal_of_few_clusters_has_no_tail():
     fields = fields_of(AR1(0.99), 3, 500, np.random.default_rng(1))
     found = stat_load.extremes(fields, stat_load.gap_of(fields), [1.0], 1)

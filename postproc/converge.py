@@ -1,0 +1,385 @@
+# SPDX-License-Identifier: MIT
+"""Does a result depend on what only the computation has: the width and length of the domain, the time step, the
+tolerance, the window, the start, the number of fields?
+
+    converge.py CASE.yml -o DIR --budget 10        DIR/converge.json, DIR/converge/NAME/fNNN, a verdict a line
+
+One value is changed at a time, and the case is run with it and without it on the same seeds, so that Δt and
+tolerance are compared on the same ice. (Another extent is another field, whatever its seed.) The effect is that on a
+mean over fields, relative to it; its interval is the jackknife over pairs (stat_load.py). Two need no other run: the
+second half of the window against all of it, and the largest tow force of the start-up against the largest of the
+window, which it should not exceed; where it does, the ramp is made longer. Fields are added, in LOOKS looks, until
+
+    the interval lies within +- margin             resolved: no effect that matters
+    it lies outside of it altogether               resolved: it matters, and the next value is compared with this one
+    neither, and the budget is spent               not resolved
+
+Looking again and again finds an effect sooner or later [Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132]: each
+look is made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejected: a fixed number of fields, which is
+too small where floes jam and too large where nothing happens.
+"""
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import command
+import converge_text
+import stat_mean
+from bergtow_read import Run, RunError
+
+import numpy as np
+from scipy import stats
+
+FIELDS = (4, 8, 16, 32, 64)  # of each look
+LOOKS = len(FIELDS)
+STOPPED, SPENT = 6, "the budget is spent"  # exit code of a run that met its limit
+TRIES = 3                   # values of a quantity after each other, at most
+MARGIN = 0.1
+BUDGET = 10.0               # min
+EFFORT = 0.05               # relative error of the mean that the number of fields is for
+RAMP = 4.0                  # the ramp is made so many times as long
+
+
+# ---- what is varied
+
+
+def times(key, factor):
+    """The next value of one key as {key: value}."""
+    return lambda run, k: {key: run.value(key) * factor ** k}
+
+
+def longer(run, k):
+    """Half the length more ahead of the body; the low end stays where it is."""
+    length, ahead = run.value("domain.length"), run.value("domain.ahead")
+    more = length * (1.5 ** k - 1)
+    out = {"domain.length": length + more, "domain.x0": run.value("domain.x0"), "body.x": run.value("body.x")}
+    if run.case.get("domain.ends") == "moving" and np.isfinite(ahead):
+        out["domain.ahead"] = ahead + more
+    return out
+
+
+def wider(run, k):
+    width = run.value("domain.width") * 2.0 ** k
+    centre = run.value("domain.y0") + run.value("domain.width") / 2
+    return {"domain.width": width, "domain.y0": centre - width / 2}
+
+
+def mean_resistance(run):
+    return run.number("mean_ice_resistance_n")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A quantity that is varied: the key that stands for it, values of try k, and what they are compared by."""
+
+    name: str
+    key: str
+    values: object        #: (run of the case, k) -> {key: value}
+    measure: object
+    what: str
+    same_ice: bool
+    finer: str            #: what the next value is
+    own: object = None    #: what the measure of the same runs is held against, in place of that of the next value
+
+
+KINDS = (
+    Kind("start", "tow.ramp", times("tow.ramp", RAMP), lambda run: run.number("start_peak_tow_force_n"),
+         "start-up's largest tow force over the window's", True, "longer",
+         lambda run: run.number("peak_tow_force_n")),
+    Kind("width", "domain.width", wider, mean_resistance, "mean ice resistance", False, "wider"),
+    Kind("length", "domain.length", longer, mean_resistance, "mean ice resistance", False, "longer"),
+    Kind("dt", "run.dt", times("run.dt", 0.5), mean_resistance, "mean ice resistance", True, "shorter"),
+    Kind("tolerance", "solver.tolerance", times("solver.tolerance", 0.1), mean_resistance, "mean ice resistance", True,
+         "tighter"),
+)
+NAMES = tuple(k.name for k in KINDS) + ("window", "fields")
+
+
+# ---- runs
+
+
+@dataclass
+class Study:
+    """The runs of a convergence study, made when they are asked for and kept in folders."""
+
+    case: Path
+    folder: Path
+    program: Path
+    given: list            #: --set of the user's
+    jobs: int
+    end: float             #: of what is left to a quantity, by time.monotonic()
+    last: float            #: of the budget
+    seconds: dict = field(default_factory=dict)  #: of a run, by setting
+
+    def __post_init__(self):
+        version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
+        #: a run is kept while the case, the program and the values are what they were
+        self.identity = hashlib.sha256(self.case.read_bytes() + version).hexdigest()
+
+    def path(self, name, i):
+        return self.folder / "converge" / name / f"f{i + 1:03d}"
+
+    def arguments(self, name, i, values):
+        sets = [*self.given, "output.frame_interval=-1 s", *(f"{k}={v:.12g}" for k, v in values.items()),
+                f"ice.seed={1000 + i}"]
+        out = [str(self.program), "run", str(self.case), "-o", str(self.path(name, i)), "--quiet", "--threads", "1"]
+        return out + [part for text in sets for part in ("--set", text)]
+
+    def kept(self, name, i, values):
+        path = self.path(name, i)
+        try:
+            return (path / "summary.json").exists() and json.loads(
+                (path / "call.json").read_text()) == [self.identity, *self.arguments(name, i, values)]
+        except (OSError, ValueError):
+            return False
+
+    def one(self, name, i, values):
+        """One run, unless it is there already; None, or why it failed."""
+        path, call = self.path(name, i), self.arguments(name, i, values)
+        told = path / "call.json"
+        if self.kept(name, i, values):
+            return None
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        t0 = time.monotonic()
+        left = max(1.0, self.last - time.monotonic())
+        done = subprocess.run([*call, "--max-wall", f"{left:.3f}"],
+                              capture_output=True,
+                              text=True,
+                              env=os.environ | {"OMP_NUM_THREADS": "1"})
+        if done.returncode == STOPPED:
+            return SPENT
+        if done.returncode:
+            lines = done.stderr.strip().splitlines()
+            return lines[0] if lines else f"exit code {done.returncode}"
+        told.write_text(json.dumps([self.identity, *call]))
+        self.seconds[name] = time.monotonic() - t0
+        return None
+
+    def there(self, name, n, values):
+        """Are n runs there now, or could they be made? False where the budget does not reach so far."""
+        missing = [i for i in range(n) if not self.kept(name, i, values)]
+        expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-len(missing) // self.jobs)
+        if missing and time.monotonic() + expected > self.end:
+            return False
+        with ThreadPoolExecutor(self.jobs) as pool:
+            why = [w for w in pool.map(lambda i: self.one(name, i, values), range(n)) if w]
+        if SPENT in why:
+            return False
+        if why:
+            raise RunError(self.path(name, 0), f"a run of {name} failed: {why[0]}",
+                           "mend the case" if name == "case" else "leave it out of --vary")
+        return True
+
+    def measured(self, name, n, measure):
+        out = []
+        for i in range(n):
+            with Run(self.path(name, i)) as run:
+                out.append(measure(run))
+        return np.array(out, dtype=float)
+
+
+# ---- effects
+
+
+def effect(base, other, looks=LOOKS):
+    """(mean(other)/mean(base) - 1, (low, high)) of pairs, at the level of one of so many looks; on the logarithm of the
+    ratio where it has one."""
+    n, value = len(base), other.mean() / base.mean()
+    without = (other.sum() - other) / (base.sum() - base)
+    logs = value > 0 and np.all(without > 0)
+    there, back = (np.log, np.exp) if logs else (np.asarray, np.asarray)
+    se = np.sqrt((n - 1) / n * np.sum((there(without) - there(without).mean()) ** 2))
+    half = stats.t.ppf(1 - 0.025 / looks, n - 1) * se
+    return float(value) - 1, (float(back(there(value) - half)) - 1, float(back(there(value) + half)) - 1)
+
+
+def judged(interval, margin, one_sided=False):
+    """"none", "matters" or "open". one_sided: only what is above zero matters."""
+    low, high = interval
+    if one_sided:
+        return "none" if high <= margin else "matters" if low > margin else "open"
+    if -margin <= low and high <= margin:
+        return "none"
+    return "matters" if low > margin or high < -margin else "open"
+
+
+def compare(study, kind, base_name, base_values, name, values, margin):
+    """A row of one value against the next, with as many fields as it takes."""
+    row = {"quantity": kind.what, "effect": np.nan, "interval_95": (np.nan, np.nan), "fields": 0, "judged": "open",
+           "same_ice": kind.same_ice}
+    for n in FIELDS:
+        if not (study.there(base_name, n, base_values) and (kind.own or study.there(name, n, values))):
+            return row | {"why": SPENT}
+        base = study.measured(base_name, n, kind.own or kind.measure)
+        other = study.measured(base_name if kind.own else name, n, kind.measure)
+        if not (np.isfinite(base).all() and np.isfinite(other).all()):
+            return row | {"why": f"a run has no {kind.what}"}
+        if base.mean() == 0 or base.max() == base.sum():  # nothing to hold it against, without one field at least
+            return row | {"fields": n, "why": f"nothing to hold the {kind.what} against",
+                          "judged": "matters" if kind.own and other.min() > 0 else "open"}
+        row["effect"], row["interval_95"] = effect(base, other)
+        row["fields"], row["judged"] = n, judged(row["interval_95"], margin, bool(kind.own))
+        if row["judged"] != "open":
+            return row
+    return row | {"why": f"{FIELDS[-1]} fields scatter too much"}
+
+
+def vary(study, kind, margin, most=TRIES):
+    """Rows of a quantity: from the case's value on until the next one changes nothing."""
+    with Run(study.path("case", 0)) as run:
+        tries = [{}] + [kind.values(run, k + 1) for k in range(most)]
+        first, unit = run.value(kind.key), run.case.get(kind.key, "").partition(" ")[2]
+    if not (np.isfinite(first) and first > 0):
+        return [{"name": kind.name, "key": kind.key, "judged": "open", "why": f"the case has no {kind.key}"}]
+    names, rows = ["case"] + [f"{kind.name}-{k + 1}" for k in range(most)], []
+    for k in range(most):
+        a, b = (tries[j].get(kind.key, first) for j in (k, k + 1))
+        row = {"name": kind.name, "key": kind.key, "unit": unit, "from": a, "to": b, "finer": kind.finer}
+        rows.append(row | compare(study, kind, names[k], tries[k], names[k + 1], tries[k + 1], margin))
+        found = rows[-1]["judged"]
+        rows[-1]["recommended"] = a if found == "none" else b if found == "matters" else None
+        if found != "matters" or not possible(study, kind, b):
+            break
+    return rows
+
+
+def possible(study, kind, value):
+    """A ramp must end before the window begins."""
+    with Run(study.path("case", 0)) as run:
+        return kind.name != "start" or run.window is None or value < run.window[0]
+
+
+def window(study, margin):
+    """The mean over the second half of the window against that of all of it, on the runs that are there."""
+    for n in FIELDS:
+        if not study.there("case", n, {}):
+            break
+        rows = []
+        for i in range(n):
+            with Run(study.path("case", i)) as run:
+                if run.window is None:
+                    return [{"name": "window", "key": "output.window_start", "judged": "open",
+                             "why": "a run has no window"}]
+                (start, end), t, x = run.window, run["time"], run["ice_resistance"]
+            middle = 0.5 * (start + end)
+            rows.append((x[(t >= start) & (t <= end)].mean(), x[(t > middle) & (t <= end)].mean(), start, middle))
+        base, late, starts, middles = np.array(rows).T
+        value, interval = effect(base, late)
+        row = {"name": "window", "key": "output.window_start", "unit": "s", "from": starts.mean(), "to": middles.mean(),
+               "finer": "later", "quantity": "mean ice resistance", "effect": value, "interval_95": interval,
+               "fields": n, "judged": judged(interval, margin), "same_ice": True}
+        if row["judged"] != "open":
+            break
+    else:
+        row["why"] = f"{FIELDS[-1]} fields scatter too much"
+    if row["judged"] == "open":
+        row.setdefault("why", SPENT)
+    row["recommended"] = {"none": row["from"], "matters": row["to"], "open": None}[row["judged"]]
+    return [row]
+
+
+def fields_row(study):
+    """How many fields the mean needs, from those that are there."""
+    n = sum(study.kept("case", i, {}) for i in range(FIELDS[-1]))
+    x = study.measured("case", n, mean_resistance)
+    low, high = stat_mean.t_interval(x)
+    needed = stat_mean.fields_needed(x.mean(), np.std(x, ddof=1), EFFORT)
+    return [{"name": "fields", "key": "repeats", "fields": n, "quantity": "mean ice resistance", "mean": x.mean(),
+             "mean_95": (low, high), "wanted_error": EFFORT, "recommended": needed,
+             "judged": "none" if n >= needed else "open"}]
+
+
+def converge(study, names, margin, tries=TRIES):
+    """All rows. The budget is shared: what is left goes in equal parts to what is still to be varied."""
+    end, rows = study.end, []
+    chosen = [k for k in KINDS if k.name in names]
+    if not study.there("case", FIELDS[0], {}):
+        raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case", "raise --budget")
+    for k, kind in enumerate(chosen):
+        study.end = time.monotonic() + (end - time.monotonic()) / (len(chosen) - k)
+        try:
+            rows += vary(study, kind, margin, tries)
+        except RunError as error:
+            rows.append({"name": kind.name, "key": kind.key, "judged": "open", "why": error.reason})
+    study.end = end
+    if "window" in names:
+        rows += window(study, margin)
+    if "fields" in names:
+        rows += fields_row(study)
+    return rows
+
+
+def plain(value):
+    """As JSON has it: what is not finite is null."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def names_of(text):
+    found = [part.strip() for part in text.split(",") if part.strip()]
+    for name in found:
+        if name not in NAMES:
+            raise argparse.ArgumentTypeError(f"{name}: is none of {', '.join(NAMES)}")
+    return found
+
+
+def above_zero(text):
+    value = float(text)
+    if not (np.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text} is not above zero")
+    return value
+
+
+def program():
+    """The binary: BERGTOW, or the one built beside this script."""
+    path = Path(os.environ.get("BERGTOW") or Path(__file__).resolve().parents[1] / "build/release/bergtow")
+    if not os.access(path, os.X_OK):
+        raise RunError(path, "no such program", "build it with make, or name it in BERGTOW")
+    return path.resolve()
+
+
+def main(argv=None):
+    p = argparse.ArgumentParser(description="Find out what of the computation a result depends on.")
+    p.add_argument("case", metavar="CASE.yml", type=Path)
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/converge-CASE; runs are kept there, "
+                   "and the same call takes those of the same case file and program")
+    p.add_argument("--budget", type=above_zero, default=BUDGET, metavar="MIN", help="wall time, min (default 10)")
+    p.add_argument("--vary", type=names_of, default=list(NAMES), metavar="NAME,...",
+                   help=f"some of {', '.join(NAMES)} (default: all)")
+    p.add_argument("--margin", type=above_zero, default=MARGIN, metavar="M",
+                   help="relative effect that does not matter (default 0.1)")
+    p.add_argument("--tries", type=int, choices=range(1, 6), default=TRIES, metavar="K",
+                   help="values of a quantity after each other, where the first change matters (default 3)")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
+    p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
+                   help="runs at a time (default: the cores)")
+    a = p.parse_args(argv)
+    if not a.case.is_file():
+        raise RunError(a.case, "no such file", "name a case file")
+    folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
+    study = Study(a.case.resolve(), folder, program(), a.set, max(1, a.jobs), began + 60 * a.budget,
+                  began + 60 * a.budget)
+    rows = converge(study, a.vary, a.margin, a.tries)
+    found = {"case": str(a.case), "set": a.set, "margin": a.margin, "budget_min": a.budget, "looks": LOOKS,
+             "spent_min": (time.monotonic() - began) / 60, "rows": rows}
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "converge.json").write_text(json.dumps(plain(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    print(converge_text.verdicts(found))
+    print(f"\n{folder / 'converge.json'}")
+
+
+if __name__ == "__main__":
+    command.guarded(main)

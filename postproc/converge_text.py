@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: MIT
+"""The verdicts of converge.py, a line each, or as a table of the report."""
+import json
+from pathlib import Path
+
+from text_table import number, table
+
+WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
+
+
+def percent(value):
+    return "–" if value is None else f"{100 * value:+.3g} %"
+
+
+def interval(ends):
+    return "–" if ends is None or None in ends else f"{percent(ends[0])} to {percent(ends[1])}"
+
+
+def value(row, which):
+    at = row.get(which)
+    return "–" if at is None else f"{at:.4g} {row.get('unit') or ''}".strip()
+
+
+def advice(row):
+    """What to take."""
+    at = value(row, "recommended")
+    if row["name"] == "fields":
+        return f"{value(row, 'recommended')} fields for {100 * row['wanted_error']:g} %"
+    if row["judged"] == "none":
+        return f"{at} will do"
+    if row["judged"] == "matters":
+        return f"take {at}, or {row['finer']}"
+    return row.get("why") or "–"
+
+
+def cells(row):
+    if row["name"] == "fields":
+        return ["fields", "–", f"mean {number(row['mean'])} N", "–", f"{row['fields']}", WORDS[row["judged"]],
+                advice(row)]
+    if "from" not in row:
+        return [row["name"], "–", "–", "–", "–", WORDS[row["judged"]], row.get("why", "–")]
+    on = f"{row['fields']}, {'the same ice' if row['same_ice'] else 'other ice'}"
+    return [row["name"], f"{value(row, 'from')} -> {value(row, 'to')}", row["quantity"],
+            f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
+
+
+def plain(found):
+    """As it comes back from the file: what is not finite is None."""
+    return json.loads(json.dumps(found, default=float).replace("NaN", "null").replace("Infinity", "null"))
+
+
+def verdicts(found, markdown=False):
+    found = plain(found)
+    head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
+    note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together. What is below "
+            f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
+    return table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note
+
+
+def of_folder(folder):
+    """What converge.py left in a folder, None where it has not been there, or its file cannot be read."""
+    try:
+        return json.loads((Path(folder) / "converge.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+// bergtow converge: starts postproc/converge.py, which runs this program on several fields with one value changed at a
+// time, and judges the effects with the statistics of the ensembles. Those are Python's; a second copy in C would be
+// one too many.
+#include "app/cmd.h"
+#include "base/fileio.h"
+
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static const char script[] = "postproc/converge.py";
+
+/// The script in the source tree that this program was built in, or in BERGTOW_HOME; the caller frees it.
+static char *find_script(const char *program)
+{
+    const char *home = getenv("BERGTOW_HOME");
+    if (home) return bt_file_join(home, script);
+    char folder[PATH_MAX];
+    snprintf(folder, sizeof folder, "%s", program);
+    for (int up = 0; up < 3; up++) { // build/release/bergtow
+        char *slash = strrchr(folder, '/');
+        if (slash) *slash = 0;
+    }
+    return bt_file_join(folder, script);
+}
+
+/// Exit code of the script, −1 when it cannot be started.
+static int start(const char *python, char **arguments)
+{
+    fflush(stdout);
+    const pid_t child = fork();
+    if (child == 0) {
+        execv(python, arguments);
+        _exit(127);
+    }
+    int how = 0;
+    while (child > 0 && waitpid(child, &how, 0) < 0 && errno == EINTR) {}
+    if (child < 0 || (WIFEXITED(how) && WEXITSTATUS(how) == 127)) return -1;
+    return WIFEXITED(how) ? WEXITSTATUS(how) : BT_ERR_SIGNAL;
+}
+
+int bt_cmd_converge(int argc, char **argv)
+{
+    bt_errors err = {0};
+    char program[PATH_MAX] = "";
+    const char *python = getenv("PYTHON") ? getenv("PYTHON") : "/usr/bin/python3";
+    char *path = NULL;
+    int code = -1;
+    if (bt_comm_world()->size > 1) {
+        bt_errors_add(&err, "converge: starts runs of its own; call it without mpirun, and say --jobs");
+        return bt_cmd_end(&bt_comm_alone, BT_ERR_USAGE, &err);
+    }
+    if (readlink("/proc/self/exe", program, sizeof program - 1) > 0) path = find_script(program);
+    if (path && access(path, R_OK) == 0) {
+        char **arguments = bt_alloc((size_t)argc + 2, sizeof *arguments);
+        arguments[0] = (char *)python, arguments[1] = path;
+        for (int i = 1; i < argc; i++) arguments[i + 1] = argv[i];
+        arguments[argc + 1] = NULL;
+        setenv("BERGTOW", program, 1);
+        code = start(python, arguments);
+        free(arguments);
+        if (code < 0) bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);
+    } else {
+        bt_errors_add(&err, "%s: cannot be read; name the folder that holds postproc/ in BERGTOW_HOME",
+                      path ? path : script);
+    }
+    free(path);
+    return code < 0 ? bt_cmd_end(&bt_comm_alone, BT_ERR_IO, &err) : code;
+}

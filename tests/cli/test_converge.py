@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""postproc/converge.py: verdicts of known effects, and small cases whose width, ramp and step matter or do not."""
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import made_up_ensemble as made_up
+from harness import BERGTOW, ROOT, TOW, changed, environment, write_case
+from test_postproc import script
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import converge  # noqa: E402
+import converge_text  # noqa: E402
+
+
+@pytest.mark.parametrize("n", [4, 8, 32])
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 1.5])
+def test_intervals_of_an_effect_hold_it(n, ratio):
+    """Pairs with a common part, at the level of a single look."""
+    rng, inside = np.random.default_rng(n), 0
+    for _ in range(600):
+        common = 1 + 0.2 * rng.standard_normal(n)
+        base, other = common + 0.1 * rng.standard_normal(n), ratio * (common + 0.1 * rng.standard_normal(n))
+        value, (low, high) = converge.effect(base, other, looks=1)
+        assert low <= value <= high
+        inside += low <= ratio - 1 <= high
+    assert 0.92 <= inside / 600 <= 0.98
+
+
+def test_looking_again_and_again_keeps_the_level():
+    """Of cases without an effect at most 5 % are said to have one, whenever the looking ends."""
+    rng, found = np.random.default_rng(5), 0
+    for _ in range(500):
+        x, y = (1 + 0.3 * rng.standard_normal((2, converge.FIELDS[-1])))
+        for n in converge.FIELDS:
+            verdict = converge.judged(converge.effect(x[:n], y[:n])[1], 1e-9)
+            assert verdict != "none"
+            if verdict == "matters":
+                found += 1
+                break
+    assert found <= 0.05 * 500 + 2 * np.sqrt(500 * 0.05 * 0.95)
+
+
+def test_verdicts():
+    assert [converge.judged(ends, 0.1) for ends in ((-0.05, 0.09), (0.11, 0.3), (-0.4, -0.11), (-0.2, 0.0),
+                                                    (0.05, 0.2))] == ["none", "matters", "matters", "open", "open"]
+    assert [converge.judged(ends, 0.1, one_sided=True) for ends in ((-0.9, 0.1), (0.2, 9), (-0.5, 3))
+            ] == ["none", "matters", "open"]
+    assert converge.names_of("width, dt") == ["width", "dt"]
+
+
+CASE = changed(TOW, run__duration=40, output__window_start=15, domain__length=20, ice__concentration=0.5)
+
+
+def converged(folder, case, *more):
+    write_case(folder, case)
+    result = subprocess.run([BERGTOW, "converge", "case.yml", "-o", "out", *map(str, more)], cwd=folder,
+                            env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    return json.loads((folder / "out/converge.json").read_text()), result.stdout
+
+
+LINE = changed(CASE, tow__mode="line", tow__line_length=2, tow__line_stiffness=5e4, tow__line_damping=2000,
+               ice__concentration=0.2, run__duration=60, output__window_start=30)
+
+
+def test_a_start_that_jerks_the_line_is_found(tmp_path):
+    """A line that is pulled at once pulls as hard as speed times the root of stiffness and mass, and a start over half
+    a minute with m V / t alone."""
+    found, text = converged(tmp_path, changed(LINE, tow__ramp=0.1), "--vary", "start", "--budget", 3, "--tries", 1)
+    row = found["rows"][0]
+    assert row["judged"] == "matters" and row["effect"] > 1 and row["recommended"] == pytest.approx(0.4)
+    assert "resolved: it matters" in text and "take 0.4 s, or longer" in text
+    slow, text = converged(tmp_path, changed(LINE, tow__ramp=25), "--vary", "start", "--budget", 3, "--margin", 2)
+    assert [row["judged"] for row in slow["rows"]] == ["none"] and "25 s will do" in text
+
+
+def test_a_channel_that_is_too_narrow_is_found(tmp_path):
+    """Dense ice that is pushed along between walls two body widths apart is another thing than a field."""
+    dense = changed(CASE, ice__concentration=0.8, domain__width=4, run__duration=18, output__window_start=6)
+    found, text = converged(tmp_path, dense, "--vary", "width", "--budget", 3, "--tries", 1)
+    row = found["rows"][0]
+    assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and not row["same_ice"]
+    assert "take 8 m, or wider" in text
+
+
+def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp_path):
+    loose = changed(CASE, ice__concentration=0.2, run__duration=20, output__window_start=5)
+    found, text = converged(tmp_path, loose, "--vary", "tolerance,fields", "--budget", 3)
+    first, second = found["rows"]
+    assert first["judged"] == "none" and first["same_ice"] and "0.001 will do" in text
+    assert second["name"] == "fields" and second["recommended"] > 4 and f"{second['recommended']:g} fields" in text
+
+
+def test_runs_are_kept_and_a_spent_budget_is_told(tmp_path):
+    found, _ = converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.2, "--margin", 1e-6)
+    made = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/converge/*/*/summary.json")}
+    assert found["rows"][0]["judged"] == "open" and found["rows"][0]["why"] in (
+        "the budget is spent", "64 fields scatter too much") and len(made) >= 5
+    kept = [p for p in made if (p.parent / "call.json").exists()]
+    converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.02, "--margin", 1e-6)
+    assert len(kept) >= 4 and all(p.stat().st_mtime_ns == made[p] for p in kept)
+
+
+def test_what_is_refused(tmp_path):
+    write_case(tmp_path, CASE)
+    def said(*arguments):
+        return subprocess.run([sys.executable, ROOT / "postproc/converge.py", *arguments], cwd=tmp_path,
+                              env=os.environ | {"BERGTOW": str(BERGTOW)}, capture_output=True, text=True)
+    assert said("none.yml").returncode == 4 and "no such file" in said("none.yml").stderr
+    assert said("case.yml", "--vary", "colour").returncode == 2 and said("case.yml", "--budget", "0").returncode == 2
+    bad = said("case.yml", "--set", "ice.sise=1")
+    lost = subprocess.run([BERGTOW, "converge", "case.yml"], env=environment(BERGTOW_HOME=tmp_path), cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert lost.returncode == 4 and "name the folder that holds postproc/ in BERGTOW_HOME" in lost.stderr
+    assert bad.returncode == 4 and "unknown key" in bad.stderr and "Traceback" not in bad.stderr
+
+
+def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
+    folder = made_up.write(tmp_path / "all", [made_up.member(np.arange(40.0) + k, {}, 0) for k in range(3)])
+    row = {"name": "width", "key": "domain.width", "unit": "m", "from": 10.0, "to": 20.0, "finer": "wider",
+           "quantity": "mean ice resistance", "effect": -0.4, "interval_95": [-0.5, -0.3], "fields": 8,
+           "judged": "matters", "recommended": 20.0, "same_ice": False}
+    found = {"rows": [row], "looks": 5, "margin": 0.1, "spent_min": 2.0, "budget_min": 10}
+    (folder / "converge.json").write_text(json.dumps(found))
+    text = script("ensemble.py", folder, "--resamples", 1).stdout
+    assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
+    assert "take 20 m, or wider" in text and converge_text.verdicts(found) in text
