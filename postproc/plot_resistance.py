@@ -209,7 +209,7 @@ def draw(points, log=True):
     shown = mean > 0 if log else np.full(len(mean), True)
     below = np.minimum(below, mean - low / 2) if log else below
     for which, face, label in ((steady, style.ICE, "simulated, 95 % of the run's mean"),
-                               (~steady, style.PAPER, "simulated, window not steady or too short")):
+                               (~steady, style.PAPER, "window not steady or too short")):
         which = which & shown
         if which.any():
             axes.errorbar(a[which],

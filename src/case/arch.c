@@ -6,6 +6,9 @@
 
 #include "bergtow/shape.h"
 
+/// Body widths that ice from this concentration on needs.
+static const struct { double concentration, widths; } needed[] = {{0.45, 10}, {0.7, 30}, {0.85, 60}};
+
 bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
 {
     double v[2 * BT_MAX_VERTICES];
@@ -18,7 +21,9 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
                  .bodies = c->domain.width / across,
                  .floes = floe_size > 0 ? c->domain.width / floe_size : NAN};
     a.sides = open ? "open sides" : c->domain.sides == BT_BOUND_PERIODIC ? "periodic images" : "walls";
-    a.possible = !open && n > 0 && floe_size > 0 && concentration >= BT_ARCH_CONCENTRATION && a.bodies < BT_ARCH_WIDTHS;
+    for (size_t k = 0; k < sizeof needed / sizeof *needed; k++)
+        if (concentration >= needed[k].concentration) a.widths = needed[k].widths;
+    a.possible = !open && n > 0 && floe_size > 0 && a.bodies < a.widths;
     a.rigid = !(c->ice.rafting_kappa > 0) && !(c->ice.crushing_pressure > 0);
     a.unbounded = a.rigid && n > 0 && floe_size > 0 && concentration >= BT_BOUND_CONCENTRATION;
     return a;
@@ -33,7 +38,7 @@ void bt_arch_warn(const bt_arch *a, bt_errors *warnings)
                       "domain.width: %.3g body widths of %.0f %% ice, and %s can carry arches of %s: the "
                       "resistance is also a property of "
                       "that width; take at least %g body widths (assumed), or compare widths",
-                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), BT_ARCH_WIDTHS);
+                      a->bodies, 100 * a->concentration, a->sides, bt_arch_floes(a), a->widths);
     if (a->unbounded)
         bt_errors_add(warnings,
                       "ice.concentration: %.0f %% of rigid floes: from some %.0f %% on (assumed) they lock, and their "

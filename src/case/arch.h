@@ -8,22 +8,22 @@
 //        / / /   arch                     the domain, the rarer it is. Floes that raft or crush bound it.
 //     wall ─────────────────────────
 //
-// The limits are assumed, after trials with rigid floes of friction 0.05 to 0.35: at 50 % the width does not show, at
-// 80 % in the basin of 10, 20 and 30 m (5, 10, 15 body widths) the mean falls from 100 to 10 and 5 N, and at 90 % at
-// full scale from 650 kN at 15 body widths to 219 kN at 35.
+// The limits are assumed, after trials of friction 0.05 to 0.35. In the basin, from 5 to 20 body widths, the mean of
+// rigid floes does not change at 20 %, falls by a quarter at 50 % and to a sixth at 80 %; that of floes that raft falls
+// by a tenth at 50 % and to less than half at 80 %. At full scale with rafting, from 31 to 62 body widths, it does not
+// change at 80 %, and falls by a third at 90 % and by half at 95 %.
 #ifndef BT_ARCH_H
 #define BT_ARCH_H
 
 #include "bergtow/case.h"
 
-#define BT_ARCH_CONCENTRATION 0.7   ///< from which on arches are looked for, assumed
 #define BT_BOUND_CONCENTRATION 0.75 ///< from which on rigid ice is said to have no upper bound of load, assumed
-#define BT_ARCH_WIDTHS 30.0         ///< body widths of domain from which on they are not expected, assumed
 
 typedef struct bt_arch {
     double concentration; ///< as given
     double bodies;        ///< width of the domain in widths of the body across the tow; NaN without a body
     double floes;         ///< the same in mean floe sizes; NaN without floes
+    double widths;        ///< of the body: a domain as wide is not expected to show; 0 at these concentrations
     bool possible;        ///< arches can reach from the body to the walls or to the next image of it
     bool rigid;           ///< floes neither raft nor crush
     bool unbounded;       ///< rigid and dense, around a towed body: no upper bound of its load

@@ -44,8 +44,16 @@ static void dense_ice_between_near_sides_can_arch(void **state)
     assert_false(bt_arch_of(&c, 0.69, 0.5).possible);
     assert_false(bt_arch_of(&c, 0.8, 0).possible); // no floes
     c.domain.width = 60;
+    assert_false(bt_arch_of(&c, 0.84, 0.5).possible);
+    assert_true(bt_arch_of(&c, 0.85, 0.5).possible);
+    c.domain.width = 120;
     assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
-    c.domain.width = 59;
+    c.domain.width = 19;
+    assert_true(bt_arch_of(&c, 0.45, 0.5).possible);
+    assert_false(bt_arch_of(&c, 0.44, 0.5).possible);
+    c.domain.width = 20;
+    assert_false(bt_arch_of(&c, 0.5, 0.5).possible);
+    c.domain.width = 119;
     c.domain.sides = BT_BOUND_PERIODIC;
     assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
     assert_string_equal(bt_arch_of(&c, 0.9, 0.5).sides, "periodic images");
