@@ -112,7 +112,7 @@ def test_the_width_of_the_domain_is_told(tmp_path):
     assert re.search(r"domain width +5 body widths, 13\.\d floe sizes, periodic images: arches of rigid floes POSSIBLE",
                      checked.stdout)
     assert "domain.width: 5 body widths of 85 % ice, and periodic images can carry arches" in checked.stdout
-    wide = call("check", write_case(tmp_path, changed(narrow, domain__width=2500)))
+    wide = call("check", write_case(tmp_path, changed(narrow, domain__width=5000)))
     assert "arches of rigid floes not expected" in wide.stdout and "can carry arches" not in wide.stdout
     assert call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": -1}))).returncode == CASE
 
