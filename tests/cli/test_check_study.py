@@ -44,7 +44,8 @@ def seconds(text):
 
 def test_the_study_in_numbers(tmp_path):
     text = checked(tmp_path, STUDY)
-    assert text.startswith("study.yml: valid, with warnings in 4 of 6 conditions\n")  # at 50 and 70 % arches reach the walls
+    # at 50 and 70 % the width shows
+    assert text.startswith("study.yml: valid, with warnings in 4 of 6 conditions\n")
     assert line(text, "title") == "three ices" and line(text, "base") == "base.yml" and line(
         text, "set") == "output.frame_interval=-1 s, ice.friction=0.2"
     assert line(text, "ice.concentration") == "0.2, 0.5, 0.7" and line(text, "tow.speed") == "0.1, 0.2" and line(

@@ -83,7 +83,7 @@ def test_a_start_that_jerks_the_line_is_found(tmp_path):
 
 def test_a_channel_that_is_too_narrow_is_found(tmp_path):
     """Dense ice that is pushed along between walls two body widths apart is another thing than a field."""
-    dense = changed(CASE, ice__concentration=0.8, domain__width=4, run__duration=18, output__window_start=6)
+    dense = changed(CASE, ice__concentration=0.7, domain__width=4, run__duration=18, output__window_start=6)
     found, text = converged(tmp_path, dense, "--vary", "width", "--budget", 3, "--tries", 1)
     row = found["rows"][0]
     assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and not row["same_ice"]
