@@ -590,7 +590,7 @@ def pictures(e, options, conditions):
         out.append(("map", lambda: draw_map(e, keys[0], keys[1])))
     if len(keys) >= 2:
         out.append(("sensitivity", lambda: draw_sensitivity(e, sensitivity(e, {int(m): member(e, m) for m in e.used}))))
-    if plot_variants.KEY in e.parameters:
+    if plot_variants.KEY in e.parameters and not e.sampled:
         out.append(("variants", lambda: plot_variants.draw(e, headline)))
     if not e.sampled or len(e.conditions()) <= MOST_LINES:
         out.append(("exceedance", lambda: draw_exceedance(e, options)))

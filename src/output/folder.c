@@ -37,7 +37,7 @@ static const struct {
 } files[] = {
     {CASE_FILE, is_case},
     {"summary.json", is_summary},
-    {BT_RESULT_FILE, is_sealed},
+    {BT_RESULT_FILE, NULL}, // the result that --force is asked to replace, damaged or not
     {BT_RESULT_PART, is_sealed},
     {BT_RESULT_FILE ".tmp", is_sealed},
     {"frames.xdmf", is_frames},

@@ -116,7 +116,7 @@ def test_a_failed_run_keeps_its_series(tmp_path):
 
 # ---- files of the user's ----
 
-FOREIGN = ["failure.h5", "frames.xdmf", "case.resolved.yml", "stop", "result.h5", "summary.json", "checkpoint.h5",
+FOREIGN = ["failure.h5", "frames.xdmf", "case.resolved.yml", "stop", "summary.json", "checkpoint.h5",
            "result.part.h5", "checkpoint.previous.h5"]
 
 
