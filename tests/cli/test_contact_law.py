@@ -4,8 +4,8 @@
 Physics by itself: tests/physics/test_contact_law.c. Here: the force on the tow, the balance, series and summary, the
 moving window, ranks, threads, resume, the page.
 
-Red with (tried): the memory of added laws not saved; their sums not reduced over ranks; the state counted from contacts
-at work alone; the numbers registered without the work; the keys not written to the resolved case.
+Red with (tried): what pairs remember of added laws lost in a resume; their sums not reduced over ranks; the numbers
+registered without the work.
 """
 import json
 import os

@@ -3,7 +3,8 @@
 // what the table refuses. What runs of it leave is in tests/cli/test_contact_law.py.
 //
 // Red with (tried): the given depth left out of the gap; the bound without Δt; growth booked whichever law is at its
-// bound; the record not written; applies not asked; the work of the points not booked.
+// bound; the record not written; applies not asked; the work of the points not booked; the state counted from contacts
+// at work alone.
 #include "scene.h"
 
 #include "bergtow/contact.h"
