@@ -24,6 +24,12 @@ static bool is_case(const char *path) { return bt_file_begins(path, BT_CASE_RESO
 
 static bool is_sealed(const char *path) { return bt_checksum_there(path, NULL); }
 
+static bool is_regular(const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 && S_ISREG(st.st_mode);
+}
+
 static bool is_request(const char *path)
 {
     struct stat st;
@@ -37,7 +43,7 @@ static const struct {
 } files[] = {
     {CASE_FILE, is_case},
     {"summary.json", is_summary},
-    {BT_RESULT_FILE, NULL}, // the result that --force is asked to replace, damaged or not
+    {BT_RESULT_FILE, is_regular}, // the result that --force is asked to replace, damaged or not
     {BT_RESULT_PART, is_sealed},
     {BT_RESULT_FILE ".tmp", is_sealed},
     {"frames.xdmf", is_frames},
@@ -88,8 +94,7 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
 
 bool bt_folder_begun(const char *dir)
 {
-    return bt_file_there(dir, CASE_FILE) || bt_file_there(dir, BT_RESULT_PART) || bt_checkpoint_there(dir) ||
-           bt_folder_keeps(dir);
+    return bt_file_there(dir, BT_RESULT_PART) || bt_checkpoint_there(dir) || bt_folder_keeps(dir);
 }
 
 bool bt_folder_keeps(const char *dir) { return bt_file_there(dir, BT_FOLDER_REPLACED); }
