@@ -44,6 +44,6 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err)
         bt_errors_add(err, "contact law %s: there are %d added laws; raise BT_MAX_ADDED_LAWS", name,
                       BT_MAX_ADDED_LAWS);
     if (err->n > before || !bt_keys_add(name, law->keys, law->n_keys, err)) return BT_ERR_USAGE;
-    bt_added_add(law);
+    bt_added_add(law); // there is room
     return BT_OK;
 }

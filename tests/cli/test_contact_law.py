@@ -91,7 +91,7 @@ def test_same_bits_in_every_layout_and_after_a_stop(tmp_path, name, case):
     assert differing(whole / "result.h5", folder / "result.h5") == []
 
 
-def test_the_page_has_its_numbers(tmp_path):
+def test_the_page_of_the_run_names_its_keys(tmp_path):
     folder, *_ = of_run(tmp_path, changed(SPEED, run__duration=12))
     done = subprocess.run(["/usr/bin/python3", ROOT / "postproc/report.py", folder], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
