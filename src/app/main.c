@@ -25,7 +25,7 @@ static const struct {
     {"ensemble", "run the members of a study, many fields and conditions; the same call resumes", bt_cmd_ensemble,
      true},
     {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
-     bt_cmd_converge, false},
+     bt_cmd_script, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
-// bergtow converge: starts postproc/converge.py, which runs this program on several fields with one value changed at a
-// time, and judges the effects with the statistics of the ensembles. Those are Python's; a second copy in C would be
-// one too many.
+// The commands that are scripts: `bergtow NAME` starts postproc/NAME.py, which runs this program for its members and
+// judges them with the statistics of the ensembles. Those are Python's; a second copy in C would be one too many.
 #include "app/cmd.h"
 #include "base/fileio.h"
 
@@ -13,14 +12,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-static const char script[] = "postproc/converge.py";
-
-/// The script in the source tree that this program was built in, or in BERGTOW_HOME; the caller frees it.
-static char *find_script(const char *program)
+/// The script of a command in the source tree that this program was built in, or in BERGTOW_HOME; the caller frees it.
+static char *find_script(const char *program, const char *command)
 {
     const char *home = getenv("BERGTOW_HOME");
+    char folder[PATH_MAX], script[NAME_MAX];
+    snprintf(script, sizeof script, "postproc/%s.py", command);
     if (home) return bt_file_join(home, script);
-    char folder[PATH_MAX];
     snprintf(folder, sizeof folder, "%s", program);
     for (int up = 0; up < 3; up++) { // build/release/bergtow
         char *slash = strrchr(folder, '/');
@@ -44,7 +42,7 @@ static int start(const char *python, char **arguments)
     return WIFEXITED(how) ? WEXITSTATUS(how) : BT_ERR_SIGNAL;
 }
 
-int bt_cmd_converge(int argc, char **argv)
+int bt_cmd_script(int argc, char **argv)
 {
     bt_errors err = {0};
     char program[PATH_MAX] = "";
@@ -52,10 +50,10 @@ int bt_cmd_converge(int argc, char **argv)
     char *path = NULL;
     int code = -1;
     if (bt_comm_world()->size > 1) {
-        bt_errors_add(&err, "converge: starts runs of its own; call it without mpirun, and say --jobs");
+        bt_errors_add(&err, "%s: starts runs of its own; call it without mpirun, and say --jobs", argv[0]);
         return bt_cmd_end(&bt_comm_alone, BT_ERR_USAGE, &err);
     }
-    if (readlink("/proc/self/exe", program, sizeof program - 1) > 0) path = find_script(program);
+    if (readlink("/proc/self/exe", program, sizeof program - 1) > 0) path = find_script(program, argv[0]);
     if (path && access(path, R_OK) == 0) {
         char **arguments = bt_alloc((size_t)argc + 2, sizeof *arguments);
         arguments[0] = (char *)python, arguments[1] = path;
@@ -67,7 +65,7 @@ int bt_cmd_converge(int argc, char **argv)
         if (code < 0) bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);
     } else {
         bt_errors_add(&err, "%s: cannot be read; name the folder that holds postproc/ in BERGTOW_HOME",
-                      path ? path : script);
+                      path ? path : argv[0]);
     }
     free(path);
     return code < 0 ? bt_cmd_end(&bt_comm_alone, BT_ERR_IO, &err) : code;
