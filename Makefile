@@ -122,8 +122,8 @@ $(EXTENDED): tests/examples/extended.c $(BIN_OBJ) $(BUILD)/libbergtow.a $(STAMP)
 	@$(CC) $(CFLAGS) -Itests $< $(BIN_OBJ) $(BUILD)/libbergtow.a $(LDLIBS) -o $@
 
 # Preloaded by Python tests.
-FAULT := $(BUILD)/tests/fault/fault.so
-$(FAULT): tests/fault/fault.c $(STAMP)
+FAULT := $(patsubst %.c,$(BUILD)/%.so,$(wildcard tests/fault/*.c))
+$(FAULT): $(BUILD)/%.so: %.c $(STAMP)
 	@mkdir -p $(@D)
 	@echo '  TEST $@'
 	@$(CC) $(CFLAGS) -shared -fPIC $< -ldl -o $@

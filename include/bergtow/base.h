@@ -35,6 +35,7 @@ void bt_errors_add(bt_errors *e, const char *fmt, ...) __attribute__((format(pri
 /// Print every message on stderr, one a line, prefixed "bergtow: ".
 void bt_errors_print(const bt_errors *e);
 void bt_errors_free(bt_errors *e);
+void bt_errors_move(bt_errors *to, bt_errors *from); ///< behind those that are there; from is empty then
 
 /// malloc/realloc/calloc that end the program with a message and BT_ERR_NUMERIC when memory runs out.
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
@@ -49,6 +50,10 @@ typedef struct bt_text {
 } bt_text;
 void bt_text_begin(bt_text *t);
 char *bt_text_end(bt_text *t); ///< the text; the caller frees it
+
+/// Copy of a text, or a text as printf makes it; the caller frees it.
+char *bt_text_copy(const char *text);
+char *bt_text_of(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 
 /// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).
 double bt_clock(void);

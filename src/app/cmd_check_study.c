@@ -66,7 +66,7 @@ static void take_faults(faults *f, int64_t condition, bt_errors *err)
         while (k < f->n && strcmp(f->list[k].text, err->text[i])) k++;
         if (k == f->n) {
             f->list = bt_realloc(f->list, f->n + 1, sizeof *f->list);
-            f->list[f->n++] = (fault){strdup(err->text[i]), condition, 0};
+            f->list[f->n++] = (fault){bt_text_copy(err->text[i]), condition, 0};
         }
         f->list[k].count++;
     }

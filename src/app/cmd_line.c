@@ -126,11 +126,9 @@ char *bt_cmd_default_folder(const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
     bool yaml = dot && dot != name && (!strcmp(dot, ".yml") || !strcmp(dot, ".yaml"));
-    char *folder = NULL;
     const int n = yaml ? (int)(dot - name) : (int)strlen(name);
     const bool dots = (int)strspn(name, ".") >= n; // "...yml" would be the folder above out/
-    if (asprintf(&folder, "out/%.*s", dots ? 4 : n, dots ? "case" : name) < 0) abort();
-    return folder;
+    return bt_text_of("out/%.*s", dots ? 4 : n, dots ? "case" : name);
 }
 
 char *bt_cmd_join(int argc, char **argv)

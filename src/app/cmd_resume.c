@@ -29,12 +29,11 @@ static void take_place(options *o, char *arg)
 {
     struct stat st;
     if (stat(arg, &st) != 0 || S_ISDIR(st.st_mode)) {
-        o->dir = strdup(arg);
+        o->dir = bt_text_copy(arg);
         return;
     }
-    const char *slash = strrchr(arg, '/');
     o->file = arg;
-    o->dir = !slash ? strdup(".") : slash == arg ? strdup("/") : strndup(arg, (size_t)(slash - arg));
+    o->dir = bt_file_folder(arg);
 }
 
 static error_t parse(int key, char *arg, struct argp_state *state)
@@ -102,7 +101,7 @@ static error_t parse_two(int key, char *arg, struct argp_state *state)
     switch (key) {
     case ARGP_KEY_ARG:
         if (f->n == 2) argp_error(state, "%s: at most two checkpoints are compared", arg);
-        f->path[f->n++] = is_folder(arg) ? bt_file_join(arg, BT_CHECKPOINT_FILE) : strdup(arg);
+        f->path[f->n++] = is_folder(arg) ? bt_file_join(arg, BT_CHECKPOINT_FILE) : bt_text_copy(arg);
         return 0;
     case ARGP_KEY_END:
         if (f->n == 0) argp_error(state, "no checkpoint given; name one to print, or two to compare");

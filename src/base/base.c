@@ -57,6 +57,28 @@ char *bt_text_end(bt_text *t)
     return t->text;
 }
 
+char *bt_text_copy(const char *text)
+{
+    const size_t n = strlen(text) + 1;
+    return memcpy(bt_alloc(n, 1), text, n);
+}
+
+static char *text_of(const char *fmt, va_list ap)
+{
+    char *text = NULL;
+    if (vasprintf(&text, fmt, ap) < 0) out_of_memory(1, strlen(fmt));
+    return text;
+}
+
+char *bt_text_of(const char *fmt, ...)
+{
+    va_list ap;
+    va_start(ap, fmt);
+    char *text = text_of(fmt, ap);
+    va_end(ap);
+    return text;
+}
+
 void bt_errors_add(bt_errors *e, const char *fmt, ...)
 {
     if (e->n == e->cap) {
@@ -65,8 +87,7 @@ void bt_errors_add(bt_errors *e, const char *fmt, ...)
     }
     va_list ap;
     va_start(ap, fmt);
-    char *text = NULL;
-    if (vasprintf(&text, fmt, ap) < 0) out_of_memory(1, strlen(fmt));
+    char *text = text_of(fmt, ap);
     va_end(ap);
     // Texts of an input stand in messages: what would steer a terminal, or make two lines of one, is shown as a
     // question mark.
@@ -78,6 +99,12 @@ void bt_errors_add(bt_errors *e, const char *fmt, ...)
 void bt_errors_print(const bt_errors *e)
 {
     for (size_t i = 0; i < e->n; i++) fprintf(stderr, "bergtow: %s\n", e->text[i]);
+}
+
+void bt_errors_move(bt_errors *to, bt_errors *from)
+{
+    for (size_t i = 0; i < from->n; i++) bt_errors_add(to, "%s", from->text[i]);
+    bt_errors_free(from);
 }
 
 void bt_errors_free(bt_errors *e)

@@ -21,8 +21,7 @@ static bool read_at(int fd, void *to, size_t bytes, off_t at)
 {
     char *p = to;
     while (bytes > 0) {
-        const ssize_t n = pread(fd, p, bytes, at);
-        if (n < 0 && errno == EINTR) continue;
+        const ssize_t n = TEMP_FAILURE_RETRY(pread(fd, p, bytes, at));
         if (n <= 0) {
             if (n == 0) errno = EIO; // it has become shorter meanwhile
             return false;
@@ -72,7 +71,8 @@ void bt_checksum_digest_text(const void *bytes, size_t n, char out[BT_CHECKSUM_D
 bt_status bt_checksum_digest_file(const char *path, char out[BT_CHECKSUM_DIGEST], int64_t *bytes, bt_errors *err)
 {
     struct stat st;
-    const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); // a pipe must not keep us waiting
+    // a pipe must not keep us waiting
+    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     int reason = fd < 0 || fstat(fd, &st) != 0 ? errno : 0;
     const bool gone = reason == ENOENT || reason == ENXIO, odd = !reason && !S_ISREG(st.st_mode);
     if (!reason && !odd && !digest(fd, 0, st.st_size, out)) reason = errno;
@@ -89,13 +89,14 @@ bt_status bt_checksum_write(const char *path, const char *kind, bt_errors *err)
 {
     char block[BT_CHECKSUM_BYTES];
     struct stat st;
-    const int fd = open(path, O_RDWR | O_CLOEXEC);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDWR | O_CLOEXEC));
     int reason = fd < 0 || fstat(fd, &st) != 0 || !make(fd, st.st_size, kind, block) ? errno : 0;
     if (!reason) {
-        errno = 0;
-        if (pwrite(fd, block, sizeof block, 0) != (ssize_t)sizeof block || fsync(fd) != 0) reason = errno ? errno : EIO;
+        reason = bt_file_put(fd, 0, block, sizeof block);
+        if (!reason) reason = bt_file_sync(fd);
     }
-    if (fd >= 0 && close(fd) != 0 && !reason) reason = errno;
+    const int closed = fd < 0 ? 0 : bt_file_close(fd);
+    if (!reason) reason = closed;
     return reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
 }
 
@@ -174,12 +175,16 @@ bool bt_checksum_there(const char *path, const char *kind)
     char block[BT_CHECKSUM_BYTES + sizeof hdf5_magic] = "", front[80];
     snprintf(front, sizeof front, MAGIC "kind: %.*s", kind ? (int)strcspn(kind, " ") : 0, kind ? kind : "");
     struct stat st;
-    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     const bool regular = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode);
-    const ssize_t n = regular ? pread(fd, block, sizeof block, 0) : -1;
+    const ssize_t n = regular ? TEMP_FAILURE_RETRY(pread(fd, block, sizeof block, 0)) : -1;
     if (fd >= 0) close(fd);
     if (n < 0) return false;
     if (!strncmp(block, front, strlen(front))) return true;
-    const bool blank = !memcmp(block, zeros, sizeof zeros), shorter = n < (ssize_t)sizeof block;
-    return !kind && blank && (shorter || !memcmp(block + BT_CHECKSUM_BYTES, hdf5_magic, sizeof hdf5_magic));
+    // The checksum comes last. Before it the file begins with zeros, and until its first flush HDF5's superblock behind
+    // them is zeros, too, as data go to the file at once (h5driver.c).
+    const bool blank = !memcmp(block, zeros, BT_CHECKSUM_BYTES), shorter = n < (ssize_t)sizeof block;
+    const char *behind = block + BT_CHECKSUM_BYTES;
+    return !kind && blank &&
+           (shorter || !memcmp(behind, hdf5_magic, sizeof hdf5_magic) || !memcmp(behind, zeros, sizeof hdf5_magic));
 }

@@ -41,12 +41,30 @@ bt_status bt_file_fail(const char *path, const char *action, int errnum, bt_erro
     return BT_ERR_IO;
 }
 
+char *bt_file_folder(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? bt_text_of("%.*s", (int)(slash > path ? slash - path : 1), path) : bt_text_copy(".");
+}
+
+int bt_file_put(int fd, off_t at, const void *bytes, size_t n)
+{
+    for (const char *p = bytes; n > 0;) {
+        const ssize_t done = TEMP_FAILURE_RETRY(pwrite(fd, p, n, at));
+        if (done <= 0) return done < 0 ? errno : ENOSPC;
+        p += done, at += done, n -= (size_t)done;
+    }
+    return 0;
+}
+
+int bt_file_sync(int fd) { return TEMP_FAILURE_RETRY(fsync(fd)) != 0 ? errno : 0; }
+
+int bt_file_close(int fd) { return close(fd) != 0 && errno != EINTR ? errno : 0; }
+
 char *bt_file_join(const char *dir, const char *name)
 {
-    const size_t n = strlen(dir), size = n + strlen(name) + 2;
-    char *path = bt_alloc(size, 1);
-    snprintf(path, size, "%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
-    return path;
+    const size_t n = strlen(dir);
+    return bt_text_of("%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
 }
 
 /// A descriptor that this process was given, as the shell's pipes are: opening it waits for nobody.
@@ -73,7 +91,7 @@ static int open_input(const char *path, const char *what, bool text, bool stream
     int fd = -1, reason = stat(path, &st) != 0 ? errno : 0;
     const bool seen = reason == 0;
     if (seen && !(kind = kind_of(st.st_mode))) {
-        fd = open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+        fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC));
         if (fd < 0 || fstat(fd, &st) != 0) reason = errno;
         else kind = kind_of(st.st_mode);
     } else if (seen && taken && !S_ISDIR(st.st_mode)) {
@@ -107,22 +125,17 @@ static bt_status read_text(const char *path, const char *what, size_t most, bool
     *text = NULL;
     *size = 0;
     const int fd = open_input(path, what, true, streams, err);
-    FILE *f = fd < 0 ? NULL : fdopen(fd, "rb");
-    if (!f) {
-        if (fd < 0) return BT_ERR_IO;
-        const int reason = errno;
-        close(fd);
-        return bt_file_fail(path, "read the file", reason, err);
-    }
+    if (fd < 0) return BT_ERR_IO;
     // Read to the end rather than st_size bytes: a pipe has no size.
     size_t cap = 1 << 14, n = 0;
     *text = bt_alloc(cap, 1);
-    for (size_t got; n <= most && (got = fread(*text + n, 1, cap - n - 1, f)) > 0;) {
-        n += got;
+    ssize_t got = 0;
+    while (n <= most && (got = TEMP_FAILURE_RETRY(read(fd, *text + n, cap - n - 1))) > 0) {
+        n += (size_t)got;
         if (n == cap - 1) *text = bt_realloc(*text, cap *= 2, 1);
     }
-    const int broken = ferror(f) ? errno : 0;
-    fclose(f);
+    const int broken = got < 0 ? errno : 0;
+    close(fd);
     (*text)[n] = 0;
     *size = n;
     if (broken) {
@@ -155,34 +168,46 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     char *temporary = bt_alloc(size, 1);
     snprintf(temporary, size, "%s.tmp", path);
 
-    int reason = 0;
     // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name,
     // which the rename replaces.
     unlink(temporary);
-    FILE *f = fopen(temporary, "wx");
-    if (!f) {
-        reason = errno;
-    } else {
-        // A full disk shows at the flush or at the close as often as at the write itself.
-        errno = 0;
-        if (fwrite(text, 1, n, f) != n || fflush(f) != 0 || fsync(fileno(f)) != 0) reason = errno ? errno : EIO;
-        if (fclose(f) != 0 && !reason) reason = errno ? errno : EIO;
-        if (!reason && rename(temporary, path) != 0) reason = errno;
-        if (reason) unlink(temporary);
-    }
+    const int fd = (int)TEMP_FAILURE_RETRY(open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    int reason = fd < 0 ? errno : bt_file_put(fd, 0, text, n);
+    // a full disk shows at the sync or at the close as often as at the write itself
+    if (!reason) reason = bt_file_sync(fd);
+    const int closed = fd < 0 ? 0 : bt_file_close(fd);
+    if (!reason) reason = closed;
+    bt_status status = reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
+    if (status == BT_OK) status = bt_file_rename(temporary, path, err);
+    if (status != BT_OK && fd >= 0) unlink(temporary);
     free(temporary);
-    return reason ? bt_file_fail(path, "write the file", reason, err) : BT_OK;
+    return status;
+}
+
+/// Bring the names in the folder of a path to the disk; errno of a failure, or 0.
+static int sync_folder_of(const char *path)
+{
+    char *folder = bt_file_folder(path);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    free(folder);
+    // a folder that may be written to but not read: the system will bring the name to the disk in its own time
+    if (fd < 0) return 0;
+    const int reason = bt_file_sync(fd);
+    bt_file_close(fd);
+    return reason == EINVAL || reason == EROFS ? 0 : reason; // some file systems have no such call
 }
 
 bt_status bt_file_make_dir(const char *path, bt_errors *err)
 {
     if (!*path) return bt_file_fail("output folder", "make a folder without a name", ENOENT, err);
-    char *part = strdup(path);
+    char *part = bt_text_copy(path);
     int reason = 0;
     for (char *slash = part; slash && !reason; ) {
         slash = strchr(slash + 1, '/');
         if (slash) *slash = '\0';
-        if (mkdir(part, 0777) != 0 && errno != EEXIST) {
+        if (mkdir(part, 0777) == 0) {
+            reason = sync_folder_of(part);
+        } else if (errno != EEXIST) {
             // On a read-only or foreign parent mkdir may refuse before it sees that the folder is there.
             const int refused = errno;
             struct stat st;
@@ -210,17 +235,14 @@ static int copy_bytes(int from, int to)
     if (ioctl(to, FICLONE, from) == 0) return 0;
     char *buffer = bt_alloc(PIECE, 1);
     int reason = 0;
-    for (ssize_t n; !reason && (n = read(from, buffer, PIECE)) != 0;) {
+    off_t at = 0;
+    for (ssize_t n; !reason && (n = TEMP_FAILURE_RETRY(read(from, buffer, PIECE))) != 0;) {
         if (n < 0) {
-            reason = errno == EINTR ? 0 : errno;
-            continue;
+            reason = errno;
+            break;
         }
-        for (ssize_t done = 0; done < n && !reason;) {
-            const ssize_t m = write(to, buffer + done, (size_t)(n - done));
-            if (m > 0) done += m;
-            else if (m == 0) reason = ENOSPC;
-            else if (errno != EINTR) reason = errno;
-        }
+        reason = bt_file_put(to, at, buffer, (size_t)n);
+        at += n;
     }
     free(buffer);
     return reason;
@@ -228,13 +250,14 @@ static int copy_bytes(int from, int to)
 
 bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
 {
-    const int in = open(from, O_RDONLY | O_CLOEXEC);
+    const int in = (int)TEMP_FAILURE_RETRY(open(from, O_RDONLY | O_CLOEXEC));
     if (in < 0) return bt_file_fail(from, "read the file", errno, err);
     unlink(to); // a link of that name must not lead the copy elsewhere
-    const int out = open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const int out = (int)TEMP_FAILURE_RETRY(open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     int reason = out < 0 ? errno : copy_bytes(in, out);
-    if (!reason && fsync(out) != 0) reason = errno;
-    if (out >= 0 && close(out) != 0 && !reason) reason = errno;
+    if (!reason) reason = bt_file_sync(out);
+    const int closed = out < 0 ? 0 : bt_file_close(out);
+    if (!reason) reason = closed;
     close(in);
     if (reason && out >= 0) unlink(to);
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
@@ -242,16 +265,7 @@ bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
 
 bt_status bt_file_rename(const char *from, const char *to, bt_errors *err)
 {
-    if (rename(from, to) != 0) return bt_file_fail(to, "write the file", errno, err);
-    const char *slash = strrchr(to, '/');
-    char *folder = !slash ? strdup(".") : slash == to ? strdup("/") : strndup(to, (size_t)(slash - to));
-    const int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    free(folder);
-    // a folder that may be written to but not read: the system will bring the name to the disk in its own time
-    if (fd < 0) return BT_OK;
-    // some file systems have no such call
-    const int reason = fsync(fd) != 0 && errno != EINVAL && errno != EROFS ? errno : 0;
-    close(fd);
+    const int reason = rename(from, to) != 0 ? errno : sync_folder_of(to);
     return reason ? bt_file_fail(to, "write the file", reason, err) : BT_OK;
 }
 
@@ -268,9 +282,9 @@ bool bt_file_begins(const char *path, const char *text)
     const size_t n = strlen(text);
     char *front = bt_alloc(n + 1, 1);
     struct stat st;
-    const int fd = open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    const bool same = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) && pread(fd, front, n, 0) == (ssize_t)n &&
-                      !memcmp(front, text, n);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    const bool same = fd >= 0 && fstat(fd, &st) == 0 && S_ISREG(st.st_mode) &&
+                      TEMP_FAILURE_RETRY(pread(fd, front, n, 0)) == (ssize_t)n && !memcmp(front, text, n);
     if (fd >= 0) close(fd);
     free(front);
     return same;

@@ -3,6 +3,8 @@
 #ifndef BT_FILEIO_H
 #define BT_FILEIO_H
 
+#include <sys/types.h>
+
 #include "bergtow/base.h"
 
 /// Append "path: cannot ACTION: reason; remedy" for an errno value; returns BT_ERR_IO.
@@ -25,10 +27,16 @@ bt_status bt_file_read(const char *path, const char *what, char **text, size_t *
 /// The same of at most so many bytes, from a regular file alone.
 bt_status bt_file_read_to(const char *path, const char *what, size_t most, char **text, size_t *size, bt_errors *err);
 
-/// Write text to path by way of a temporary name and a rename: path holds the old or the new text, never a part.
+/// Write text to path by way of a temporary name and bt_file_rename: path holds the old or the new text, never a part.
 bt_status bt_file_write(const char *path, const char *text, bt_errors *err);
 
-/// Make a folder with its parents; no error when it is there.
+// Calls of the system that a signal may interrupt (EINTR) or cut short; errno of a failure, or 0.
+/// Write n bytes at a place of an open file, all of them.
+int bt_file_put(int fd, off_t at, const void *bytes, size_t n);
+int bt_file_sync(int fd);  ///< bring what was written to the disk
+int bt_file_close(int fd); ///< Linux has closed it, too, where a signal interrupts the call
+
+/// Make a folder with its parents, and their names last; no error when it is there.
 bt_status bt_file_make_dir(const char *path, bt_errors *err);
 
 /// Remove a file; no error when it is not there.
@@ -50,5 +58,8 @@ bool bt_file_begins(const char *path, const char *text);
 
 /// dir/name in new memory; the caller frees it.
 char *bt_file_join(const char *dir, const char *name);
+
+/// The folder that a path is in, "." for a bare name, in new memory; the caller frees it.
+char *bt_file_folder(const char *path);
 
 #endif

@@ -29,6 +29,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/fileio.h"
+
 #define MAX_ADDRESS (((haddr_t)1 << 62) - 1)
 
 typedef struct driver_info { int *errnum; } driver_info;
@@ -45,6 +47,7 @@ typedef struct page {
 typedef struct driver_file {
     H5FD_t pub; ///< first, as HDF5 asks
     int fd;
+    bool writes;
     haddr_t eoa, eof; ///< end of the allocated addresses, end of the file with all that waits
     page **pages;     ///< [n_pages] by address
     size_t n_pages, cap_pages;
@@ -62,7 +65,7 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
     if (!info) return NULL;
     const int how = (flags & H5F_ACC_RDWR ? O_RDWR : O_RDONLY) | (flags & H5F_ACC_TRUNC ? O_TRUNC : 0) |
                     (flags & H5F_ACC_CREAT ? O_CREAT : 0) | (flags & H5F_ACC_EXCL ? O_EXCL : 0) | O_CLOEXEC;
-    const int fd = open(name, how, 0666);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(name, how, 0666));
     struct stat st;
     if (fd < 0 || fstat(fd, &st) != 0) {
         *info->errnum = errno;
@@ -76,6 +79,7 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
         return NULL;
     }
     f->fd = fd;
+    f->writes = flags & H5F_ACC_RDWR;
     f->eof = f->flushed = (haddr_t)st.st_size;
     f->device = st.st_dev;
     f->inode = st.st_ino;
@@ -87,17 +91,7 @@ static H5FD_t *driver_open(const char *name, unsigned flags, hid_t access, haddr
 /// Data to the file, unless it has failed before.
 static void put(driver_file *f, haddr_t address, size_t size, const char *p)
 {
-    while (size > 0 && !*f->errnum) {
-        const ssize_t n = pwrite(f->fd, p, size, (off_t)address);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) {
-            *f->errnum = n < 0 ? errno : ENOSPC;
-            break;
-        }
-        size -= (size_t)n;
-        address += (haddr_t)n;
-        p += n;
-    }
+    if (!*f->errnum) *f->errnum = bt_file_put(f->fd, (off_t)address, p, size);
 }
 
 static bool waits(const page *g, size_t i) { return g->waits[i / WORD] >> i % WORD & 1; }
@@ -200,7 +194,7 @@ static void put_superblock(driver_file *f)
         return;
     struct stat st;
     if (!*f->errnum &&
-        (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && ftruncate(f->fd, (off_t)f->eoa) != 0)))
+        (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0)))
         *f->errnum = errno;
     put_run(f, f->super, f->super_end);
     forget(f, f->super, f->super_end);
@@ -274,7 +268,9 @@ static herr_t driver_close(H5FD_t *file)
     driver_file *f = (driver_file *)file;
     put_waiting(f);
     free(f->pages);
-    if (close(f->fd) != 0 && !*f->errnum) *f->errnum = errno;
+    if (f->writes && !*f->errnum) *f->errnum = bt_file_sync(f->fd);
+    const int closed = bt_file_close(f->fd);
+    if (!*f->errnum) *f->errnum = closed;
     free(f);
     return 0;
 }
@@ -322,8 +318,7 @@ static herr_t driver_read(H5FD_t *file, H5FD_mem_t type, hid_t transfer, haddr_t
     char *p = buffer;
     size_t done = 0;
     while (done < size) {
-        const ssize_t n = pread(f->fd, p + done, size - done, (off_t)(address + done));
-        if (n < 0 && errno == EINTR) continue;
+        const ssize_t n = TEMP_FAILURE_RETRY(pread(f->fd, p + done, size - done, (off_t)(address + done)));
         if (n < 0) {
             if (!*f->errnum) *f->errnum = errno;
             return -1;
@@ -358,7 +353,7 @@ static herr_t driver_truncate(H5FD_t *file, hid_t transfer, hbool_t closing)
     driver_file *f = (driver_file *)file;
     if (f->eoa == f->eof) return 0;
     forget(f, f->eoa, MAX_ADDRESS);
-    if (!*f->errnum && ftruncate(f->fd, (off_t)f->eoa) != 0) *f->errnum = errno;
+    if (!*f->errnum && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0) *f->errnum = errno;
     f->eof = f->eoa;
     return 0;
 }

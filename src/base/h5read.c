@@ -2,7 +2,12 @@
 // Reading back what this program wrote: a protected by a checksum file, with one way to fail.
 #include "base/h5read.h"
 
+#include <stdio.h>
+#include <stdlib.h>
+
 #include "base/checksum.h"
+#include "base/fileio.h"
+#include "base/h5driver.h"
 
 typedef struct { const char *path; bt_errors *err; } whole;
 
@@ -47,24 +52,49 @@ bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err)
     return found == 0 ? BT_OK : BT_ERR_CASE;
 }
 
-static void fail(bt_h5_reader *r, const char *name)
+void bt_h5_fail(bt_h5_reader *r, const char *why)
 {
     if (r->status != BT_OK) return;
+    if (*r->errnum) {
+        r->status = bt_file_fail(r->path, "read the file", *r->errnum, r->err);
+        return;
+    }
     r->status = BT_ERR_CASE;
-    bt_errors_add(r->err,
-                  "%s: %s cannot be read or has another shape than expected; use the program that wrote the file",
-                  r->path, name);
+    bt_errors_add(r->err, "%s: %s", r->path, why);
+}
+
+static void fail(bt_h5_reader *r, const char *name)
+{
+    char why[300];
+    snprintf(why, sizeof why, "%.100s cannot be read or has another shape than expected; use the program that wrote "
+             "the file", name);
+    bt_h5_fail(r, why);
+}
+
+hid_t bt_h5_open_file(const char *path, int *errnum)
+{
+    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    const hid_t file = bt_h5driver_select(access, errnum) < 0 ? -1 : H5Fopen(path, H5F_ACC_RDONLY, access);
+    H5Pclose(access);
+    return file;
 }
 
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err)
 {
-    *r = (bt_h5_reader){.file = -1, .path = path, .err = err};
+    *r = (bt_h5_reader){.file = -1, .path = path, .errnum = bt_alloc(1, sizeof(int)), .err = err};
     r->status = bt_checksum_check(path, kind, NULL, err);
     if (r->status != BT_OK) return r->status;
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
-    r->file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-    if (r->file < 0) fail(r, "as HDF5 it");
-    else r->status = bt_h5_whole(r->file, path, err);
+    r->file = bt_h5_open_file(path, r->errnum);
+    bt_errors found = {0};
+    const bool sound = r->file >= 0 && bt_h5_whole(r->file, path, &found) == BT_OK;
+    if (r->file < 0 || *r->errnum) {
+        fail(r, "as HDF5 it");
+    } else if (!sound) {
+        bt_errors_add(err, "%s", found.text[0]);
+        r->status = BT_ERR_CASE;
+    }
+    bt_errors_free(&found);
     return r->status;
 }
 
@@ -72,6 +102,8 @@ bt_status bt_h5_end(bt_h5_reader *r)
 {
     if (r->file >= 0) H5Fclose(r->file);
     r->file = -1;
+    free(r->errnum);
+    r->errnum = NULL;
     return r->status;
 }
 

@@ -12,17 +12,26 @@
 /// name: any file of the disk as raw numbers, a FIFO for ever. No other file is opened here. Errors: BT_ERR_CASE.
 bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err);
 
+/// Open a file for reading through the driver of h5driver.h: a read that fails leaves its errno in *errnum, so that a
+/// disk that reports errors is not taken for a file that is damaged. −1 where HDF5 cannot open it.
+hid_t bt_h5_open_file(const char *path, int *errnum);
+
 /// An open file; after a failure, which is told once, every function below does nothing.
 typedef struct bt_h5_reader {
     hid_t file;
     const char *path;
     bt_status status;
+    int *errnum; ///< of a read that failed
     bt_errors *err;
 } bt_h5_reader;
 
 /// Check the checksum, open, and bt_h5_whole. path must stay valid. Errors: those of bt_checksum_check and bt_h5_whole.
+/// bt_h5_end follows, also after an error.
 bt_status bt_h5_open(bt_h5_reader *r, const char *path, const char *kind, bt_errors *err);
 bt_status bt_h5_end(bt_h5_reader *r); ///< close; the status of the whole
+
+/// Note that the file, or what is named, could not be read: with the errno of a read that failed, or `why` of the file.
+void bt_h5_fail(bt_h5_reader *r, const char *why);
 
 /// Is there a dataset of this name in a group that there is?
 bool bt_h5_there(const bt_h5_reader *r, const char *name);

@@ -44,7 +44,7 @@ static bool idle(const bt_h5 *h) { return h->status != BT_OK || h->file < 0; }
 
 static void begin(bt_h5 *h, const char *path, bt_errors *err)
 {
-    *h = (bt_h5){.file = -1, .raw = -1, .path = strdup(path), .errnum = bt_alloc(1, sizeof(int)), .err = err};
+    *h = (bt_h5){.file = -1, .raw = -1, .path = bt_text_copy(path), .errnum = bt_alloc(1, sizeof(int)), .err = err};
 }
 
 static bt_status create(bt_h5 *h, const char *path, hsize_t room_in_front, bt_errors *err)
@@ -93,7 +93,7 @@ bt_status bt_h5_create_shared(bt_h5 *h, const bt_comm *c, const char *path, bt_e
     if (c->size == 1) return h->status;
     bt_status status = bt_comm_agree(c, h->status);
     if (status == BT_OK) {
-        h->raw = open(path, O_WRONLY | O_CLOEXEC);
+        h->raw = (int)TEMP_FAILURE_RETRY(open(path, O_WRONLY | O_CLOEXEC));
         if (h->raw < 0) {
             *h->errnum = errno;
             fail(h, "open the file");
@@ -121,9 +121,9 @@ void bt_h5_flush(bt_h5 *h)
 
 void bt_h5_sync_raw(bt_h5 *h)
 {
-    if (h->raw < 0 || h->status != BT_OK || fsync(h->raw) == 0) return;
-    *h->errnum = errno;
-    fail(h, "write the file");
+    if (h->raw < 0 || h->status != BT_OK) return;
+    *h->errnum = bt_file_sync(h->raw);
+    check(h, true);
 }
 
 bt_status bt_h5_close(bt_h5 *h)
@@ -132,9 +132,10 @@ bt_status bt_h5_close(bt_h5 *h)
         bt_h5_flush(h);
         check(h, H5Fclose(h->file) >= 0);
     }
-    if (h->raw >= 0 && close(h->raw) != 0 && h->status == BT_OK) {
-        *h->errnum = errno;
-        fail(h, "write the file");
+    if (h->raw >= 0) {
+        const int closed = bt_file_close(h->raw);
+        if (!*h->errnum) *h->errnum = closed;
+        check(h, true);
     }
     free(h->path);
     free(h->errnum);
@@ -367,17 +368,7 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
 
 void bt_h5_write_raw(bt_h5 *h, uint64_t address, size_t bytes, const void *data)
 {
-    const char *p = data;
-    while (bytes > 0 && h->status == BT_OK) {
-        const ssize_t n = pwrite(h->raw, p, bytes, (off_t)address);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) {
-            *h->errnum = n < 0 ? errno : ENOSPC;
-            fail(h, "write the file");
-            return;
-        }
-        p += n;
-        address += (uint64_t)n;
-        bytes -= (size_t)n;
-    }
+    if (h->status != BT_OK) return;
+    *h->errnum = bt_file_put(h->raw, (off_t)address, data, bytes);
+    check(h, true);
 }

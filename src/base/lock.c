@@ -36,7 +36,7 @@ int bt_lock_take(const char *dir, bt_errors *err)
     char *path = bt_file_join(dir, "run.lock");
     int fd = -1;
     for (bool taken = false; !taken;) {
-        fd = open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666);
+        fd = (int)TEMP_FAILURE_RETRY(open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0666));
         if (fd < 0) {
             bt_file_fail(path, "make the file", errno, err);
             break;

@@ -24,7 +24,7 @@ void *bt_snapshot_add(bt_snapshot *s, const char *name, bt_item_type type, int64
 {
     if (s->n == s->cap) s->item = bt_realloc(s->item, (size_t)(s->cap = s->cap ? 2 * s->cap : 64), sizeof *s->item);
     bt_item *i = &s->item[s->n++];
-    *i = (bt_item){.name = strdup(name), .type = type, .n = n, .width = width};
+    *i = (bt_item){.name = bt_text_copy(name), .type = type, .n = n, .width = width};
     const size_t bytes = bytes_of(i);
     i->data = bt_alloc(bytes, 1);
     if (data && bytes) memcpy(i->data, data, bytes);

@@ -134,10 +134,8 @@ bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err)
     *s = (bt_snapshot){.path = path, .err = err};
     bt_h5_reader r;
     if (bt_h5_open(&r, path, BT_CHECKSUM_CHECKPOINT, err) != BT_OK) return bt_h5_end(&r);
-    if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0) {
-        bt_errors_add(err, "%s: holds what this program does not write; use the program that wrote it", path);
-        r.status = BT_ERR_CASE;
-    }
+    if (H5Literate(r.file, H5_INDEX_NAME, H5_ITER_INC, NULL, take_group, s) < 0)
+        bt_h5_fail(&r, "holds what this program does not write; use the program that wrote it");
     const bt_status status = bt_h5_end(&r);
     if (status != BT_OK) bt_snapshot_free(s);
     return status;

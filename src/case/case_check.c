@@ -6,6 +6,7 @@
 #include "case/case_check.h"
 
 #include "bergtow/shape.h"
+#include "base/fileio.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 #include "case/schema.h"
@@ -60,13 +61,9 @@ static char outside(const bt_case *c, box b, double x, double y)
 static void follow_file(const bt_case *c, char **file)
 {
     if (!*file || **file == '/') return;
-    const char *slash = c->path ? strrchr(c->path, '/') : NULL;
-    char *folder = slash == c->path && slash ? strdup("/")
-                   : slash                   ? strndup(c->path, (size_t)(slash - c->path))
-                                             : strdup(".");
-    char *absolute = folder ? realpath(folder, NULL) : NULL;
-    char *joined = NULL;
-    if (absolute && asprintf(&joined, "%s/%s", strcmp(absolute, "/") ? absolute : "", *file) >= 0) {
+    char *folder = bt_file_folder(c->path ? c->path : ""), *absolute = realpath(folder, NULL);
+    if (absolute) {
+        char *joined = bt_file_join(absolute, *file);
         free(*file);
         *file = joined;
     }

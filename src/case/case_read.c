@@ -247,7 +247,7 @@ static void read_override(reader *r, const char *set, const char *place)
 static void begin_case(bt_case *c, const char *path)
 {
     bt_case_defaults(c);
-    c->path = strdup(path);
+    c->path = bt_text_copy(path);
 }
 
 /// The text of c into its values.
@@ -315,7 +315,7 @@ bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, cons
                             const bt_table *wind, bt_errors *err)
 {
     begin_case(c, path);
-    c->text = strdup(text);
+    c->text = bt_text_copy(text);
     keep_table(&c->water.table, current);
     keep_table(&c->air.table, wind);
     return read_text(c, strlen(text), NULL, NULL, 0, err);

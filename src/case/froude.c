@@ -126,34 +126,31 @@ bt_status bt_case_scale(bt_case *c, double ratio, bt_errors *err)
 
 char *bt_case_scaled_text(const bt_case *twin, double ratio)
 {
-    char *head = NULL;
     const char *path = twin->path ? twin->path : "a case";
     const char *coriolis = twin->water.latitude == 0
                                ? ""
                                : "#   - The earth turns as it does (water.latitude is kept): Coriolis force / inertia "
                                  "is sqrt(L) times that of the original.\n";
-    if (asprintf(
-            &head,
-            "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn "
-            "1/sqrt(L); masses,\n"
-            "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles "
-            "and ratios as they were.\n"
-            "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full "
-            "scale:\n"
-            "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that "
-            "of the original.\n"
-            "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are "
-            "those of full scale, and\n"
-            "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
-            "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the "
-            "stiffness.\n"
-            "%s"
-            "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. "
-            "Otherwise rounding changes the shaken\n"
-            "# field into another of the same statistics (not so with ice.shake: 0).\n"
-            "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n",
-            path, ratio, coriolis) < 0)
-        return NULL;
+    char *head = bt_text_of(
+        "# The Froude-scaled twin of %s, L = %.17g: lengths times L; times and speeds sqrt(L); rates of turn "
+        "1/sqrt(L); masses,\n"
+        "# forces and stiffnesses EA L^3; dampings L^(5/2); forces per length L^2; pressures L; densities, angles "
+        "and ratios as they were.\n"
+        "# In this model it moves alike in sqrt(L) times the time. What is not similar between a model and full "
+        "scale:\n"
+        "#   - Drag coefficients are kept, though they depend on the Reynolds number, which is L^(3/2) times that "
+        "of the original.\n"
+        "#   - Pressures of the ice scale with L, those of real ice do not; estimate.p_star and estimate.p_s are "
+        "those of full scale, and\n"
+        "#     estimate.length_scale brings them here. Friction and restitution are kept.\n"
+        "#   - A named tow line has become its numbers: a rope of L times the diameter has L^2 times the "
+        "stiffness.\n"
+        "%s"
+        "# The field made from the seed is the original's, scaled, to the last bit when L is a power of 4. "
+        "Otherwise rounding changes the shaken\n"
+        "# field into another of the same statistics (not so with ice.shake: 0).\n"
+        "# Every key with its value in SI units, and what it means; the sources named are those of the defaults.\n",
+        path, ratio, coriolis);
     char *text = bt_case_text(twin, head);
     free(head);
     return text;

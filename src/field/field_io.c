@@ -271,15 +271,16 @@ bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex
         bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);
         return BT_ERR_CASE;
     }
-    reader r = {.nonconvex = nonconvex, .r = {.path = path, .err = err, .status = BT_OK}};
-    r.file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT);
-    if (r.file < 0) {
-        bt_errors_add(err, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
-        return BT_ERR_CASE;
-    }
-    if (bt_h5_whole(r.file, path, err) == BT_OK) read_floes(&r, f);
-    else r.r.status = BT_ERR_CASE;
-    H5Fclose(r.file);
+    int errnum = 0; // of a read that failed: then what was found in the file says nothing of it
+    bt_errors found = {0};
+    reader r = {.nonconvex = nonconvex, .r = {.path = path, .err = &found, .status = BT_ERR_CASE}};
+    r.file = bt_h5_open_file(path, &errnum);
+    if (r.file < 0) bt_errors_add(&found, "%s: is cut off or damaged, HDF5 cannot open it; write it anew", path);
+    else if ((r.r.status = bt_h5_whole(r.file, path, &found)) == BT_OK) read_floes(&r, f);
+    if (r.file >= 0) H5Fclose(r.file);
+    if (errnum) r.r.status = bt_file_fail(path, "read the file", errnum, err);
+    else bt_errors_move(err, &found);
+    bt_errors_free(&found); // what was found in spite of errnum
     if (r.r.status == BT_OK) {
         if (r.counts.hulled || r.counts.rounded) take_hulls(f);
         f->outlines = r.counts;

@@ -55,7 +55,7 @@ __attribute__((constructor(101))) static void begin(void)
     bt_errors err = {0};
     for (int k = 0; k < bt_n_force_laws; k++) add_keys(bt_force_laws[k], &err);
     bt_errors_print(&err);
-    if (err.n > 0) abort();
+    if (err.n > 0) exit(BT_ERR_CASE);
     find_series();
 }
 

@@ -15,8 +15,7 @@
 bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
 {
     char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE),
-         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = NULL;
-    if (asprintf(&part, "%s.tmp", path) < 0) abort();
+         *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = bt_text_of("%s.tmp", path);
     bt_status status = bt_snapshot_write(s, part, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // One that has been damaged meanwhile must not take the place of a sound one.
@@ -51,9 +50,9 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
         bt_errors unheard = {0};
         const bt_status other = bt_snapshot_read(s, before, first ? &unheard : &why);
         if (other == BT_OK) {
-            if (asprintf(said, "%s; %s is taken, step %" PRId64, first ? why.text[0] : "the last checkpoint is missing",
-                         before, bt_snapshot_int(s, "world/step")) < 0)
-                abort();
+            *said = bt_text_of("%s; %s is taken, step %" PRId64,
+                               first ? why.text[0] : "the last checkpoint is missing", before,
+                               bt_snapshot_int(s, "world/step"));
             free(*path);
             *path = before;
             before = NULL;
@@ -65,8 +64,7 @@ bt_status bt_checkpoint_read(bt_snapshot *s, const char *dir, char **path, char 
     }
     if (status != BT_OK && !first && !second)
         bt_errors_add(err, "%s: holds no checkpoint; give the folder of a run that was stopped", dir);
-    if (status != BT_OK)
-        for (size_t k = 0; k < why.n; k++) bt_errors_add(err, "%s", why.text[k]);
+    if (status != BT_OK) bt_errors_move(err, &why);
     if (status == BT_OK) s->err = err, s->faulty = false;
     bt_errors_free(&why);
     free(before);
@@ -125,7 +123,7 @@ bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference,
     *difference = NULL;
     bt_status status = bt_snapshot_read(&x, a, err);
     if (status == BT_OK) status = bt_snapshot_read(&y, b, err);
-    if (status == BT_OK && bt_snapshot_differ(&x, &y, text)) *difference = strdup(text);
+    if (status == BT_OK && bt_snapshot_differ(&x, &y, text)) *difference = bt_text_copy(text);
     bt_snapshot_free(&x);
     bt_snapshot_free(&y);
     return status;

@@ -28,10 +28,8 @@ static void add_quantity(const bt_quantity *like, int law, int k)
 static void add_law(int law)
 {
     const bt_contact_law *l = bt_contact_law_of(law);
-    char *name = NULL, *text = NULL;
-    if (asprintf(&name, "%s_work", l->name) < 0 ||
-        asprintf(&text, "work taken by contact points at their bound: %s", l->doc) < 0)
-        abort();
+    char *name = bt_text_of("%s_work", l->name),
+         *text = bt_text_of("work taken by contact points at their bound: %s", l->doc);
     add_quantity(&(bt_quantity){.name = name, .units = "J", .description = text, .keep = BT_KEEP_SUM}, law, 0);
     for (int k = 0; k < l->n_numbers; k++) {
         const bt_contact_number *n = &l->numbers[k];

@@ -145,7 +145,7 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
         bt_h5_close(&h);
     }
     status = h.status;
-    if (status == BT_OK && rename(temporary, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
+    if (status == BT_OK) status = bt_file_rename(temporary, path, err);
     if (status != BT_OK) unlink(temporary);
     free(temporary);
     return status;

@@ -30,10 +30,8 @@ static bool has_member(const char *name)
 static void add_quantity(const bt_force_series *of)
 {
     bt_errors err = {0};
-    char *name = NULL, *text = NULL;
-    if (asprintf(&name, "%s_force", of->name) < 0 ||
-        asprintf(&text, "%s on the towed body against the tow direction", of->law ? of->law->doc : of->name) < 0)
-        abort();
+    char *name = bt_text_of("%s_force", of->name),
+         *text = bt_text_of("%s on the towed body against the tow direction", of->law ? of->law->doc : of->name);
     const bt_quantity q = {.name = name, .units = "N", .description = text, .label = of->name, .keep = BT_KEEP_MEAN,
                            .applies = BT_APPLIES_BODY, .role = BT_ROLE_BALANCE, .of_world = against, .context = of};
     if (bt_quantity_register(&q, &err) != BT_OK) bt_errors_print(&err);

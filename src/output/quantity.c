@@ -46,17 +46,15 @@ static bool is_end_of_balance(const bt_quantity *q)
 const char *bt_balance_words(void)
 {
     static char *words;
-    size_t size;
     free(words);
-    FILE *text = open_memstream(&words, &size);
-    if (!text) abort();
-    fputs("tow", text);
+    bt_text text;
+    bt_text_begin(&text);
+    fputs("tow", text.out);
     for (int k = 0; k < bt_n_series(); k++)
         if (bt_series(k)->role == BT_ROLE_BALANCE && !is_end_of_balance(bt_series(k)))
-            fprintf(text, " - %s", bt_series(k)->label);
-    fputs(" - inertia", text);
-    if (fclose(text)) abort();
-    return words;
+            fprintf(text.out, " - %s", bt_series(k)->label);
+    fputs(" - inertia", text.out);
+    return words = bt_text_end(&text);
 }
 
 const bt_quantity *bt_sample_fault(const bt_sample *s, unsigned has)

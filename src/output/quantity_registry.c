@@ -53,8 +53,7 @@ static void make_key(const bt_quantity *q, char key[MOST_KEY])
 /// A name without underscores; kept to the end of the program, as the texts of a quantity are.
 static char *in_words(const char *name)
 {
-    char *words = strdup(name);
-    if (!words) abort();
+    char *words = bt_text_copy(name);
     for (char *p = words; *p; p++)
         if (*p == '_') *p = ' ';
     return words;

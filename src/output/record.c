@@ -130,7 +130,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
 {
     *out = NULL;
     bt_record *r = bt_alloc(1, sizeof *r);
-    r->dir = strdup(dir);
+    r->dir = bt_text_copy(dir);
     r->c = c;
     r->comm = comm;
     r->fresh = fresh;

@@ -181,7 +181,7 @@ static void make_list(ensemble *e)
         entry *x = &e->list[i];
         x->index = i;
         bt_study_member(e->s, i, &x->m);
-        if (asprintf(&x->folder, "%s/members/%s", e->o->dir, x->m.name) < 0) abort();
+        x->folder = bt_text_of("%s/members/%s", e->o->dir, x->m.name);
         // fields of one condition cost the same; a case that cannot be read fails when its turn comes
         if (x->m.condition != priced) {
             bt_case c;
@@ -601,7 +601,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         fflush(stdout);
     }
     if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
-    struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal};
+    struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
     sigemptyset(&act.sa_mask);
     told = 0;
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);

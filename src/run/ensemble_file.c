@@ -31,6 +31,7 @@
 #include "bergtow/ensemble.h"
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
+#include "base/h5read.h"
 #include "base/h5util.h"
 #include "case/schema.h"
 #include "base/checksum.h"
@@ -61,7 +62,7 @@ static double *column_of(table *t, const char *name, const char *key)
         if (!strcmp(t->column[k].name, name)) return t->column[k].value;
     t->column = bt_realloc(t->column, (size_t)t->n_columns + 1, sizeof *t->column);
     column *c = &t->column[t->n_columns++];
-    *c = (column){strdup(name), strdup(key), bt_alloc((size_t)t->n, sizeof(double))};
+    *c = (column){bt_text_copy(name), bt_text_copy(key), bt_alloc((size_t)t->n, sizeof(double))};
     for (int64_t m = 0; m < t->n; m++) c->value[m] = NAN;
     return c->value;
 }
@@ -97,25 +98,22 @@ static bool take_summary(table *t, int64_t m, const char *folder)
     const char *hash = json_string_value(json_object_get(root, "state_hash"));
     if (hash) {
         free(t->hash[m]);
-        t->hash[m] = strdup(hash);
+        t->hash[m] = bt_text_copy(hash);
     }
     json_decref(root);
     return true;
 }
 
-/// Series of a member; returns its length, 0 when there is none.
-static hsize_t read_series(const char *folder, int which, double **out)
+/// Series of a member; returns its length, 0 when there is none. A read that fails is kept in h: the numbers of a
+/// member that has finished are there, and a row without them would be taken for one that has not.
+static hsize_t read_series(bt_h5 *h, const char *folder, int which, double **out)
 {
     *out = NULL;
     char *path = bt_file_join(folder, "result.h5"), name[64];
     snprintf(name, sizeof name, "/series/%s", series[which]);
     hsize_t n = 0;
-    H5E_auto2_t handler;
-    void *data;
-    H5Eget_auto2(H5E_DEFAULT, &handler, &data);
-    H5Eset_auto2(H5E_DEFAULT, NULL, NULL);
-    const hid_t file = H5Fopen(path, H5F_ACC_RDONLY, H5P_DEFAULT),
-                set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
+    int errnum = 0;
+    const hid_t file = bt_h5_open_file(path, &errnum), set = file >= 0 ? H5Dopen2(file, name, H5P_DEFAULT) : -1;
     if (set >= 0) {
         const hid_t space = H5Dget_space(set);
         hsize_t dims[H5S_MAX_RANK] = {0};
@@ -127,7 +125,7 @@ static hsize_t read_series(const char *folder, int which, double **out)
         H5Dclose(set);
     }
     if (file >= 0) H5Fclose(file);
-    H5Eset_auto2(H5E_DEFAULT, handler, data);
+    if (errnum && h->status == BT_OK) bt_h5_give_up(h, bt_file_fail(path, "read the file", errnum, h->err));
     free(path);
     return n;
 }
@@ -137,10 +135,9 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
     hsize_t most = 0;
     for (int64_t m = 0; m < t->n; m++) {
         if (t->status[m] != BT_MEMBER_FINISHED) continue;
-        char *folder = NULL;
+        char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
         double *x;
-        if (asprintf(&folder, "%s/members/%s", dir, t->name[m]) < 0) abort();
-        const hsize_t n = read_series(folder, 0, &x);
+        const hsize_t n = read_series(h, folder, 0, &x);
         if (n > most) most = n;
         free(x);
         free(folder);
@@ -153,10 +150,9 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
             bt_h5_growing(h, name, H5T_NATIVE_DOUBLE, 2, (hsize_t[]){most}, (hsize_t[]){1, most ? most : 1}, true);
         double *row = bt_alloc(most, sizeof *row);
         for (int64_t m = 0; m < t->n; m++) {
-            char *folder = NULL;
+            char *folder = bt_text_of("%s/members/%s", dir, t->name[m]);
             double *x;
-            if (asprintf(&folder, "%s/members/%s", dir, t->name[m]) < 0) abort();
-            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_series(folder, k, &x) : (x = NULL, 0);
+            const hsize_t n = t->status[m] == BT_MEMBER_FINISHED ? read_series(h, folder, k, &x) : (x = NULL, 0);
             for (hsize_t i = 0; i < most; i++) row[i] = i < n ? x[i] : (double)NAN;
             bt_h5_append(h, set, H5T_NATIVE_DOUBLE, (hsize_t)m, 1, row);
             free(x);
@@ -181,7 +177,7 @@ static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
     bt_member member;
     for (int64_t m = 0; m < n; m++) {
         bt_study_member(s, m, &member);
-        text[m] = strdup(member.value[p]);
+        text[m] = bt_text_copy(member.value[p]);
         bt_case c;
         bt_case_defaults(&c);
         char why[BT_WHY];
@@ -220,11 +216,9 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
     }
     if (status != BT_OK) {
         free(t->reason[m]);
-        t->reason[m] = NULL;
-        if (asprintf(&t->reason[m], "its result %s: %s",
-                     status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again",
-                     why.n ? why.text[0] : "no reason given") < 0)
-            abort();
+        t->reason[m] =
+            bt_text_of("its result %s: %s", status == BT_ERR_IO ? "cannot be read" : "is not sound and is made again",
+                       why.n ? why.text[0] : "no reason given");
     }
     bt_errors_free(&why);
     return status == BT_OK ? BT_MEMBER_FINISHED : BT_MEMBER_WAITING;
@@ -240,17 +234,16 @@ static void fill(table *t, const bt_study *s, const char *dir, bt_member_records
     for (int64_t m = 0; m < t->n; m++) {
         bt_member member;
         bt_study_member(s, m, &member);
-        char *folder = NULL;
-        if (asprintf(&folder, "%s/members/%s", dir, member.name) < 0) abort();
+        char *folder = bt_text_of("%s/members/%s", dir, member.name);
         t->id[m] = m + 1;
         t->condition[m] = member.condition;
         t->repeat[m] = member.repeat;
         t->seed[m] = member.seed;
-        t->name[m] = strdup(member.name);
-        t->hash[m] = strdup("");
+        t->name[m] = bt_text_copy(member.name);
+        t->hash[m] = bt_text_copy("");
         t->status[m] = bt_ensemble_state(folder, NULL, &t->reason[m]);
         if (t->status[m] == BT_MEMBER_FINISHED) t->status[m] = take_finished(t, m, folder, records);
-        if (!t->reason[m]) t->reason[m] = strdup("");
+        if (!t->reason[m]) t->reason[m] = bt_text_copy("");
         free(folder);
         bt_member_free(&member);
     }
@@ -339,15 +332,14 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
 {
     table t = {0};
     fill(&t, s, dir, records);
-    char *path = bt_file_join(dir, "ensemble.h5"), *part = NULL;
-    if (asprintf(&part, "%s.tmp", path) < 0) abort();
+    char *path = bt_file_join(dir, "ensemble.h5"), *part = bt_text_of("%s.tmp", path);
     bt_h5 h;
     bt_status status = bt_h5_create_with_room(&h, part, err);
     if (status == BT_OK) {
         write_all(&h, &t, s, dir);
         status = bt_h5_close(&h);
         if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
-        if (status == BT_OK && rename(part, path) != 0) status = bt_file_fail(path, "write the file", errno, err);
+        if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
     }
     free(part);

@@ -17,7 +17,7 @@
 int bt_member_open(const char *folder, const char *name, int flags)
 {
     char *path = bt_file_join(folder, name);
-    const int fd = open(path, flags | O_CLOEXEC, 0666);
+    const int fd = (int)TEMP_FAILURE_RETRY(open(path, flags | O_CLOEXEC, 0666));
     free(path);
     return fd;
 }
@@ -25,7 +25,7 @@ int bt_member_open(const char *folder, const char *name, int flags)
 bool bt_member_take_lock(int fd, bool wait)
 {
     struct flock l = {.l_type = F_WRLCK, .l_whence = SEEK_SET};
-    return fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l) == 0;
+    return TEMP_FAILURE_RETRY(fcntl(fd, wait ? F_OFD_SETLKW : F_OFD_SETLK, &l)) == 0;
 }
 
 bool bt_member_held(const char *folder)
@@ -74,9 +74,7 @@ void bt_member_forget_attempts(const char *folder)
 /// Names of the record in the folder (0) and beside it (1); the caller frees it.
 static char *record_path(const char *folder, int which)
 {
-    char *path = NULL;
-    if (asprintf(&path, which ? "%s.failed.txt" : "%s/failed.txt", folder) < 0) abort();
-    return path;
+    return bt_text_of("%s%s", folder, which ? ".failed.txt" : "/failed.txt");
 }
 
 bt_status bt_member_record_failure(const char *folder, bt_status code, const bt_errors *why, bt_errors *err)
@@ -116,7 +114,7 @@ static bool read_failure(const char *folder, int which, int *code, char **why)
     if (there && bt_file_read(path, "a record", &text, &size, &none) == BT_OK) {
         char *rest = strchr(text, '\n');
         if (code) *code = (int)strtol(text, NULL, 10);
-        if (why && rest) *why = strdup(rest + 1);
+        if (why && rest) *why = bt_text_copy(rest + 1);
     }
     free(text);
     free(path);
@@ -132,10 +130,9 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **why)
     if (read_failure(folder, 0, code, why) || read_failure(folder, 1, code, why)) return BT_MEMBER_FAILED;
     // the one under way has no end yet
     const int n = why ? bt_member_attempts(folder) : 0, died = n > 0 && bt_member_held(folder) ? n - 1 : n;
-    if (died > 0 && asprintf(why,
-                             "its process died in %d attempt%s without a checkpoint; it is tried again after all "
-                             "others, %d times in all",
-                             died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS) < 0)
-        abort();
+    if (died > 0)
+        *why = bt_text_of("its process died in %d attempt%s without a checkpoint; it is tried again after all others, "
+                          "%d times in all",
+                          died, died > 1 ? "s" : "", BT_MAX_ATTEMPTS);
     return BT_MEMBER_WAITING;
 }

@@ -171,8 +171,7 @@ bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *na
         status = BT_ERR_CASE;
     }
     r->seen[m] = status == BT_OK ? now : 0;
-    for (size_t k = 0; k < why.n; k++) bt_errors_add(err, "%s", why.text[k]);
-    bt_errors_free(&why);
+    bt_errors_move(err, &why);
     free(kept);
     free(path);
     return status;

@@ -31,7 +31,8 @@ void bt_halt_begin(bt_halt *h)
     h->last = bt_clock();
     h->looked = 0;
     for (int k = 0; k < BT_N_CAUGHT; k++) {
-        struct sigaction act = {.sa_handler = caught[k].handler};
+        // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
+        struct sigaction act = {.sa_handler = caught[k].handler, .sa_flags = SA_RESTART};
         sigemptyset(&act.sa_mask);
         sigaction(caught[k].number, &act, &h->before[k]);
     }

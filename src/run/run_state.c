@@ -108,7 +108,7 @@ bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err)
     const int64_t step = bt_snapshot_int(s, "world/step");
     bt_snapshot_want(s, step >= 0 && step <= bt_case_steps(c), "world/step", -1, "is no step of its case");
     free(c->text); // the result shows the case as it was given
-    c->text = strdup(given);
+    c->text = bt_text_copy(given);
     return s->faulty ? BT_ERR_CASE : BT_OK;
 }
 

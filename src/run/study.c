@@ -38,18 +38,7 @@ static void complain(const reader *r, int line, const char *fmt, ...)
     else bt_errors_add(r->err, "%s:%d: %s", r->s->path, line, text);
 }
 
-static char *print(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
-static char *print(const char *fmt, ...)
-{
-    char *text = NULL;
-    va_list ap;
-    va_start(ap, fmt);
-    if (vasprintf(&text, fmt, ap) < 0) abort();
-    va_end(ap);
-    return text;
-}
-
-static char *place_of(const bt_study *s, int line) { return print("%s:%d: ", s->path, line); }
+static char *place_of(const bt_study *s, int line) { return bt_text_of("%s:%d: ", s->path, line); }
 
 static bool scalar(const reader *r, const bt_node *node, int line, const char *name)
 {
@@ -123,7 +112,7 @@ static void read_set(const reader *r, const bt_node *map, int line, const char *
         const int key = find_key(r, map->key_line[i], prefix, map->key[i]);
         if (key < 0 || !check_value(r, map->key_line[i], map->key[i], key, map->item[i])) continue;
         (*at)[*n] = place_of(r->s, map->key_line[i]);
-        (*set)[(*n)++] = print("%s=%s", map->key[i], map->item[i]->text);
+        (*set)[(*n)++] = bt_text_of("%s=%s", map->key[i], map->item[i]->text);
     }
 }
 
@@ -141,7 +130,7 @@ static void read_list(const reader *r, const bt_node *list, int line, bt_study_p
         for (int j = 0; j < p->n; j++)
             if (!strcmp(p->value[j], list->item[i]->text))
                 COMPLAIN(r, list->item[i]->line, "%s: %s stands twice in the list; remove one", p->name, p->value[j]);
-        p->value[p->n++] = strdup(list->item[i]->text);
+        p->value[p->n++] = bt_text_copy(list->item[i]->text);
     }
 }
 
@@ -151,13 +140,13 @@ static char *range_value(const bt_study_parameter *p, double at)
     double x = p->logarithmic ? p->from * pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
     if (at == 0) x = p->from;
     if (at == 1) x = p->to;
-    if (bt_case_keys[p->key].type == BT_KEY_INT) return print("%.0f", nearbyint(x));
+    if (bt_case_keys[p->key].type == BT_KEY_INT) return bt_text_of("%.0f", nearbyint(x));
     for (int digits = 6; digits < 17; digits++) { // 0.3, not 0.30000000000000004, where nothing is lost
-        char *text = print("%.*g", digits, x);
+        char *text = bt_text_of("%.*g", digits, x);
         if (fabs(strtod(text, NULL) - x) <= 1e-12 * fabs(x)) return text;
         free(text);
     }
-    return print("%.17g", x);
+    return bt_text_of("%.17g", x);
 }
 
 static void read_range(const reader *r, const bt_node *map, int line, bt_study_parameter *p)
@@ -234,7 +223,7 @@ static bt_study_parameter *add_parameter(const reader *r, int line, const char *
         return NULL;
     }
     bt_study_parameter *p = &s->parameter[s->n_parameters++];
-    *p = (bt_study_parameter){.name = strdup(name), .at = place_of(s, line), .key = key};
+    *p = (bt_study_parameter){.name = bt_text_copy(name), .at = place_of(s, line), .key = key};
     return p;
 }
 
@@ -274,8 +263,8 @@ static void read_variants(const reader *r, const bt_node *map, int line)
         bt_study_variant *v = &s->variant[s->n_variants++];
         char where[96];
         snprintf(where, sizeof where, "variants: %.60s", map->key[i]);
-        v->name = strdup(map->key[i]);
-        p->value[p->n++] = strdup(v->name);
+        v->name = bt_text_copy(map->key[i]);
+        p->value[p->n++] = bt_text_copy(v->name);
         read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
 }
@@ -301,7 +290,7 @@ static void read_with(const reader *r, const bt_node *map, int line)
         if (!known)
             COMPLAIN(r, map->key_line[i], "%s: is no value of a parameter; write key=value as in the list", where);
         bt_study_variant *v = &s->with[s->n_with++];
-        v->name = strdup(map->key[i]);
+        v->name = bt_text_copy(map->key[i]);
         read_set(r, map->item[i], map->key_line[i], where, &v->set, &v->at, &v->n_set);
     }
 }
@@ -414,8 +403,8 @@ static void add_set(bt_study *s, const char *text, const char *at, bool first)
     const int k = first ? 0 : s->n_set;
     memmove(s->set + k + 1, s->set + k, (size_t)(s->n_set - k) * sizeof *s->set);
     memmove(s->set_at + k + 1, s->set_at + k, (size_t)(s->n_set - k) * sizeof *s->set_at);
-    s->set[k] = strdup(text);
-    s->set_at[k] = at ? strdup(at) : NULL;
+    s->set[k] = bt_text_copy(text);
+    s->set_at[k] = at ? bt_text_copy(at) : NULL;
     s->n_set++;
 }
 
@@ -425,12 +414,12 @@ static void read_entries(const reader *r, const bt_node *root)
     int line = 1;
     check_words(r, root);
     const bt_node *node = entry(root, "title", &line);
-    if (node && scalar(r, node, line, "title")) s->title = strdup(node->text);
+    if (node && scalar(r, node, line, "title")) s->title = bt_text_copy(node->text);
     if ((node = entry(root, "base", &line)) && scalar(r, node, line, "base")) {
         const char *slash = strrchr(s->path, '/');
-        s->base_name = strdup(node->text);
-        s->base = slash && node->text[0] != '/' ? print("%.*s/%s", (int)(slash - s->path), s->path, node->text)
-                                                : strdup(node->text);
+        s->base_name = bt_text_copy(node->text);
+        s->base = slash && node->text[0] != '/' ? bt_text_of("%.*s/%s", (int)(slash - s->path), s->path, node->text)
+                                                : bt_text_copy(node->text);
     } else if (!node) {
         bt_errors_add(r->err, "%s: base: missing; name the case that is varied, as in base: ../basin/basin-80.yml",
                       s->path);
@@ -451,7 +440,7 @@ static void read_entries(const reader *r, const bt_node *root)
 
 bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err)
 {
-    *s = (bt_study){.path = strdup(path), .repeats = 1, .samples = 1, .seed = 1, .ranks = 1, .n_conditions = 1};
+    *s = (bt_study){.path = bt_text_copy(path), .repeats = 1, .samples = 1, .seed = 1, .ranks = 1, .n_conditions = 1};
     const size_t before = err->n;
     size_t size;
     bt_status status = bt_file_read(path, "a study file", &s->text, &size, err);
@@ -508,11 +497,11 @@ static void take_override(bt_study *s, const char *text, bt_errors *err)
     if (k >= 0) {
         free(s->set[k]);
         free(s->set_at[k]);
-        s->set[k] = print("%s=%s", name, value);
-        s->set_at[k] = strdup("--set: ");
+        s->set[k] = bt_text_of("%s=%s", name, value);
+        s->set_at[k] = bt_text_copy("--set: ");
         return;
     }
-    char *given = print("%s=%s", name, value);
+    char *given = bt_text_of("%s=%s", name, value);
     add_set(s, given, "--set: ", false);
     free(given);
 }
@@ -582,11 +571,11 @@ static char *value_in(const bt_study *s, int p, int64_t c)
         const double at = ((double)q->stratum[c] + bt_rng_uniform(&r)) / (double)s->n_conditions;
         if (q->continuous) return range_value(q, at);
         const int i = (int)(at * q->n);
-        return strdup(q->value[i < q->n ? i : q->n - 1]);
+        return bt_text_copy(q->value[i < q->n ? i : q->n - 1]);
     }
     // The last parameter runs fastest.
     for (int i = s->n_parameters - 1; i > p; i--) c /= s->parameter[i].n;
-    return strdup(q->value[c % q->n]);
+    return bt_text_copy(q->value[c % q->n]);
 }
 
 static void add_override(bt_member *m, char *set, const char *at)
@@ -607,22 +596,22 @@ void bt_study_member(const bt_study *s, int64_t m, bt_member *out)
     for (int i = 0; i < s->n_with; i++) most += s->with[i].n_set;
     out->set = bt_alloc((size_t)most, sizeof *out->set);
     out->at = bt_alloc((size_t)most, sizeof *out->at);
-    for (int i = 0; i < s->n_set; i++) add_override(out, strdup(s->set[i]), s->set_at[i]);
+    for (int i = 0; i < s->n_set; i++) add_override(out, bt_text_copy(s->set[i]), s->set_at[i]);
     for (int p = 0; p < s->n_parameters; p++) {
         out->value[p] = value_in(s, p, out->condition);
         if (s->parameter[p].key >= 0) {
-            char *given = print("%s=%s", s->parameter[p].name, out->value[p]);
+            char *given = bt_text_of("%s=%s", s->parameter[p].name, out->value[p]);
             add_override(out, given, s->parameter[p].at);
             for (int i = 0; i < s->n_with; i++)
                 for (int k = 0; k < s->with[i].n_set && !strcmp(s->with[i].name, given); k++)
-                    add_override(out, strdup(s->with[i].set[k]), s->with[i].at[k]);
+                    add_override(out, bt_text_copy(s->with[i].set[k]), s->with[i].at[k]);
             continue;
         }
         for (int i = 0; i < s->n_variants; i++)
             for (int k = 0; k < s->variant[i].n_set && !strcmp(s->variant[i].name, out->value[p]); k++)
-                add_override(out, strdup(s->variant[i].set[k]), s->variant[i].at[k]);
+                add_override(out, bt_text_copy(s->variant[i].set[k]), s->variant[i].at[k]);
     }
-    add_override(out, print("ice.seed=%" PRId64, out->seed), NULL);
+    add_override(out, bt_text_of("ice.seed=%" PRId64, out->seed), NULL);
 }
 
 void bt_member_free(bt_member *m)

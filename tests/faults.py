@@ -1,0 +1,379 @@
+# SPDX-License-Identifier: MIT
+"""Faults at the n-th call of the system on the files of a result, and what must be true after each.
+
+A scenario is a command on a folder in a known state. `calls_of` counts its calls; `strike` makes it again with one of
+them failing, and holds what is left against the contract: an exit code of the program's, a message with path and remedy,
+and then one call without a fault that ends with the state of the run that nothing disturbed."""
+import collections
+import errno
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+
+import h5py
+
+from harness import BERGTOW, DONE, IO, FAULT, changed, environment, write_case
+
+CALLS = FAULT.with_name("calls.so")  # tests/fault/calls.c
+MEMORY = FAULT.with_name("memory.so")  # tests/fault/memory.c
+ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
+HANGS = 60  # seconds after which a run of a tenth of one hangs
+
+# Two checkpoints on the way, collisions, panels; as few floes and frames as show that.
+CASE = {
+    "run": {"dt": 0.1, "duration": 3},
+    "domain": {"length": 8, "width": 6},
+    "ice": {"concentration": 0.5, "size": 0.7, "thickness": 0.04, "friction": 0.3},
+    "body": {"x": 3, "length": 2, "draft": 0.5},
+    "tow": {"speed": 0.3, "ramp": 1},
+    "output": {"frame_interval": 3, "checkpoint_steps": 10, "panels": True},
+}
+OTHER = changed(CASE, ice__friction=0.1)
+
+WRITES = ("write", "pwrite64", "writev")
+NAMES = ("openat", "open", "mkdir", "mkdirat", "rename", "renameat", "unlink", "unlinkat", "rmdir")
+SYNCS = ("fsync", "fdatasync")
+# fault -> what the shim is told, and the calls it can befall
+FAULTS = {
+    "full disk": ({"BT_CALLS_WITH": errno.ENOSPC, "BT_CALLS_ON": 1}, WRITES + SYNCS + ("ftruncate", "mkdir", "mkdirat")),
+    "ENOSPC": ({"BT_CALLS_WITH": errno.ENOSPC}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+    "EIO": ({"BT_CALLS_WITH": errno.EIO}, WRITES + SYNCS + NAMES + ("ftruncate", "close", "read", "pread64")),
+    "EINTR": ({"BT_CALLS_WITH": errno.EINTR},
+              WRITES + SYNCS + ("openat", "open", "ftruncate", "close", "read", "pread64")),
+    "short": ({"BT_CALLS_WITH": "short"}, WRITES),
+    "kill": ({"BT_CALLS_WITH": errno.EIO, "BT_CALLS_KILL": 1}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+}
+
+Call = collections.namedtuple("Call", "name path second result")
+
+
+def shim(under, **more):
+    return environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, LD_PRELOAD=CALLS, BT_CALLS_UNDER=under, **ROOT, **more)
+
+
+def started(words, env, cwd=None):
+    """Killed with all below it when it hangs: that is a failure of its own."""
+    p = subprocess.Popen([str(w) for w in words], env=env, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                         text=True, start_new_session=True)
+    try:
+        out, err = p.communicate(timeout=HANGS)
+    except subprocess.TimeoutExpired:
+        os.killpg(p.pid, signal.SIGKILL)
+        out, err = p.communicate()
+        return subprocess.CompletedProcess(words, "hangs", out, err)
+    return subprocess.CompletedProcess(words, p.returncode, out, err)
+
+
+def plain(*words):
+    return started([BERGTOW, *words], environment(OMP_NUM_THREADS=1, **ROOT))
+
+
+def logged(path):
+    if not path.exists():
+        return []
+    lines = (line.split("\t") for line in path.read_text().splitlines())
+    return [Call(w[0], w[1], w[2], int(w[3])) for w in lines]
+
+
+def state_hash(folder):
+    """Of a result that is whole; what the summary says is held against the files."""
+    summary = json.loads((folder / "summary.json").read_text())
+    with h5py.File(folder / "result.h5") as f:
+        assert f.attrs["complete"] == 1 and len(f["series/time"]) == summary["n_steps"]
+        assert len(f["frames/time"]) == (folder / "frames.xdmf").read_text().count('CollectionType="Spatial"')
+    return summary["state_hash"]
+
+
+def checkpoint_step(folder):
+    """Of the newest checkpoint that is whole, −1 without one."""
+    result = plain("diff", folder / "checkpoint.h5") if (folder / "checkpoint.h5").exists() else None
+    if result is None or result.returncode != DONE:
+        if not (folder / "checkpoint.previous.h5").exists():
+            return -1
+        result = plain("diff", folder / "checkpoint.previous.h5")
+        assert result.returncode == DONE, result.stderr
+    return int(re.search(r"world/step +int64 +(\d+)", result.stdout).group(1))
+
+
+def told(result, folder):
+    """A message names a file of the folder, the reason, and what to do about it."""
+    assert re.search(rf"bergtow: [^\n]*{re.escape(str(folder))}[^\n]*: [^\n]*; [^\n]+", result.stderr), result.stderr
+
+
+class Scenario:
+    """prepare leaves the folder as the command finds it, once; `whole` is the state it must end with."""
+    codes = (IO, )
+
+    def __init__(self, base):
+        self.base = pathlib.Path(base) / self.name.replace(" ", "-")
+        self.base.mkdir(parents=True)
+        self.start, self.folder = self.base / "start", self.base / "work"
+        self.start.mkdir()
+        self.prepare(self.start)
+
+    def fresh(self):
+        shutil.rmtree(self.folder, ignore_errors=True)
+        shutil.copytree(self.start, self.folder)
+        (self.base / "log").unlink(missing_ok=True)
+
+    def launch(self, env):
+        return started([BERGTOW, *self.command()], env)
+
+    def calls_of(self):
+        """The calls of the undisturbed command."""
+        self.fresh()
+        result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log"))
+        assert result.returncode == DONE, result.stderr
+        self.check_done()
+        return logged(self.base / "log")
+
+    def strike(self, fault, calls, n):
+        """The n-th of these calls meets the fault; the outcome in a word."""
+        self.fresh()
+        what = FAULTS[fault][0]
+        result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_CALLS=",".join(calls), BT_CALLS_AT=n,
+                                  **what))
+        if fault == "kill":
+            assert result.returncode in (-signal.SIGKILL, 128 + signal.SIGKILL), (result.returncode, result.stderr)
+        elif result.returncode == DONE:
+            self.check_done()
+            return "done"
+        else:
+            assert result.returncode in self.codes, (result.returncode, result.stderr)
+            told(result, self.folder)
+        self.check_kept(logged(self.base / "log"))
+        return self.recover()
+
+
+class FreshRun(Scenario):
+    name = "run"
+
+    def prepare(self, start):
+        self.case = write_case(self.base, CASE)
+        result = plain("run", self.case, "-o", self.base / "whole", "--quiet")
+        assert result.returncode == DONE, result.stderr
+        self.whole = state_hash(self.base / "whole")
+
+    def command(self):
+        return "run", self.case, "-o", self.folder / "out", "--quiet"
+
+    def check_done(self):
+        assert state_hash(self.folder / "out") == self.whole
+
+    def check_kept(self, log):
+        """A checkpoint that got its name is still there."""
+        stood = sum(c.name.startswith("rename") and c.result == 0 and c.path.endswith("/checkpoint.h5.tmp") for c in log)
+        assert not stood or checkpoint_step(self.folder / "out") >= 10 * min(stood, 3), "a checkpoint is lost"
+
+    def recover(self):
+        begun = (self.folder / "out/case.resolved.yml").exists()
+        result = plain(*(("resume", self.folder / "out", "--quiet") if begun else self.command()))
+        assert result.returncode == DONE, result.stderr
+        self.check_done()
+        return "resumed" if begun else "again"
+
+
+class Resume(FreshRun):
+    name = "resume"
+
+    def prepare(self, start):
+        super().prepare(start)
+        result = plain("run", self.case, "-o", start / "out", "--quiet", "--steps", 15)
+        assert result.returncode == DONE, result.stderr
+
+    def command(self):
+        return "resume", self.folder / "out", "--quiet"
+
+    def check_kept(self, log):
+        assert checkpoint_step(self.folder / "out") >= 15, "a checkpoint is lost"
+
+
+class Force(FreshRun):
+    """An old result in the folder, and another case: after a fault one of the two is whole."""
+    name = "run --force"
+
+    def prepare(self, start):
+        super().prepare(start)
+        shutil.copytree(self.base / "whole", start / "out")
+        self.old = self.whole
+        self.case = write_case(self.base, OTHER, "other.yml")
+        result = plain("run", self.case, "-o", self.base / "other", "--quiet")
+        assert result.returncode == DONE, result.stderr
+        self.whole = state_hash(self.base / "other")
+
+    def command(self):
+        return "run", self.case, "-o", self.folder / "out", "--quiet", "--force"
+
+    def check_done(self):
+        super().check_done()
+        assert not (self.folder / "out/replaced").exists() or state_hash(self.folder / "out/replaced") == self.old
+
+    def check_kept(self, log):
+        out = self.folder / "out"
+        stood = any(c.name.startswith("rename") and c.result == 0 and c.path.endswith("checkpoint.h5.tmp") for c in log)
+        if stood:
+            return super().check_kept(log)
+        parts = {}  # in one place or the other, while it is moved
+        for name in "case.resolved.yml", "summary.json", "result.h5", "frames.xdmf", "checkpoint.h5":
+            places = [p for p in (out / "replaced" / name, out / name) if p.exists()]
+            assert places, f"{name} of the old result is lost"
+            parts[name] = places[0].read_bytes()
+        for name, text in parts.items():
+            assert text == (self.start / "out" / name).read_bytes(), f"{name} of the old result is changed"
+
+    def recover(self):
+        result = plain("resume", self.folder / "out", "--quiet")
+        assert result.returncode == DONE, result.stderr
+        now = state_hash(self.folder / "out")
+        assert now in (self.old, self.whole)
+        assert not (self.folder / "out/replaced").exists()
+        return "old stays" if now == self.old else "resumed"
+
+
+class Field(Scenario):
+    """A field in place of an older one."""
+    name, output = "field", "field.h5"
+
+    def prepare(self, start):
+        self.case = write_case(self.base, CASE)
+        path = write_case(self.base, changed(CASE, ice__seed=7), "old.yml")
+        for case, to in (self.case, self.base), (path, start):
+            result = plain("field", case, "-o", to / self.output)
+            assert result.returncode == DONE, result.stderr
+        self.made, self.old = ((f / self.output).read_bytes() for f in (self.base, start))
+
+    def command(self):
+        return "field", self.case, "-o", self.folder / self.output
+
+    def check_done(self):
+        assert (self.folder / self.output).read_bytes() == self.made
+
+    def check_kept(self, log):
+        assert (self.folder / self.output).read_bytes() in (self.old, self.made)
+
+    def recover(self):
+        result = plain(*self.command())
+        assert result.returncode == DONE, result.stderr
+        self.check_done()
+        return "old stays"
+
+
+class FieldText(Field):
+    name, output = "field to GeoJSON", "field.geojson"
+
+
+class Contacts(FreshRun):
+    name = "run --dump-contacts"
+
+    def prepare(self, start):
+        super().prepare(start)
+        self.case = write_case(self.base, changed(CASE, output__checkpoint_steps=0, output__panels=False))
+
+    def command(self):
+        return ("run", self.case, "-o", self.folder / "out", "--quiet", "--dump-contacts",
+                f"20:{self.folder / 'contacts.h5'}")
+
+    def check_done(self):
+        super().check_done()
+        with h5py.File(self.folder / "contacts.h5") as f:
+            assert "fclib_local" in f
+
+    def check_kept(self, log):
+        if (self.folder / "contacts.h5").exists():
+            with h5py.File(self.folder / "contacts.h5") as f:
+                assert "fclib_local" in f
+
+    def recover(self):
+        result = plain(*self.command(), "--force")
+        assert result.returncode == DONE, result.stderr
+        self.check_done()
+        return "again"
+
+
+class Ensemble(Scenario):
+    name = "ensemble"
+
+    def prepare(self, start):
+        write_case(self.base, changed(CASE, output__checkpoint_steps=20, output__panels=False), "base.yml")
+        self.study = self.base / "study.yml"
+        self.study.write_text(json.dumps({"base": "base.yml", "repeats": 3}))
+        result = plain("ensemble", self.study, "-o", self.base / "whole", "--threads", 1)
+        assert result.returncode == DONE, result.stderr
+        self.whole = self.hashes(self.base / "whole")
+        assert len(set(self.whole)) == 3
+
+    def command(self):
+        return "ensemble", self.study, "-o", self.folder / "out", "--threads", 1, "--quiet"
+
+    @staticmethod
+    def hashes(folder):
+        with h5py.File(folder / "ensemble.h5") as f:
+            assert f.attrs["complete"] == 1 and f.attrs["n_finished"] == 3
+            return [h.decode() for h in f["members/state_hash"][:]]
+
+    def check_done(self):
+        assert self.hashes(self.folder / "out") == self.whole
+
+    def check_kept(self, log):
+        """A member that was finished is so still, with the bytes it had."""
+        for c in log:
+            if c.name.startswith("rename") and c.result == 0 and c.second.endswith("/finished"):
+                assert state_hash(pathlib.Path(c.second).parent) in self.whole
+
+    def recover(self):
+        result = plain(*self.command(), "--retry")
+        assert result.returncode == DONE, result.stderr
+        self.check_done()
+        return "again"
+
+
+class Ranks(FreshRun):
+    """Two ranks, one of which meets the fault."""
+    name, struck = "2 ranks", 0
+
+    def launch(self, env):
+        rank = f'[ "$OMPI_COMM_WORLD_RANK" = {self.struck} ] || unset LD_PRELOAD; exec "$0" "$@"'
+        preload = f"export LD_PRELOAD={CALLS}; "
+        env = {k: v for k, v in env.items() if k != "LD_PRELOAD"}
+        return started(["mpirun", "--oversubscribe", "-n", 2, "sh", "-c", preload + rank, BERGTOW, *self.command()], env)
+
+
+class OtherRank(Ranks):
+    name, struck = "2 ranks, the second", 1
+
+
+SCENARIOS = {s.name: s for s in (FreshRun, Resume, Force, Field, FieldText, Contacts, Ensemble, Ranks, OtherRank)}
+
+
+def numbers(n, most):
+    """1 to n, or so many of them from the first to the last, evenly."""
+    return range(1, n + 1) if n <= most else sorted({1 + round(i * (n - 1) / (most - 1)) for i in range(most)})
+
+
+def campaign(scenario, faults, most):
+    """Every fault at the calls of a scenario, at most so many n of each name: (fault, name) -> Counter of outcomes."""
+    made = scenario.calls_of()
+    table, failures = {}, []
+    for fault in faults:
+        for name in sorted({c.name for c in made} & set(FAULTS[fault][1])):
+            counter = table.setdefault((fault, name), collections.Counter())
+            for n in numbers(sum(c.name == name for c in made), most):
+                try:
+                    counter[scenario.strike(fault, (name, ), n)] += 1
+                except AssertionError as e:
+                    counter["FAILED"] += 1
+                    failures.append(f"{scenario.name}: {fault} at {name} {n}: {str(e)[:1500]}")
+    return table, failures
+
+
+def printed(name, table):
+    """Fault × call × outcome as text."""
+    outcomes = sorted({o for c in table.values() for o in c})
+    lines = [f"{name:24}{'call':12}" + "".join(f"{o:>12}" for o in outcomes)]
+    for (fault, call), counter in table.items():
+        lines.append(f"{fault:24}{call:12}" + "".join(f"{counter[o] or '-':>12}" for o in outcomes))
+    return "\n".join(lines)
