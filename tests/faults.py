@@ -99,6 +99,33 @@ def checkpoint_step(folder):
     return int(re.search(r"world/step +int64 +(\d+)", result.stdout).group(1))
 
 
+def not_durable(log):
+    """What of a log could be lost with the power: bytes, names and removals that are not in the order of durability."""
+    faults, dirty, names = [], {}, {}  # file -> call that has changed it; folder -> name that has come into it
+    for c in log:
+        folder = os.path.dirname(c.second or c.path)
+        if c.result < 0:
+            continue
+        if c.name in WRITES or c.name == "ftruncate":
+            dirty[c.path] = c
+        elif c.name in SYNCS:
+            dirty.pop(c.path, None)
+            names.pop(c.path, None)
+        elif c.name.startswith("rename") or c.name.startswith("unlink"):
+            faults += [f"{n} is not in {f} for good when {c.path} goes" for f, n in names.items()]
+        if c.name.startswith("rename"):
+            if c.path in dirty:
+                faults.append(f"{c.path} becomes {c.second} before its bytes are on the disk")
+            names[folder] = c.second
+        elif c.name.startswith("mkdir"):
+            names[folder] = c.path
+        elif c.name.startswith("unlink"):
+            dirty.pop(c.path, None)
+    faults += [f"{f} is not on the disk in the end" for f in dirty if not f.endswith("run.lock")]
+    faults += [f"{n} is not in {f} for good in the end" for f, n in names.items()]
+    return faults
+
+
 def told(result, folder):
     """A message names a file of the folder, the reason, and what to do about it."""
     assert re.search(rf"bergtow: [^\n]*{re.escape(str(folder))}[^\n]*: [^\n]*; [^\n]+", result.stderr), result.stderr
@@ -368,6 +395,14 @@ def campaign(scenario, faults, most):
                     counter["FAILED"] += 1
                     failures.append(f"{scenario.name}: {fault} at {name} {n}: {str(e)[:1500]}")
     return table, failures
+
+
+def chosen(made, most):
+    """So many (fault, call, n), evenly among all of them; a call that is made a thousand times counts as twenty."""
+    count = collections.Counter(c.name for c in made)
+    every = [(fault, name, n) for fault, (_, befalls) in FAULTS.items() for name in sorted(count) if name in befalls
+             for n in numbers(count[name], 20)]
+    return [every[k - 1] for k in numbers(len(every), most)]
 
 
 def printed(name, table):

@@ -54,6 +54,7 @@ typedef struct {
     char **name, **hash, **reason;
     column *column;
     int n_columns;
+    int64_t unread; ///< members that have finished and could not be read
 } table;
 
 static double *column_of(table *t, const char *name, const char *key)
@@ -84,16 +85,11 @@ static void take_numbers(table *t, int64_t m, const json_t *object, const char *
     }
 }
 
-static bool take_summary(table *t, int64_t m, const char *folder)
+static bt_status take_summary(table *t, int64_t m, const char *folder, bt_errors *err)
 {
-    char *path = bt_file_join(folder, "summary.json");
-    json_error_t why;
-    json_t *root = json_load_file(path, 0, &why);
-    free(path);
-    if (!json_is_object(root)) {
-        json_decref(root);
-        return false;
-    }
+    json_t *root;
+    const bt_status status = bt_member_summary(folder, &root, err);
+    if (status != BT_OK) return status;
     take_numbers(t, m, root, "");
     const char *hash = json_string_value(json_object_get(root, "state_hash"));
     if (hash) {
@@ -101,7 +97,7 @@ static bool take_summary(table *t, int64_t m, const char *folder)
         t->hash[m] = bt_text_copy(hash);
     }
     json_decref(root);
-    return true;
+    return BT_OK;
 }
 
 /// Series of a member; returns its length, 0 when there is none. A read that fails is kept in h: the numbers of a
@@ -210,10 +206,8 @@ static bt_member_state take_finished(table *t, int64_t m, const char *folder, bt
 {
     bt_errors why = {0};
     bt_status status = bt_member_record_check(records, m, t->name[m], folder, &why);
-    if (status == BT_OK && !take_summary(t, m, folder)) {
-        bt_errors_add(&why, "%s/summary.json: cannot be read as JSON", folder);
-        status = BT_ERR_CASE;
-    }
+    if (status == BT_OK) status = take_summary(t, m, folder, &why);
+    t->unread += status == BT_ERR_IO;
     if (status != BT_OK) {
         free(t->reason[m]);
         t->reason[m] =
@@ -341,6 +335,13 @@ bt_status bt_ensemble_gather(const bt_study *s, const char *dir, bt_member_recor
         if (status == BT_OK) status = bt_checksum_write(part, BT_CHECKSUM_ENSEMBLE, err);
         if (status == BT_OK) status = bt_file_rename(part, path, err);
         if (status != BT_OK) unlink(part);
+    }
+    if (status == BT_OK && t.unread) {
+        bt_errors_add(err,
+                      "%s: %" PRId64 " members that have finished are not in it, as their files could not be read; "
+                      "mend that, and call again",
+                      path, t.unread);
+        status = BT_ERR_IO;
     }
     free(part);
     free(path);

@@ -74,22 +74,39 @@ static bt_status make(const bt_member_records *r, const char *name, const char *
     return BT_OK;
 }
 
+bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err)
+{
+    char *path = bt_file_join(folder, "summary.json"), *text;
+    size_t size;
+    json_error_t why = {0};
+    *root = NULL;
+    bt_status status = bt_file_read(path, "a summary", &text, &size, err);
+    if (status == BT_OK) *root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &why);
+    if (status == BT_OK && !json_is_object(*root)) {
+        json_decref(*root);
+        *root = NULL;
+        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
+        status = BT_ERR_CASE;
+    }
+    free(text);
+    free(path);
+    return status;
+}
+
 /// Is it the summary of a whole run? One that is cut short, or of a run that stopped, is not.
 static bt_status check_summary(const char *folder, bt_errors *err)
 {
     static const char *const numbers[] = {"n_steps", "n_floes", "sim_time_s", NULL};
+    json_t *root;
+    if (bt_member_summary(folder, &root, err) != BT_OK) return BT_ERR_IO;
     char *path = bt_file_join(folder, "summary.json");
-    json_error_t why = {0};
-    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, &why);
     const char *missing = json_is_string(json_object_get(root, "state_hash")) ? NULL : "state_hash";
     for (int k = 0; numbers[k] && !missing; k++)
         if (!json_is_number(json_object_get(root, numbers[k]))) missing = numbers[k];
     const bool stopped = json_is_string(json_object_get(root, "stopped"));
-    if (!root)
-        bt_errors_add(err, "%s: cannot be read as JSON: line %d: %s; look at the disk", path, why.line, why.text);
-    else if (missing) bt_errors_add(err, "%s: has no %s; look at the disk", path, missing);
+    if (missing) bt_errors_add(err, "%s: has no %s; look at the disk", path, missing);
     else if (stopped) bt_errors_add(err, "%s: is of a run that was stopped", path);
-    const bt_status status = root && !missing && !stopped ? BT_OK : BT_ERR_IO;
+    const bt_status status = !missing && !stopped ? BT_OK : BT_ERR_IO;
     json_decref(root);
     free(path);
     return status;
@@ -97,11 +114,12 @@ static bt_status check_summary(const char *folder, bt_errors *err)
 
 bool bt_member_is_whole(const char *folder, int64_t n_steps)
 {
-    char *path = bt_file_join(folder, "summary.json");
-    json_t *root = json_load_file(path, JSON_REJECT_DUPLICATES, NULL);
-    const bool whole = json_integer_value(json_object_get(root, "n_steps")) >= n_steps;
+    bt_errors unheard = {0};
+    json_t *root;
+    const bool whole = bt_member_summary(folder, &root, &unheard) == BT_OK &&
+                       json_integer_value(json_object_get(root, "n_steps")) >= n_steps;
     json_decref(root);
-    free(path);
+    bt_errors_free(&unheard);
     return whole;
 }
 

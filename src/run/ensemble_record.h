@@ -16,6 +16,8 @@
 #ifndef BT_ENSEMBLE_RECORD_H
 #define BT_ENSEMBLE_RECORD_H
 
+#include <jansson.h>
+
 #include "bergtow/base.h"
 #include "bergtow/study.h"
 
@@ -35,6 +37,9 @@ void bt_member_records_end(bt_member_records *r);
 /// Write the record of member m, which has just finished in this folder. Errors: BT_ERR_IO, when its files are not what
 /// a run leaves, or it cannot be written.
 bt_status bt_member_record_write(bt_member_records *r, int64_t m, const char *name, const char *folder, bt_errors *err);
+
+/// Summary of the result in a folder; the caller releases it. Errors: BT_ERR_CASE, no JSON; BT_ERR_IO.
+bt_status bt_member_summary(const char *folder, json_t **root, bt_errors *err);
 
 /// Does the summary in this folder tell of so many steps? A run that was limited to fewer has one, too.
 bool bt_member_is_whole(const char *folder, int64_t n_steps);

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Calls of the system that fail at the n-th time, some n of each kind; tests/long/test_faults.py has them all. And the
+order in which bytes and names are brought to the disk."""
+import pytest
+
+import faults
+from faults import SCENARIOS, chosen, not_durable
+
+# runs of each scenario; with ranks, and with three members, each takes seconds
+MOST = {"run": 24, "resume": 16, "run --force": 24, "field": 12, "field to GeoJSON": 8, "run --dump-contacts": 8,
+        "ensemble": 6, "2 ranks": 3, "2 ranks, the second": 3}
+
+
+@pytest.fixture(scope="module")
+def scenarios(tmp_path_factory):
+    made = {}
+
+    def get(name):
+        if name not in made:
+            scenario = SCENARIOS[name](tmp_path_factory.mktemp("faults"))
+            made[name] = scenario, scenario.calls_of()
+        return made[name]
+
+    return get
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_nothing_is_lost(scenarios, name):
+    scenario, calls = scenarios(name)
+    wrong = []
+    for fault, call, n in chosen(calls, MOST[name]):
+        try:
+            scenario.strike(fault, (call, ), n)
+        except AssertionError as e:
+            wrong.append(f"{fault} at {call} {n}: {e}")
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_bytes_before_names_and_names_before_removals(scenarios, name):
+    """As the calls come: a file is synced before it gets its name, the folder after it, and before anything else goes."""
+    _, calls = scenarios(name)
+    assert not_durable(calls) == []
+
+
+def test_the_old_result_goes_last(scenarios):
+    """None of it is removed before the checkpoint of the new one has its name for good."""
+    _, calls = scenarios("run --force")
+    gone = [k for k, c in enumerate(calls) if c.name.startswith("unlink") and "/replaced/" in c.path]
+    stands = [k for k, c in enumerate(calls) if c.name.startswith("rename") and c.path.endswith("checkpoint.h5.tmp")]
+    synced = [k for k, c in enumerate(calls) if c.name in faults.SYNCS and c.path.endswith("/out") and k > stands[0]]
+    assert gone and synced[0] < min(gone)
+
+
+def test_what_is_made_stands_in_this_order(scenarios):
+    """Result, pictures, checkpoint, summary: each counts on those before it."""
+    _, calls = scenarios("run")
+    names = [c.second.rsplit("/", 1)[1] for c in calls if c.name.startswith("rename")]
+    checkpoint = ["result.h5", "frames.xdmf", "checkpoint.h5"]
+    later = ["result.h5", "frames.xdmf", "checkpoint.previous.h5", "checkpoint.h5"]
+    assert names == ["case.resolved.yml.new", "case.resolved.yml", *checkpoint, *later, *later, "summary.json"]
