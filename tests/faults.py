@@ -16,7 +16,7 @@ import subprocess
 
 import h5py
 
-from harness import BERGTOW, DONE, IO, FAULT, changed, environment, write_case
+from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, changed, environment, write_case
 
 CALLS = FAULT.with_name("calls.so")  # tests/fault/calls.c
 MEMORY = FAULT.with_name("memory.so")  # tests/fault/memory.c
@@ -172,6 +172,29 @@ class Scenario:
         else:
             assert result.returncode in self.codes, (result.returncode, result.stderr)
             told(result, self.folder)
+        self.check_kept(logged(self.base / "log"))
+        return self.recover()
+
+
+    def requests(self):
+        """How often the undisturbed command asks for memory."""
+        self.fresh()
+        log = self.base / "memory"
+        env = environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, LD_PRELOAD=MEMORY, BT_MEMORY_LOG=log, **ROOT)
+        assert self.launch(env).returncode == DONE
+        return int(log.read_text())
+
+    def starve(self, n):
+        """The n-th request for memory is refused; the outcome in a word."""
+        self.fresh()
+        preload = f"{CALLS} {MEMORY}"
+        result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_MEMORY_AT=n) | {"LD_PRELOAD": preload})
+        if result.returncode == DONE:
+            self.check_done()
+            return "done"
+        assert result.returncode in (IO, NUMERIC), (result.returncode, result.stderr)
+        assert re.search(r"bergtow: .*: (out of|Cannot allocate) memory|bergtow: out of memory: .*; ", result.stderr), \
+            result.stderr
         self.check_kept(logged(self.base / "log"))
         return self.recover()
 

@@ -29,6 +29,7 @@ const char *bt_file_remedy(int errnum)
     case ENAMETOOLONG: return "give a shorter path";
     case EMFILE:
     case ENFILE: return "close other files, or raise the limit on open files (ulimit -n)";
+    case ENOMEM: return "use fewer floes or a larger machine";
     case EIO: return "the disk reports errors: write to another one with -o DIR";
     default: return "check the path, the free space and the permissions";
     }

@@ -36,6 +36,19 @@ def test_nothing_is_lost(scenarios, name):
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.parametrize("name", ["run", "resume", "run --force", "field", "run --dump-contacts"])
+def test_no_memory(scenarios, name):
+    """Refused at some requests of the program's own code."""
+    scenario, _ = scenarios(name)
+    wrong = []
+    for n in faults.numbers(scenario.requests(), 10):
+        try:
+            scenario.starve(n)
+        except AssertionError as e:
+            wrong.append(f"request {n}: {e}")
+    assert not wrong, "\n".join(wrong)
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_bytes_before_names_and_names_before_removals(scenarios, name):
     """As the calls come: a file is synced before it gets its name, the folder after it, and before anything else goes."""
