@@ -1,0 +1,223 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Does the suite tell wrong lines from right ones? Each mutant of tests/mutants.py is built in a copy of the source,
+and tests run until one fails: first those named with it, then, for survivors, the wider suite.
+
+    tests/mutate.py [-j N] [--only TEXT] [--first N] [--wide] [--seconds S]
+
+Results are kept in build/mutate/results.json, by text: a call goes on where the last one ended. Exit code 1 where a
+mutant survives. Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a
+mutant (20 minutes here), and know of no barrier, order or sync; a list says why each line matters."""
+import argparse
+import collections
+import json
+import multiprocessing
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from harness import DONE, ROOT, environment
+from mutants import MUTANTS
+
+HERE = ROOT / "build/mutate"
+RESULTS = HERE / "results.json"
+PATIENCE = {"build": 300, "test": 240}
+# Half the time of -O3 to compile, and the same bits.
+MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG"]
+WIDE = ["parallel/test_scenes.py", "parallel/test_same_bits.py", "parallel/test_ranks.py", "cli/test_balance.py",
+        "cli/test_tow.py", "cli/test_resume.py", "cli/test_run.py", "cli/test_random_cases.py", "parallel/test_everything.py"]
+
+
+def listed():
+    """(file, text, in its place, why, tests)"""
+    return [(path, *m, tests) for path, (tests, found) in MUTANTS.items() for m in found]
+
+
+def name_of(mutant):
+    return f"{mutant[0]}: {mutant[1]} -> {mutant[2]}"
+
+
+def run(words, tree, seconds):
+    """Exit code and output; a group that hangs is killed whole, and counts as failed."""
+    p = subprocess.Popen(words, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
+                         start_new_session=True,
+                         env=environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1,
+                                         BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none"))
+    try:
+        out, _ = p.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        os.killpg(p.pid, signal.SIGKILL)
+        p.communicate()
+        return "hangs", ""
+    return p.returncode, out
+
+
+def make(tree, *targets):
+    return run([*MAKE, *targets], tree, PATIENCE["build"])
+
+
+def copy_source(tree):
+    """What git knows, and what is new, with its times: make builds what has changed since the last copy."""
+    listed_files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True,
+                                  check=True).stdout.splitlines()
+    for name in listed_files:
+        source, to = ROOT / name, tree / name
+        if not source.is_file() or (to.exists() and to.read_bytes() == source.read_bytes()):
+            continue
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(source, to)
+        os.utime(to)
+
+
+def prepare(n):
+    first = HERE / "tree0"
+    copy_source(first)
+    code, out = make(first, "all", *(f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory")))
+    assert code == 0, out
+    for k in range(1, n):
+        other = HERE / f"tree{k}"
+        if not other.exists():
+            subprocess.run(["cp", "-a", first, other], check=True)
+        else:
+            copy_source(other)
+            make(other, "all")
+
+
+def fails_scenes(tree, names):
+    """The first scene that is not what is stored of it, on one layout."""
+    import scenes  # reads BERGTOW as it is imported
+    _, _, stored = scenes.stored()
+    binary = tree / "build/release/bergtow"
+    for name in names:
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                layout = scenes.layouts_of(name)[0]
+                found = scenes.digests(scenes.run_scene(pathlib.Path(folder) / "run", name, layout, binary=binary))
+            except (scenes.Failed, subprocess.TimeoutExpired, OSError, KeyError, ValueError):
+                return name
+        if any(found.get(i) != d for i, d in stored[name].items()):
+            return name
+    return None
+
+
+def fails(tree, test):
+    """Does the test tell? The word for what did, or None."""
+    if test.startswith("scenes:"):
+        found = fails_scenes(tree, test[7:].split(","))
+        return found and f"scene {found}"
+    if test.startswith(("unit/", "physics/")):
+        program = f"build/release/tests/{test}"
+        code, out = make(tree, program)
+        if code != 0:
+            return f"{test} does not build"
+        return None if run([tree / program], tree, PATIENCE["test"])[0] == 0 else test
+    extra = []
+    if "ranks" in test or "same_bits" in test or "broken" in test:
+        make(tree, "build/release/tests/parallel/broken_division")
+    code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *extra, f"tests/{test}"],
+                    tree, PATIENCE["test"])
+    return None if code == 0 else test
+
+
+def killed_by(tree, mutant, wide):
+    path, text, instead, _, tests = mutant
+    target = tree / path
+    source = (ROOT / path).read_text()
+    assert source.count(text) == 1, f"{path}: {source.count(text)} times: {text}"
+    target.write_text(source.replace(text, instead))
+    try:
+        code, out = make(tree, "all")
+        if code != 0:
+            return "does not build: " + out.strip().splitlines()[-1][:200]
+        # scenes first: they need no other program
+        for test in sorted(tests, key=lambda t: not t.startswith("scenes:")) + (WIDE if wide else []):
+            found = fails(tree, test)
+            if found:
+                return found
+        return None
+    finally:
+        target.write_text(source)
+
+
+def worker(k, jobs, done, wide):
+    tree = HERE / f"tree{k}"
+    for mutant in iter(jobs.get, None):
+        began = time.monotonic()
+        try:
+            by = killed_by(tree, mutant, wide)
+        except Exception as e:  # told with the mutant; the others go on
+            by = f"does not build: {e}"
+        done.put((mutant, by, time.monotonic() - began))
+
+
+def report(mutants, kept):
+    """Score, and what survives."""
+    counts, alive = collections.Counter(), []
+    for m in mutants:
+        r = kept.get(name_of(m))
+        if r is None:
+            continue
+        counts["run"] += 1
+        if r["by"] is None:
+            alive.append(m)
+        elif r["by"].startswith("does not build"):
+            counts["do not build"] += 1
+            print(f"does not build: {name_of(m)}: {r['by']}")
+        else:
+            counts["killed"] += 1
+    for path, text, instead, why, _ in alive:
+        print(f"survives: {path}: {why}\n    - {text!r}\n    + {instead!r}")
+    sound = counts["run"] - counts["do not build"]
+    print(f"{len(mutants)} mutants, {counts['run']} run, {counts['killed']} killed, {len(alive)} survive"
+          f" ({100 * counts['killed'] / max(1, sound):.1f} %)")
+    return not alive and counts["do not build"] == 0
+
+
+def main():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("-j", type=int, default=1, help="trees at work at a time")
+    p.add_argument("--only", default="", help="mutants whose file, text or reason holds this")
+    p.add_argument("--first", type=int, default=0, help="so many, evenly over the list")
+    p.add_argument("--wide", action="store_true", help="survivors alone, against the wider suite")
+    p.add_argument("--seconds", type=float, default=1e9, help="begin none after this time")
+    p.add_argument("--report", action="store_true", help="only print what is known")
+    a = p.parse_args()
+    HERE.mkdir(parents=True, exist_ok=True)
+    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    mutants = [m for m in listed() if a.only in " ".join(m[:4])]
+    todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if a.wide else name_of(m) not in kept)]
+    if a.first and len(todo) > a.first:
+        todo = [todo[k * len(todo) // a.first] for k in range(a.first)]
+    if a.report:
+        return 0 if report(mutants, kept) else 1
+    prepare(a.j)
+    jobs, done = multiprocessing.Queue(), multiprocessing.Queue()
+    end, waiting, at_work = time.monotonic() + a.seconds, list(todo), 0
+    workers = [multiprocessing.Process(target=worker, args=(k, jobs, done, a.wide)) for k in range(a.j)]
+    for w in workers:
+        w.start()
+    while waiting or at_work:
+        while waiting and at_work < a.j and time.monotonic() < end:
+            jobs.put(waiting.pop(0))
+            at_work += 1
+        if not at_work:
+            break
+        mutant, by, seconds = done.get()
+        at_work -= 1
+        kept[name_of(mutant)] = {"by": by, "seconds": round(seconds, 1)}
+        RESULTS.write_text(json.dumps(kept, indent=1))
+        print(f"{seconds:5.0f} s  {by or 'SURVIVES':40.40}  {mutant[0]}: {mutant[3]}", flush=True)
+    for w in workers:
+        jobs.put(None)
+    for w in workers:
+        w.join()
+    return 0 if report(mutants, kept) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
