@@ -59,7 +59,7 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 EXTENDED := $(BUILD)/tests/examples/extended
 
 .PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
-        validation test test-long lint tidy validate asan tsan valgrind coverage fuzz
+        validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -195,6 +195,10 @@ test: deps ## every test: units, known answers, same bits, command line, short r
 test-long: deps ## tests that take minutes: intervals over fields, long tows, finer steps and tolerance, kills, soak
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
+
+# FLAGS='-j 2 --only solve': tests/mutate.py --help
+mutate: deps ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended
+	$(PYTHON) tests/mutate.py $(FLAGS)
 
 STUDY := $(BUILD)/partition/study/partition_quality
 $(STUDY): partition/study/partition_quality.c $(BUILD)/libbergtow.a $(STAMP)

@@ -16,7 +16,7 @@ import subprocess
 
 import h5py
 
-from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, changed, environment, write_case
+from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, SIGNAL, changed, environment, write_case
 
 CALLS = FAULT.with_name("calls.so")  # tests/fault/calls.c
 MEMORY = FAULT.with_name("memory.so")  # tests/fault/memory.c
@@ -45,7 +45,10 @@ FAULTS = {
     "EINTR": ({"BT_CALLS_WITH": errno.EINTR},
               WRITES + SYNCS + ("openat", "open", "ftruncate", "close", "read", "pread64")),
     "short": ({"BT_CALLS_WITH": "short"}, WRITES),
-    "kill": ({"BT_CALLS_WITH": errno.EIO, "BT_CALLS_KILL": 1}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+    "kill": ({"BT_CALLS_SIGNAL": signal.SIGKILL.value}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+    # before the handlers of a run are set SIGTERM ends the program as a kill does; SIGUSR1 never does
+    "SIGTERM": ({"BT_CALLS_SIGNAL": signal.SIGTERM.value}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+    "SIGUSR1": ({"BT_CALLS_SIGNAL": signal.SIGUSR1.value}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
 }
 
 Call = collections.namedtuple("Call", "name path second result")
@@ -133,7 +136,7 @@ def told(result, folder):
 
 class Scenario:
     """prepare leaves the folder as the command finds it, once; `whole` is the state it must end with."""
-    codes = (IO, )
+    codes, stopped = (IO, ), False
 
     def __init__(self, base):
         self.base = pathlib.Path(base) / self.name.replace(" ", "-")
@@ -164,11 +167,14 @@ class Scenario:
         what = FAULTS[fault][0]
         result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_CALLS=",".join(calls), BT_CALLS_AT=n,
                                   **what))
-        if fault == "kill":
-            assert result.returncode in (-signal.SIGKILL, 128 + signal.SIGKILL), (result.returncode, result.stderr)
-        elif result.returncode == DONE:
+        number, self.stopped = what.get("BT_CALLS_SIGNAL", 0), result.returncode == SIGNAL
+        if result.returncode == DONE and fault != "kill":
             self.check_done()
             return "done"
+        if result.returncode == SIGNAL and fault == "SIGTERM":
+            assert re.search(r"stopped by .* goes on", result.stderr), result.stderr
+        elif fault in ("kill", "SIGTERM"):
+            assert result.returncode in (-number, 128 + number), (result.returncode, result.stderr)
         else:
             assert result.returncode in self.codes, (result.returncode, result.stderr)
             told(result, self.folder)
@@ -215,9 +221,9 @@ class FreshRun(Scenario):
         assert state_hash(self.folder / "out") == self.whole
 
     def check_kept(self, log):
-        """A checkpoint that got its name is still there."""
-        stood = sum(c.name.startswith("rename") and c.result == 0 and c.path.endswith("/checkpoint.h5.tmp") for c in log)
-        assert not stood or checkpoint_step(self.folder / "out") >= 10 * min(stood, 3), "a checkpoint is lost"
+        """A checkpoint that got its name is still there; the one at a stop is of any step."""
+        stood = -self.stopped + sum(c.name.startswith("rename") and c.result == 0 and c.path.endswith("/checkpoint.h5.tmp") for c in log)
+        assert stood <= 0 or checkpoint_step(self.folder / "out") >= 10 * min(stood, 3), "a checkpoint is lost"
 
     def recover(self):
         begun = (self.folder / "out/case.resolved.yml").exists()

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """Does the suite tell wrong lines from right ones? Each mutant of tests/mutants.py is built in a copy of the source,
-and tests run until one fails: first those named with it, then, for survivors, the wider suite.
+and tests run until one fails: the quick ones of those named with it; with --wide, for survivors, the others and the
+wider suite.
 
     tests/mutate.py [-j N] [--only TEXT] [--first N] [--wide] [--seconds S]
 
@@ -40,6 +41,15 @@ def listed():
 
 def name_of(mutant):
     return f"{mutant[0]}: {mutant[1]} -> {mutant[2]}"
+
+
+def quick_of(tests):
+    """Those of some seconds: scenes first, as they need no other program."""
+    return [t for t in tests if t.startswith("scenes:")] + [t for t in tests if t.startswith(("unit/", "physics/"))]
+
+
+def slow_of(tests):
+    return [t for t in tests if t not in quick_of(tests)]
 
 
 def run(words, tree, seconds):
@@ -127,15 +137,14 @@ def fails(tree, test):
 def killed_by(tree, mutant, wide):
     path, text, instead, _, tests = mutant
     target = tree / path
-    source = (ROOT / path).read_text()
+    source = target.read_text()
     assert source.count(text) == 1, f"{path}: {source.count(text)} times: {text}"
     target.write_text(source.replace(text, instead))
     try:
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        # scenes first: they need no other program
-        for test in sorted(tests, key=lambda t: not t.startswith("scenes:")) + (WIDE if wide else []):
+        for test in (slow_of(tests) + WIDE if wide else quick_of(tests) or tests):
             found = fails(tree, test)
             if found:
                 return found

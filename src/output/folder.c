@@ -141,14 +141,18 @@ static bt_status make_room(const char *dir, bt_errors *err)
     return status;
 }
 
-/// The case last: until it is there, the next call goes on with this.
+/// The case last: until it is there, the next call goes on with this. What has got its name back on a disk that refuses
+/// to sync is back all the same; what cannot be moved stays where it is, and the next call tries again.
 static void move_back(const char *dir)
 {
     if (!bt_folder_keeps(dir)) return;
-    bt_errors unheard = {0}; // what cannot be moved stays where it is, and the next call tries again
+    bt_errors unheard = {0};
     char *aside = aside_of(dir);
-    bt_status status = BT_OK;
-    for (int k = N_FILES - 1; k >= 0 && status == BT_OK; k--) status = move(aside, dir, k, &unheard);
+    bool moved = true;
+    for (int k = N_FILES - 1; k >= 0 && moved; k--) {
+        move(aside, dir, k, &unheard);
+        moved = !holds(aside, k);
+    }
     rmdir(aside);
     free(aside);
     bt_errors_free(&unheard);
@@ -160,8 +164,12 @@ bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *er
     bt_status status = bt_file_write(ready, resolved, err); // where the disk is full, nothing has changed
     if (status == BT_OK) {
         status = make_room(dir, err);
-        if (status == BT_OK) status = bt_file_rename(ready, path, err);
-        if (status != BT_OK) move_back(dir); // a case that is there is still the old one
+        if (status != BT_OK) {
+            move_back(dir); // a case that is there is still the old one
+        } else if ((status = bt_file_rename(ready, path, err)) != BT_OK) {
+            unlink(path); // and now the new one, where it has its name on a disk that refuses to sync
+            move_back(dir);
+        }
     }
     unlink(ready);
     free(ready);
@@ -183,6 +191,9 @@ void bt_folder_put_back(const char *dir)
 void bt_folder_recover(const char *dir)
 {
     if (!bt_file_there(dir, CASE_FILE)) bt_folder_put_back(dir);
+    char *aside = aside_of(dir);
+    rmdir(aside); // it stays where it is not empty
+    free(aside);
 }
 
 void bt_folder_settle(const char *dir)

@@ -7,7 +7,7 @@
 //     BT_CALLS_AT=N           the N-th of them, from 1, meets the fault
 //     BT_CALLS_ON=1           and so does every later one, as on a disk that stays full
 //     BT_CALLS_WITH=FAULT     an errno as a number, or "short": half of the bytes are written
-//     BT_CALLS_KILL=1         the process is killed before that call
+//     BT_CALLS_SIGNAL=NUMBER  the process gets this signal before that call, which is then made
 //
 // Calls of the system, not functions of the C library: stdio calls write within the library, where a preloaded function
 // of that name is not seen. A filter of seccomp turns each into SIGSYS, and the handler makes the call itself from
@@ -88,7 +88,7 @@ enum { N_CALLS = sizeof calls / sizeof *calls };
 static struct {
     char under[MOST];
     size_t n_under;
-    int log, error, writes_short, on, kill;
+    int log, error, writes_short, on, signal;
     long at;
     char counted[N_CALLS];
 } how = {.log = -1};
@@ -114,7 +114,10 @@ static long make(int number, const long *a) { return bt_raw(number, a[0], a[1], 
 /// The call as the fault leaves it. A descriptor is gone after any close, whatever that returns.
 static long fail(int k, const long *a)
 {
-    if (how.kill) bt_raw(SYS_kill, bt_raw(SYS_getpid, 0, 0, 0, 0, 0, 0), SIGKILL, 0, 0, 0, 0);
+    if (how.signal) {
+        bt_raw(SYS_kill, bt_raw(SYS_getpid, 0, 0, 0, 0, 0, 0), how.signal, 0, 0, 0, 0);
+        return make(calls[k].number, a);
+    }
     if (how.writes_short && calls[k].size) {
         long less[6];
         memcpy(less, a, sizeof less);
@@ -168,7 +171,7 @@ static void filter(void)
     const unsigned short load = BPF_LD | BPF_W | BPF_ABS, equal = BPF_JMP | BPF_JEQ | BPF_K, end_with = BPF_RET | BPF_K;
     const unsigned ip = offsetof(struct seccomp_data, instruction_pointer);
     f[n++] = (struct sock_filter)BPF_STMT(load, ip);
-    f[n++] = (struct sock_filter)BPF_JUMP(equal, (uint32_t)end, 0, AHEAD - 1 + 0);
+    f[n++] = (struct sock_filter)BPF_JUMP(equal, (uint32_t)end, 0, AHEAD - 1);
     f[n++] = (struct sock_filter)BPF_STMT(load, ip + 4);
     f[n++] = (struct sock_filter)BPF_JUMP(equal, (uint32_t)(end >> 32), N_CALLS + 1, 0);
     f[n++] = (struct sock_filter)BPF_STMT(load, offsetof(struct seccomp_data, nr));
@@ -204,7 +207,7 @@ __attribute__((constructor)) static void begin(void)
     }
     how.at = atol(given("BT_CALLS_AT"));
     how.on = *given("BT_CALLS_ON") != 0;
-    how.kill = *given("BT_CALLS_KILL") != 0;
+    how.signal = atoi(given("BT_CALLS_SIGNAL"));
     how.writes_short = !strcmp(given("BT_CALLS_WITH"), "short");
     how.error = atoi(given("BT_CALLS_WITH"));
     if (*given("BT_CALLS_LOG")) how.log = open(given("BT_CALLS_LOG"), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
