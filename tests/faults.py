@@ -2,8 +2,8 @@
 """Faults at the n-th call of the system on the files of a result, and what must be true after each.
 
 A scenario is a command on a folder in a known state. `calls_of` counts its calls; `strike` makes it again with one of
-them failing, and holds what is left against the contract: an exit code of the program's, a message with path and remedy,
-and then one call without a fault that ends with the state of the run that nothing disturbed."""
+them failing, and holds what is left against the contract: an exit code of the program's, a message with path and
+remedy, and then one call without a fault that ends with the state of the run that nothing disturbed."""
 import collections
 import errno
 import json
@@ -39,7 +39,8 @@ NAMES = ("openat", "open", "mkdir", "mkdirat", "rename", "renameat", "unlink", "
 SYNCS = ("fsync", "fdatasync")
 # fault -> what the shim is told, and the calls it can befall
 FAULTS = {
-    "full disk": ({"BT_CALLS_WITH": errno.ENOSPC, "BT_CALLS_ON": 1}, WRITES + SYNCS + ("ftruncate", "mkdir", "mkdirat")),
+    "full disk": ({"BT_CALLS_WITH": errno.ENOSPC, "BT_CALLS_ON": 1},
+                  WRITES + SYNCS + ("ftruncate", "mkdir", "mkdirat")),
     "ENOSPC": ({"BT_CALLS_WITH": errno.ENOSPC}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
     "EIO": ({"BT_CALLS_WITH": errno.EIO}, WRITES + SYNCS + NAMES + ("ftruncate", "close", "read", "pread64")),
     "EINTR": ({"BT_CALLS_WITH": errno.EINTR},
@@ -194,7 +195,8 @@ class Scenario:
         """The n-th request for memory is refused; the outcome in a word."""
         self.fresh()
         preload = f"{CALLS} {MEMORY}"
-        result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_MEMORY_AT=n) | {"LD_PRELOAD": preload})
+        env = shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_MEMORY_AT=n) | {"LD_PRELOAD": preload}
+        result = self.launch(env)
         if result.returncode == DONE:
             self.check_done()
             return "done"
@@ -222,7 +224,8 @@ class FreshRun(Scenario):
 
     def check_kept(self, log):
         """A checkpoint that got its name is still there; the one at a stop is of any step."""
-        stood = -self.stopped + sum(c.name.startswith("rename") and c.result == 0 and c.path.endswith("/checkpoint.h5.tmp") for c in log)
+        renamed = [c for c in log if c.name.startswith("rename") and c.result == 0]
+        stood = sum(c.path.endswith("/checkpoint.h5.tmp") for c in renamed) - self.stopped
         assert stood <= 0 or checkpoint_step(self.folder / "out") >= 10 * min(stood, 3), "a checkpoint is lost"
 
     def recover(self):
@@ -395,7 +398,8 @@ class Ranks(FreshRun):
         rank = f'[ "$OMPI_COMM_WORLD_RANK" = {self.struck} ] || unset LD_PRELOAD; exec "$0" "$@"'
         preload = f"export LD_PRELOAD={CALLS}; "
         env = {k: v for k, v in env.items() if k != "LD_PRELOAD"}
-        return started(["mpirun", "--oversubscribe", "-n", 2, "sh", "-c", preload + rank, BERGTOW, *self.command()], env)
+        words = ["mpirun", "--oversubscribe", "-n", 2, "sh", "-c", preload + rank, BERGTOW, *self.command()]
+        return started(words, env)
 
 
 class OtherRank(Ranks):
@@ -420,7 +424,7 @@ def campaign(scenario, faults, most):
             for n in numbers(sum(c.name == name for c in made), most):
                 try:
                     counter[scenario.strike(fault, (name, ), n)] += 1
-                except AssertionError as e:
+                except (AssertionError, OSError, KeyError) as e:
                     counter["FAILED"] += 1
                     failures.append(f"{scenario.name}: {fault} at {name} {n}: {str(e)[:1500]}")
     return table, failures

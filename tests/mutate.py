@@ -22,7 +22,7 @@ import sys
 import tempfile
 import time
 
-from harness import DONE, ROOT, environment
+from harness import ROOT, environment
 from mutants import MUTANTS
 
 HERE = ROOT / "build/mutate"
@@ -30,8 +30,10 @@ RESULTS = HERE / "results.json"
 PATIENCE = {"build": 300, "test": 240}
 # Half the time of -O3 to compile, and the same bits.
 MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG"]
-WIDE = ["parallel/test_scenes.py", "parallel/test_same_bits.py", "parallel/test_ranks.py", "cli/test_balance.py",
-        "cli/test_tow.py", "cli/test_resume.py", "cli/test_run.py", "cli/test_random_cases.py", "parallel/test_everything.py"]
+PROGRAMS = [f"{p.parent.name}/{p.stem}" for p in sorted(ROOT.glob("tests/*/test_*.c")) if p.parent.name != "fuzz"]
+WIDE = ["scenes:", *PROGRAMS, "parallel/test_scenes.py", "parallel/test_same_bits.py", "parallel/test_ranks.py",
+        "cli/test_balance.py", "cli/test_tow.py", "cli/test_resume.py", "cli/test_run.py", "cli/test_random_cases.py",
+        "parallel/test_everything.py"]
 
 
 def listed():
@@ -73,9 +75,9 @@ def make(tree, *targets):
 
 def copy_source(tree):
     """What git knows, and what is new, with its times: make builds what has changed since the last copy."""
-    listed_files = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True,
-                                  check=True).stdout.splitlines()
-    for name in listed_files:
+    known = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True,
+                           check=True)
+    for name in known.stdout.splitlines():
         source, to = ROOT / name, tree / name
         if not source.is_file() or (to.exists() and to.read_bytes() == source.read_bytes()):
             continue
@@ -99,11 +101,11 @@ def prepare(n):
 
 
 def fails_scenes(tree, names):
-    """The first scene that is not what is stored of it, on one layout."""
+    """The first scene of those named, or of all, that is not what is stored of it, on one layout."""
     import scenes  # reads BERGTOW as it is imported
     _, _, stored = scenes.stored()
     binary = tree / "build/release/bergtow"
-    for name in names:
+    for name in names or scenes.SCENES:
         with tempfile.TemporaryDirectory() as folder:
             try:
                 layout = scenes.layouts_of(name)[0]
@@ -118,7 +120,7 @@ def fails_scenes(tree, names):
 def fails(tree, test):
     """Does the test tell? The word for what did, or None."""
     if test.startswith("scenes:"):
-        found = fails_scenes(tree, test[7:].split(","))
+        found = fails_scenes(tree, [n for n in test[7:].split(",") if n])
         return found and f"scene {found}"
     if test.startswith(("unit/", "physics/")):
         program = f"build/release/tests/{test}"
@@ -144,7 +146,8 @@ def killed_by(tree, mutant, wide):
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        for test in (slow_of(tests) + WIDE if wide else quick_of(tests) or tests):
+        for test in [t for t in WIDE[:1] + slow_of(tests) + WIDE[1:] if t not in quick_of(tests)] if wide else \
+                quick_of(tests) or tests:
             found = fails(tree, test)
             if found:
                 return found

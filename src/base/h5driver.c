@@ -194,7 +194,8 @@ static void put_superblock(driver_file *f)
         return;
     struct stat st;
     if (!*f->errnum &&
-        (fstat(f->fd, &st) != 0 || ((haddr_t)st.st_size < f->eoa && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0)))
+        (fstat(f->fd, &st) != 0 ||
+         ((haddr_t)st.st_size < f->eoa && TEMP_FAILURE_RETRY(ftruncate(f->fd, (off_t)f->eoa)) != 0)))
         *f->errnum = errno;
     put_run(f, f->super, f->super_end);
     forget(f, f->super, f->super_end);
