@@ -46,8 +46,9 @@ def name_of(mutant):
 
 
 def quick_of(tests):
-    """Those of some seconds: scenes first, as they need no other program."""
-    return [t for t in tests if t.startswith("scenes:")] + [t for t in tests if t.startswith(("unit/", "physics/"))]
+    """Those of some seconds: scenes, as they need no other program, or else what is compiled."""
+    return ([t for t in tests if t.startswith("scenes:")] or
+            [t for t in tests if t.startswith(("unit/", "physics/"))])
 
 
 def slow_of(tests):
@@ -146,8 +147,8 @@ def killed_by(tree, mutant, wide):
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        for test in [t for t in WIDE[:1] + slow_of(tests) + WIDE[1:] if t not in quick_of(tests)] if wide else \
-                quick_of(tests) or tests:
+        slow = slow_of(tests)
+        for test in WIDE[:1] + slow + [t for t in WIDE[1:] if t not in slow] if wide else quick_of(tests) or tests:
             found = fails(tree, test)
             if found:
                 return found

@@ -60,6 +60,17 @@ SHAPES = [{"shape": "disc", "length": 1.1, "x": 5.5, "y": 0.1, "yaw": 50, "vx": 
           {"shape": "rectangle", "length": 1.9, "width": 0.6, "x": 8.6, "y": 0, "yaw": 80, "vx": -0.5, "vy": 0},
           {"shape": "ship", "length": 2, "width": 0.7, "x": 5.5, "y": 1.8, "yaw": -50, "vx": 0.1, "vy": -0.5},
           {"shape": "square", "length": 0.9, "x": 6, "y": -1.6, "yaw": 10, "vx": 0, "vy": 0.3, "yaw_rate": -40}]
+# Two blocks of squares that turn and drive into each other: Newton's law of restitution would give them energy.
+REBOUNDS = {
+    "run": {"dt": 0.05, "duration": 2},
+    "domain": {"length": 12, "width": 8, "ends": "periodic", "sides": "periodic"},
+    "ice": {"concentration": 0, "friction": 1.5, "restitution": 0.9, "drag": {"water_form": 0, "water_skin": 0}},
+    "floes": [{"shape": "square", "length": 0.8, "x": 3 + 0.85 * (k % 6), "y": -2 + 0.85 * (k // 6),
+               "yaw": k * 6 % 7 - 3, "vx": (2 + k * 6 % 5 / 2) * (1 if k % 6 < 3 else -1), "vy": k * 6 % 9 / 2 - 2,
+               "yaw_rate": k * 6 % 11 * 10 - 50} for k in range(24)],
+    "body": {"shape": "none"},
+    "guard": {"energy": 0},
+}
 GEO_THRUST = {"mode": "thrust", "speed": 0.8, "ramp": 1, "line_length": 3, "line_stiffness": 2000}
 ORIGIN = {"origin_lon": 18.3, "origin_lat": 76.2}
 PLANE = {"origin_east": 560123.5, "origin_north": 8490321.25}
@@ -172,6 +183,7 @@ SCENES = {
     "steel_wire": changed(LINE, tow__line_stiffness=None, tow__line={"type": "steel-wire", "diameter": "4 mm"}),
     "dyneema": changed(LINE, tow__line_stiffness=None, tow__line={"type": "dyneema", "diameter": "4 mm"}),
     "no_body": changed(PRESS, run__duration=1, domain__length=18, domain__width=14, ice__concentration=0.8),
+    "rebounds": REBOUNDS,
 }
 
 

@@ -37,6 +37,9 @@ void bt_errors_print(const bt_errors *e);
 void bt_errors_free(bt_errors *e);
 void bt_errors_move(bt_errors *to, bt_errors *from); ///< behind those that are there; from is empty then
 
+/// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
+void bt_leave_by(void (*by)(int code));
+
 /// malloc/realloc/calloc that end the program with a message and BT_ERR_NUMERIC when memory runs out.
 void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size

@@ -137,6 +137,7 @@ void bt_comm_start(int *argc, char ***argv)
     MPI_Type_commit(&item_type);
     MPI_Op_create(combine, 1, &item_op);
     on_exit(on_leaving, NULL);
+    bt_leave_by(bt_comm_abort);
 }
 
 int bt_comm_end(int code)
