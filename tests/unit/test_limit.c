@@ -160,11 +160,31 @@ static void stall_windows(void **state)
     }
 }
 
+/// Neither a contact nor sheets: the largest of numbers passes over one that is none.
+static void a_velocity_that_is_no_number_is_not_solved(void **state)
+{
+    (void)state;
+    uint64_t rng = 5;
+    const bt_inv inv[2] = {{1, 2}, {0.5, 1}};
+    const bt_limit l = {.flat = {1, INFINITY}, .most = {1, INFINITY}};
+    for (int k = 0; k < 6; k++) {
+        bt_contact u = random_contact(&rng, 1, inv);
+        bt_vel v[2] = {{0.1, 0.2, 0.3, 0}, {0.3, 0.2, 0.1, 0}};
+        double *hit[3] = {&v[k / 3].x, &v[k / 3].y, &v[k / 3].w}, sum = 0;
+        assert_true(isfinite(bt_contact_residual(&u, NULL, v, &sum)));
+        *hit[k % 3] = NAN;
+        assert_true(isinf(bt_contact_residual(&u, NULL, v, &sum)));
+        u.n = 0;
+        assert_true(isinf(bt_contact_residual(&u, &l, v, &sum)));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_law_of_one_manifold), cmocka_unit_test(the_law_of_sheets),
         cmocka_unit_test(no_bound_is_rigid), cmocka_unit_test(stall_windows),
+        cmocka_unit_test(a_velocity_that_is_no_number_is_not_solved),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

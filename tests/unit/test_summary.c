@@ -2,6 +2,7 @@
 // summary.json of made-up runs: its numbers against sums of the test's own, and a warning for each doubt.
 #include "made_up_run.h"
 
+#include "output/steady.h"
 #include "step/window.h"
 
 /// The text after "key": up to the end of the line, without a comma.
@@ -287,10 +288,25 @@ static void without_a_towed_body_forces_are_null(void **state)
     free(json);
 }
 
+/// Of the branches that a run has, the strongest, whichever it is.
+static void the_peak_tension_is_of_the_strongest_branch(void **state)
+{
+    (void)state;
+    bt_steady s;
+    bt_steady_none(&s);
+    assert_true(isnan(bt_steady_peak_tension(&s, false)));
+    bt_reported *one = &s.series[BT_REPORTED_TENSION_1], *two = &s.series[BT_REPORTED_TENSION_2];
+    one->present = true, one->peak = 7, one->start_peak = 1;
+    assert_true(bt_steady_peak_tension(&s, false) == 7);
+    two->present = true, two->peak = 5, two->start_peak = 3;
+    assert_true(bt_steady_peak_tension(&s, false) == 7 && bt_steady_peak_tension(&s, true) == 3);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(summary_holds_the_numbers),
+        cmocka_unit_test(the_peak_tension_is_of_the_strongest_branch),
         cmocka_unit_test(every_doubt_is_told),
         cmocka_unit_test(the_window_serves_every_series),
         cmocka_unit_test(what_no_mean_goes_across_is_a_verdict),
