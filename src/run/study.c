@@ -202,8 +202,8 @@ static bool in_range_of_key(const reader *r, int line, const bt_study_parameter 
 
 char *bt_study_distribution(const bt_study_parameter *p)
 {
-    if (!p->continuous) return strdup("");
-    return print("%s%s%s %.6g to %.6g", p->logarithmic ? "log-" : "", distributions[p->distribution],
+    if (!p->continuous) return bt_text_copy("");
+    return bt_text_of("%s%s%s %.6g to %.6g", p->logarithmic ? "log-" : "", distributions[p->distribution],
                  p->distribution == BT_NORMAL ? ", 95 % from" : " from", p->from, p->to);
 }
 
@@ -250,7 +250,7 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
         } else if (!strcmp(map->key[i], "distribution")) {
             read_distribution(r, value, at, p);
         } else if (!strcmp(map->key[i], "source")) {
-            if (scalar(r, value, at, "source") && !p->source) p->source = strdup(value->text);
+            if (scalar(r, value, at, "source") && !p->source) p->source = bt_text_copy(value->text);
         } else {
             const char *near = bt_suggest(map->key[i], known);
             COMPLAIN(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i],
