@@ -172,6 +172,7 @@ class Scenario:
         if result.returncode == DONE and fault != "kill":
             self.check_done()
             return "done"
+        assert fault not in ("EINTR", "short", "SIGUSR1"), f"{fault} is not made good: {result.stderr}"
         if result.returncode == SIGNAL and fault == "SIGTERM":
             assert re.search(r"stopped by .* goes on", result.stderr), result.stderr
         elif fault in ("kill", "SIGTERM"):

@@ -446,7 +446,6 @@ MUTANTS = {
     "src/base/fileio.c": (SYNC, [
         ("    if (!reason) reason = bt_file_sync(fd);\n    const int closed", "    const int closed",
          "text is not synced"),
-        ("    if (!reason) reason = bt_file_sync(out);\n", "", "a copy is not synced"),
         ("const int reason = rename(from, to) != 0 ? errno : sync_folder_of(to);",
          "const int reason = rename(from, to) != 0 ? errno : 0;", "a name is not synced"),
         ("reason = sync_folder_of(part);", "reason = 0;", "the name of a new folder is not synced"),

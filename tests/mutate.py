@@ -47,8 +47,8 @@ def name_of(mutant):
 
 
 def quick_of(tests):
-    """Those of some seconds: scenes, as they need no other program, or else what is compiled."""
-    return ([t for t in tests if t.startswith("scenes:")] or
+    """Those of some seconds: scenes, as they need no other program, single tests, or else what is compiled."""
+    return ([t for t in tests if t.startswith("scenes:")] or [t for t in tests if "::" in t] or
             [t for t in tests if t.startswith(("unit/", "physics/"))])
 
 
@@ -89,17 +89,13 @@ def copy_source(tree):
 
 
 def prepare(n):
-    first = HERE / "tree0"
-    copy_source(first)
-    code, out = make(first, "all", *(f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory")))
-    assert code == 0, out
-    for k in range(1, n):
-        other = HERE / f"tree{k}"
-        if not other.exists():
-            subprocess.run(["cp", "-a", first, other], check=True)
-        else:
-            copy_source(other)
-            make(other, "all")
+    for k in range(n):
+        tree = HERE / f"tree{k}"
+        if k and not tree.exists():
+            subprocess.run(["cp", "-a", HERE / "tree0", tree], check=True)
+        copy_source(tree)
+        code, out = make(tree, "all", *(f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory")))
+        assert code == 0, out
 
 
 def fails_scenes(tree, names):

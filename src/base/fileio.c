@@ -256,7 +256,6 @@ bt_status bt_file_copy(const char *from, const char *to, bt_errors *err)
     unlink(to); // a link of that name must not lead the copy elsewhere
     const int out = (int)TEMP_FAILURE_RETRY(open(to, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
     int reason = out < 0 ? errno : copy_bytes(in, out);
-    if (!reason) reason = bt_file_sync(out);
     const int closed = out < 0 ? 0 : bt_file_close(out);
     if (!reason) reason = closed;
     close(in);

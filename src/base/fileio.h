@@ -42,8 +42,8 @@ bt_status bt_file_make_dir(const char *path, bt_errors *err);
 /// Remove a file; no error when it is not there.
 bt_status bt_file_remove(const char *path, bt_errors *err);
 
-/// Copy a file to another name, by reference where the file system can, and bring it to the disk. `to` is removed after
-/// an error.
+/// Copy a file to another name, by reference where the file system can. bt_checksum_write, which follows, brings it to
+/// the disk. `to` is removed after an error.
 bt_status bt_file_copy(const char *from, const char *to, bt_errors *err);
 
 /// Give a complete file its final name, in place of what has it, and make the change last: the folder is brought to the
