@@ -72,3 +72,18 @@ def test_what_is_made_stands_in_this_order(scenarios):
     checkpoint = ["result.h5", "frames.xdmf", "checkpoint.h5"]
     later = ["result.h5", "frames.xdmf", "checkpoint.previous.h5", "checkpoint.h5"]
     assert names == ["case.resolved.yml.new", "case.resolved.yml", *checkpoint, *later, *later, "summary.json"]
+
+
+def test_the_other_rank_syncs_its_frames_at_each_checkpoint(scenarios):
+    """Two checkpoints and the end: what rank 0 syncs is not what another machine still holds."""
+    _, calls = scenarios("2 ranks, the second")
+    assert sum(c.name in faults.SYNCS and c.path.endswith("/result.part.h5") and c.result == 0 for c in calls) == 3
+
+
+def test_an_attempt_is_on_the_disk_before_the_member_begins(scenarios):
+    """A member that takes the machine down must not be tried for ever."""
+    _, calls = scenarios("ensemble")
+    notes = [k for k, c in enumerate(calls) if c.name == "write" and c.path.endswith("/attempts")]
+    assert len(notes) == 3
+    for k in notes:
+        assert calls[k + 1].name in faults.SYNCS and calls[k + 1].path == calls[k].path
