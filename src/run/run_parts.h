@@ -33,6 +33,8 @@ typedef struct bt_running {
     double began;            ///< bt_clock when its steps began
     int64_t frames_due;      ///< frames by the interval, so far
     int64_t frames;          ///< frames taken, but for one that the end of --steps has added
+    int64_t framed;          ///< step of the last frame, −1 = none in this call
+    bt_sample sample;        ///< of the last step
     double reference_speed;
     bt_run_totals totals;
 } bt_running;
@@ -56,6 +58,9 @@ bool bt_running_goes_on(const bt_running *r);
 
 /// Collective. One step, observed, guarded and recorded; frame and checkpoint when they are due.
 bt_status bt_running_step(bt_running *r, bt_errors *err);
+
+/// Collective. The run ends here, before bt_running_end, as it does after --steps.
+bt_status bt_running_stop(bt_running *r, bt_errors *err);
 
 /// Collective. status: of the last step. Summary and last checkpoint of a run whose steps were sound; closes and frees
 /// everything but the lock. Returns the status of the run.

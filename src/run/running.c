@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A run in its three parts: begin (field, world, record), step, and end (summary, last checkpoint). The commands and the
-// library (bergtow/simulation.h) go through the same three.
+// A run in its three parts: begin (field, world, record), step, and end (summary, last checkpoint). The commands and
+// the library (bergtow/simulation.h) go through the same three.
 //
 // Ranks. Whatever can differ between ranks (an error, a signal) is agreed on once a step, after the sample and before
 // the frame, so that all leave the loop after the same step; every other collective call is made with an agreed status.
@@ -71,6 +71,7 @@ static bt_status open_record(run *r, bt_snapshot *kept, bt_errors *err)
 static bt_status record_frame(run *r, bt_errors *err)
 {
     if (!r->record) return BT_OK;
+    r->framed = r->w->step;
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
     if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, err);
@@ -179,7 +180,7 @@ static bt_status begin_steps(run *r, bool fresh, bt_errors *err)
 bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
                            bt_run_manner *m, bt_errors *err)
 {
-    *r = (run){.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c), .failed = -1};
+    *r = (run){.comm = comm, .c = c, .o = o, .reference_speed = bt_case_reference_speed(c), .framed = -1, .failed = -1};
     r->halt = (bt_halt){.steps = c->output.checkpoint_steps,
                         .wall = c->output.checkpoint_wall,
                         .max_wall = o->max_wall,
@@ -226,7 +227,7 @@ static bt_status frame_if_due(run *r, double time, bt_errors *err)
     if (!bt_running_draws(r->c)) return BT_OK;
     const double interval = bt_running_frame_interval(r->c);
     const bool due = time >= (double)r->frames_due * interval * (1 - 1e-12), whole = r->w->step == bt_case_steps(r->c);
-    if (!due && r->w->step != r->end_step) return BT_OK;
+    if (r->framed == r->w->step || (!due && r->w->step != r->end_step)) return BT_OK;
     while ((double)r->frames_due * interval * (1 - 1e-12) <= time) r->frames_due++;
     if (due || whole) r->frames++;
     return record_frame(r, err);
@@ -249,21 +250,21 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     add_phases(&r->totals.phases, &w->stats);
     const double t0 = bt_clock();
     if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);
-    bt_sample s;
-    bt_observe(w, r->reference_speed, &s);
+    bt_sample *const s = &r->sample;
+    bt_observe(w, r->reference_speed, s);
     bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
-    const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, &s, err);
+    const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, s, err);
     // what is not has been told, and the series hold numbers only
-    const bool writable = !bt_sample_fault(&s, bt_observe_applies(w));
-    if (status == BT_OK && r->record && writable) status = bt_record_sample(r->record, &s, err);
+    const bool writable = !bt_sample_fault(s, bt_observe_applies(w));
+    if (status == BT_OK && r->record && writable) status = bt_record_sample(r->record, s, err);
     if (status == BT_OK && r->record) status = bt_record_events(r->record, &w->events, err);
     if (status == BT_OK) status = sound;
     status = agree(r, status);
     if (status == BT_ERR_NUMERIC) bt_guard_name(&r->guard, w, err);
-    if (status == BT_OK) status = frame_if_due(r, s.time, err);
+    if (status == BT_OK) status = frame_if_due(r, s->time, err);
     const bool saves = r->record && bt_halt_saves(r->asked); // at the end one is written anyway
     if (status == BT_OK && saves && bt_running_goes_on(r)) status = bt_running_checkpoint(r, BT_CHECKPOINT_FILE, err);
-    bt_progress_step(&r->progress, w->step, s.time, s.ice_resistance);
+    bt_progress_step(&r->progress, w->step, s->time, s->ice_resistance);
     r->totals.phases.output += bt_clock() - t0;
     return status;
 }
@@ -391,6 +392,12 @@ static bt_status close_steps(run *r, bt_status status, bt_errors *err)
     if (status == BT_ERR_NUMERIC && r->w->step > r->first_step) r->failed = r->w->step;
     bt_halt_end(&r->halt);
     return status;
+}
+
+bt_status bt_running_stop(bt_running *r, bt_errors *err)
+{
+    r->end_step = r->w->step;
+    return frame_if_due(r, (double)r->w->step * r->w->par.dt, err);
 }
 
 bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
