@@ -28,7 +28,7 @@ typedef struct bt_applied {
     int64_t n;              ///< bodies; without MPI all, and id[k] = k
     const int64_t *id;      ///< [n]
     const double *place;    ///< [n][3] x, y (wrapped in periodic directions), yaw, m, m, rad
-    const double *velocity; ///< [n][3] m/s, m/s, rad/s
+    const double *velocity; ///< [n][3] m/s, m/s, rad/s; where it is prescribed, that of this step
     const double *mass;     ///< [n] with added mass, kg
     const double *inertia;  ///< [n] with that of the water, kg m²
     double *load;           ///< [n][BT_APPLIED_NUMBERS] to be filled; zero at the call

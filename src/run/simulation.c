@@ -63,8 +63,13 @@ static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors
         bt_errors_add(err, "no case: give its file in path, or the case itself in text");
         return BT_ERR_USAGE;
     }
-    if (!o->text) return bt_case_read(c, o->path, o->set, o->n_set, err);
-    return bt_case_read_text(c, o->path ? o->path : "case", o->text, o->set, o->n_set, err);
+    const char **place = bt_alloc((size_t)o->n_set, sizeof *place);
+    for (int i = 0; i < o->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
+    const bt_status status =
+        o->text ? bt_case_read_text(c, o->path ? o->path : "case", o->text, o->set, place, o->n_set, err)
+                : bt_case_read_placed(c, o->path, o->set, place, o->n_set, err);
+    free(place);
+    return status;
 }
 
 static char *copy_of(const char *text) { return text ? strcpy(bt_alloc(strlen(text) + 1, 1), text) : NULL; }
