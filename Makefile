@@ -58,8 +58,8 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install uninstall clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
-        validation test test-long lint tidy validate asan tsan valgrind coverage fuzz
+.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev demo report bench \
+        fullscale partition-study validation test test-long lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -177,6 +177,9 @@ DEPS := build-essential pkg-config git \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
         python3-pytest ffmpeg chromium chromium-driver python3-selenium
 
+# For the tests of the Python package; it runs without them, but for open_result.
+DEPS_TEST := python3-xarray python3-pip python3-setuptools python3-wheel
+
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
@@ -219,8 +222,11 @@ report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DI
 	$(PYTHON) postproc/report.py $(RUN)
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
-test: deps ## every test: units, known answers, same bits, command line, short runs under the sanitizers
-	@$(AGAIN) all tests
+deps-test: ## install what make test needs
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_TEST)'
+
+test: deps-test ## every test: units, known answers, same bits, command line, short runs under the sanitizers
+	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=validate all
 	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all

@@ -85,9 +85,11 @@ rm -f "$pc"
 put_file 644 "$build/share/bergtow.1" "$prefix/share/man/man1/bergtow.1"
 put_file 644 "$build/share/bergtow.bash" "$prefix/share/bash-completion/completions/bergtow"
 put_file 644 "$build/share/_bergtow" "$prefix/share/zsh/site-functions/_bergtow"
-for script in $(git ls-files postproc 2>/dev/null || find postproc -type f ! -name '*.pyc'); do
+find postproc -type f ! -name '*.pyc' ! -path '*/build/*' ! -path '*.egg-info/*' | sort >"$made.scripts"
+while read -r script; do
     put_file 644 "$script" "$prefix/share/bergtow/$script"
-done
+done <"$made.scripts"
+rm -f "$made.scripts"
 folder "$prefix/share/bergtow"
 echo "file $prefix/share/bergtow/installed" >>"$made"
 install -m 644 "$made" "$list"

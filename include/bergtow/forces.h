@@ -130,8 +130,8 @@ static inline bt_pose bt_force_pose(const bt_force_body *b)
     return p;
 }
 
-/// A force law. What it does follows from its numbers, the time and the body; what is to survive a checkpoint cannot be kept
-/// anywhere else.
+/// A force law. What it does follows from its numbers, the time and the body; what is to survive a checkpoint cannot be
+/// kept anywhere else.
 typedef struct bt_force_law {
     const char *name;          ///< lower_snake; its series is NAME_force
     /// one line, "drag of water": the description of the series goes on "on the towed body against the tow direction"

@@ -25,8 +25,18 @@ def quantities():
     return json.loads(_library.take_text(_library.library().bt_list_json(b"quantities")))
 
 
+#: units of values as they are read, where a case file takes a bare number for something else
+_SI = {"deg": "rad", "deg/s": "rad/s", "-": ""}
+
+
+def _setting(key, value):
+    """A value for a key as a case file has it: numbers are in SI units here, angles in radians."""
+    unit = _keys()[key].get("unit") if key in _keys() else None
+    in_radians = unit in ("deg", "deg/s") and not isinstance(value, str)
+    return _as_text(value) + (f" {_SI[unit]}" if in_radians else "")
+
+
 def _as_text(value):
-    """A value as a case file has it."""
     if isinstance(value, str):
         return value
     if isinstance(value, bool):
@@ -40,29 +50,30 @@ def _as_text(value):
 
 def _parsed(text, kind):
     """A value of the resolved case, in SI units."""
+    if text == "none" and kind != "choice":
+        return None
     if text.startswith('"'):
         return json.loads(text)
     if text.startswith("["):
         return json.loads(re.sub(r"(?<=[\d.]) [^\W\d][^,\]]*", "", text))  # without units
-    if kind in ("real", "integer", "count") or re.match(r"[-+.\d]", text):
-        word = text.split(" ")[0]
-        try:
-            return int(word) if kind != "real" and re.fullmatch(r"[-+]?\d+", word) else float(word)
-        except ValueError:
-            return text
-    return {"true": True, "false": False}.get(text, text)
+    if kind == "integer":
+        return int(text)
+    if kind == "real":
+        return float(text.split(" ")[0])
+    return text == "true" if kind == "bool" else text
 
 
 class Case(MutableMapping):
     """A case from a file, or from a mapping of sections as in a file.
 
         case = Case("basin-80.yml", {"ice.concentration": 0.7})
-        case["tow.speed"] = "1.5 kn"      # numbers without unit are SI, angles degrees, as in a file
-        case["tow.speed"]                 # 0.7716..., SI units always
+        case["tow.speed"] = "1.5 kn"      # a text is read as in a file
+        case["tow.speed"]                 # 0.7716..., numbers are in SI units, angles in radians, both ways
         case.unit("tow.speed")            # 'm/s'
 
     Every value is checked when it is set; one that will not do raises CaseError and changes nothing. Where several
-    values only fit together, set them at once: case.update({...}).
+    values only fit together, set them at once: case.update({...}). None stands for a key that has no value. The numbers
+    of a mapping of sections are those of a file: angles in degrees.
     """
 
     def __init__(self, source, values=None, *, text=None):
@@ -71,7 +82,7 @@ class Case(MutableMapping):
         if self.path is None and self.text is None:
             raise TypeError("a case needs a file, a mapping or a text")
         self.overrides = {}
-        self._resolve(self.overrides | {k: _as_text(v) for k, v in (values or {}).items()})
+        self._resolve(self.overrides | {k: _setting(k, v) for k, v in (values or {}).items()})
 
     @classmethod
     def from_text(cls, text, values=None, path=None):
@@ -110,11 +121,11 @@ class Case(MutableMapping):
         return self._values.get(key)
 
     def __setitem__(self, key, value):
-        self._resolve(self.overrides | {key: _as_text(value)})
+        self._resolve(self.overrides | {key: _setting(key, value)})
 
     def update(self, values=(), **more):
         """Set several values at once, which are checked together."""
-        self._resolve(self.overrides | {k: _as_text(v) for k, v in dict(values, **more).items()})
+        self._resolve(self.overrides | {k: _setting(k, v) for k, v in dict(values, **more).items()})
 
     def __delitem__(self, key):
         """Take back a value that was set: that of the file, or the default, holds again."""
@@ -133,7 +144,9 @@ class Case(MutableMapping):
 
     def unit(self, key):
         """Unit of the value as it is read; '' for plain numbers, texts and choices."""
-        return _keys()[key].get("unit", "") if key in _keys() else self[key]
+        self[key]
+        unit = _keys()[key].get("unit") or ""
+        return _SI.get(unit, unit)
 
     def meaning(self, key):
         """The sentence of bergtow --list-keys."""

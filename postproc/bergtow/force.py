@@ -48,8 +48,8 @@ class Bodies:
 
 
 class Forces:
-    """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped in
-    turn with this one, does nothing in the steps of this."""
+    """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
+    in turn with this one, does nothing in the steps of this."""
 
     _callbacks = {}  # name -> the C function; kept for ever, as the library keeps its address
     _owner = {}      # name -> the Forces that have it now

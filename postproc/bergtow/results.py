@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Result folders of runs: the summary, and everything in result.h5 as an xarray.Dataset that is read when it is used."""
+"""Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read when it is used."""
 import json
 from pathlib import Path
 

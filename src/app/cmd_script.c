@@ -24,8 +24,8 @@ static char *beside(const char *program, int up, const char *name)
     return bt_file_join(folder, name);
 }
 
-/// The script of a command in BERGTOW_HOME, in share/bergtow of the folder that this program was installed in, or in the
-/// source tree that it was built in; the caller frees it.
+/// The script of a command in BERGTOW_HOME, in share/bergtow of the prefix that this program was installed in, or in
+/// the source tree that it was built in; the caller frees it.
 static char *find_script(const char *program, const char *command)
 {
     const char *home = getenv("BERGTOW_HOME");

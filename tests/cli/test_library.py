@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""libbergtow as a program outside of the tree meets it: installed, found by pkg-config, stepped, and taken away again."""
+"""libbergtow as a program outside of the tree meets it: installed, found by pkg-config, stepped, taken away again."""
 import os
 import re
 import subprocess
@@ -14,8 +14,10 @@ WAVES = {"amplitude": 0.02, "period": 2, "direction": 30}
 
 
 def make(*arguments):
+    # not as a part of the make that may have started this test
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
     result = subprocess.run(["make", "--no-print-directory", *arguments], cwd=ROOT, capture_output=True, text=True,
-                            timeout=600)
+                            timeout=600, env=own)
     assert result.returncode == DONE, result.stdout + result.stderr
 
 
@@ -79,6 +81,11 @@ def test_a_faulty_case_is_a_message_and_not_the_end(program, tmp_path):
     case = write_case(tmp_path, changed(CASE, tow__sped=1))
     result = subprocess.run([program, case], capture_output=True, text=True)
     assert result.returncode == 1 and "tow.sped: unknown key; did you mean tow.speed?" in result.stderr
+
+
+def test_the_page_shows_the_example():
+    page = (ROOT / "docs/library.md").read_text()
+    assert re.search(r"```c\n(.*?)```", page, re.DOTALL)[1] == (EXAMPLES / "simulation.c").read_text()
 
 
 def test_the_library_exports_what_public_headers_name(prefix):

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -30,7 +31,8 @@ WINDOW = {
 
 @pytest.fixture(scope="module", autouse=True)
 def library():
-    made = subprocess.run(["make", "--no-print-directory", "lib"], cwd=ROOT, capture_output=True, text=True)
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    made = subprocess.run(["make", "--no-print-directory", "lib"], cwd=ROOT, capture_output=True, text=True, env=own)
     assert made.returncode == 0, made.stdout + made.stderr
 
 
@@ -257,7 +259,7 @@ def test_contacts_add_up_to_the_force_on_the_body():
     with bergtow.Simulation(changed(LINE, ice__concentration=0.8), threads=1) as sim:
         sim.step(40)
         outline, place = sim.outline(sim.towed), sim.positions[sim.towed]
-        force, moment, touching = np.zeros(2), 0, 0
+        force, touching = np.zeros(2), 0
         for c in sim.contacts[sim.contacts["normal_impulse"].max(1) > 0]:
             if sim.towed not in (c["a"], c["b"]):
                 continue
@@ -362,9 +364,17 @@ def test_a_case_has_the_values_of_the_resolved_one(tmp_path):
     assert set(case) == set(listed) and case["run.title"] == 'an "odd" one: # 1'
     assert case["domain.ends"] == "moving" and case["guard.escape"] is True
     assert isinstance(case["solver.max_sweeps"], int) and isinstance(case["air.wind_x"], float)
-    assert all(case.unit(key) == listed[key].get("unit", "") for key in case)
+    units = {"deg": "rad", "deg/s": "rad/s", "-": ""}
+    assert all(case.unit(key) == units.get(u := listed[key].get("unit", ""), u) for key in case)
+    case["tow.direction"] = "30 deg"
+    assert math.isclose(case["tow.direction"], math.pi / 6)
+    for key in ("tow.direction", "body.yaw_rate", "water.latitude", "tow.speed"):  # what is read can be set
+        before = case[key]
+        case[key] = before
+        assert case[key] == before
+    assert case["ice.field"] is None and case["water.tilt"] == "none"
     again = bergtow.Case.from_text(case.resolved)
-    assert {k: str(again[k]) for k in again} == {k: str(case[k]) for k in case}
+    assert dict(again) == dict(bergtow.Case(WINDOW, {"run.title": 'an "odd" one: # 1', "tow.direction": math.pi / 6}))
     assert "tow.speed" in case._repr_html_()
 
 
@@ -407,6 +417,41 @@ def test_a_large_result_opens_without_being_read(tmp_path):
         assert time.perf_counter() - start < 1
 
 
+# --- the page, and the contract ---------------------------------------------------------------------------------------
+
+def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
+    shutil.copy(ROOT / "cases/basin/basin-80.yml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    examples = re.findall(r"```python\n(.*?)```", (ROOT / "docs/library.md").read_text(), re.DOTALL)
+    assert len(examples) == 2
+    for example in examples:
+        exec(compile(example, "docs/library.md", "exec"), {})
+
+
+def test_no_signal_handler_is_installed():
+    def caught():
+        with open("/proc/self/status") as f:
+            return next(line for line in f if line.startswith("SigCgt"))
+
+    before = caught()
+    with bergtow.Simulation(SHORT) as sim:
+        assert caught() == before
+        sim.step(3)
+        assert caught() == before
+
+
+def test_a_program_is_told_that_memory_has_run_out():
+    said = python("""
+import bergtow, ctypes, os
+lib = bergtow._library.library()
+told = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)(lambda text, user: os.write(1, b"told: " + text))
+lib.bt_on_out_of_memory(told, None)
+lib.bt_alloc.argtypes = [ctypes.c_size_t, ctypes.c_size_t]
+lib.bt_alloc(2**60, 8)
+""")
+    assert said.stdout.startswith("told: out of memory") and not said.stderr and said.returncode == 5
+
+
 # --- installation ----------------------------------------------------------------------------------------------------
 
 def python(code, *, path=ROOT / "postproc", **env):
@@ -432,6 +477,6 @@ def test_pip_installs_the_package(tmp_path):
                             capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "site/bergtow/py.typed").exists()
-    said = python("import bergtow; print(bergtow.__file__, bergtow.Case({'run': {'dt': 0.1, 'duration': 1}})['run.dt'])",
+    said = python("import bergtow as b; print(b.__file__, b.Case({'run': {'dt': 0.1, 'duration': 1}})['run.dt'])",
                   path=tmp_path / "site", BERGTOW_LIB=str(LIBRARY))
     assert said.stdout.split() == [str(tmp_path / "site/bergtow/__init__.py"), "0.1"], said.stderr
