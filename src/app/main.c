@@ -26,6 +26,8 @@ static const struct {
      true},
     {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
      bt_cmd_script, false},
+    {"budget", "find out how much of the scatter is of the fields, of each assumed value, of the computation",
+     bt_cmd_script, false},
     {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
