@@ -58,11 +58,13 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help tests install clean FORCE deps deps-lint deps-dev demo report bench fullscale partition-study \
-        validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
+.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev demo report bench \
+        fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
+
+lib: $(BUILD)/libbergtow.a $(BUILD)/libbergtow.so ## the library: static, and shared for programs and Python
 
 help: ## this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-15s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -91,6 +93,38 @@ $(BUILD)/%.o: %.c $(STAMP) | $(REV)
 $(BUILD)/libbergtow.a: $(LIB_OBJ)
 	@rm -f $@
 	@ar rcs $@ $^
+
+# --- The shared library, and what is installed with it -------------------------------------------------------------
+
+# The program keeps objects of its own, without -fPIC. The number of the soname rises when a public header changes so
+# that programs built before no longer work.
+VERSION := $(shell sed -n 's/^\#define BT_VERSION "\(.*\)"/\1/p' include/bergtow/base.h)
+SONAME := libbergtow.so.$(firstword $(subst ., ,$(VERSION)))
+PIC_OBJ := $(LIB_SRC:%.c=$(BUILD)/pic/%.o)
+
+$(BUILD)/pic/%.o: %.c $(STAMP) | $(REV)
+	@mkdir -p $(@D)
+	@echo '  PIC  $<'
+	@$(CC) $(CFLAGS) -fPIC -fno-semantic-interposition -I$(BUILD) -c $< -o $@
+
+$(BUILD)/symbols.map: $(BUILD)/libbergtow.a install/symbols.sh $(wildcard include/bergtow/*.h)
+	@install/symbols.sh $< > $@.new && mv $@.new $@
+
+$(BUILD)/libbergtow.so.$(VERSION): $(PIC_OBJ) $(BUILD)/symbols.map
+	@echo '  LINK $@'
+	@$(CC) $(CFLAGS) -shared -Wl,-soname,$(SONAME) -Wl,--version-script,$(BUILD)/symbols.map -Wl,-z,defs \
+	  $(PIC_OBJ) $(LDLIBS) -o $@
+
+$(BUILD)/libbergtow.so: $(BUILD)/libbergtow.so.$(VERSION)
+	@ln -sf $(<F) $(BUILD)/$(SONAME)
+	@ln -sf $(SONAME) $@
+
+$(BUILD)/share/bergtow.pc: install/bergtow.pc.in include/bergtow/base.h $(STAMP)
+	@mkdir -p $(@D)
+	@sed 's|@VERSION@|$(VERSION)|; s|@PRIVATE@|-fopenmp $(LDLIBS)|' $< > $@
+
+$(BUILD)/share/bergtow.1: $(BUILD)/bergtow install/from_help.py
+	@PYTHONDONTWRITEBYTECODE=1 $(PYTHON) install/from_help.py $< $(@D)
 
 $(BUILD)/bergtow: $(BIN_OBJ) $(BUILD)/libbergtow.a
 	@echo '  LINK $@'
@@ -143,6 +177,9 @@ DEPS := build-essential pkg-config git \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
         python3-pytest ffmpeg chromium chromium-driver python3-selenium
 
+# For the tests of the Python package; it runs without them, but for open_result.
+DEPS_TEST := python3-xarray python3-pip python3-setuptools python3-wheel
+
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
@@ -185,8 +222,11 @@ report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DI
 	$(PYTHON) postproc/report.py $(RUN)
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
-test: deps ## every test: units, known answers, same bits, command line, short runs under the sanitizers
-	@$(AGAIN) all tests
+deps-test: ## install what make test needs
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_TEST)'
+
+test: deps-test ## every test: units, known answers, same bits, command line, short runs under the sanitizers
+	@$(AGAIN) all lib tests
 	@$(AGAIN) CONFIG=validate all
 	@$(AGAIN) CONFIG=asan all build/asan/tests/fuzz/test_corpus
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
@@ -257,11 +297,14 @@ fuzz: all ## hostile input by libFuzzer: TARGET=case, study, outlines, field, ..
 validate: deps ## build/validate/bergtow: assertions, checks of the division, teams of threads for every loop
 	@$(AGAIN) CONFIG=validate all
 
-install: all ## install the program into DESTDIR PREFIX
-	install -D -m 755 $(BUILD)/bergtow $(DESTDIR)$(PREFIX)/bin/bergtow
+install: all lib $(BUILD)/share/bergtow.pc $(BUILD)/share/bergtow.1 ## program, library, scripts into DESTDIR PREFIX
+	@install/install.sh put $(BUILD) $(VERSION) $(PREFIX) $(DESTDIR)
+
+uninstall: ## take away what make install has put into DESTDIR PREFIX
+	@install/install.sh remove $(PREFIX) $(DESTDIR)
 
 clean: ## remove build/ and out/
 	rm -rf build out
 
--include $(patsubst %.o,%.d,$(LIB_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
+-include $(patsubst %.o,%.d,$(LIB_OBJ) $(PIC_OBJ) $(HARNESS_OBJ) $(BIN_OBJ))
 -include $(TEST_BIN:=.d) $(RANK_BIN:=.d) $(EXTENDED).d $(STUDY).d $(BUILD)/triad.d $(FAULT:.so=.d)

@@ -262,6 +262,10 @@ bt_status bt_case_read(bt_case *c, const char *path, const char *const *override
 bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *overrides, const char *const *place,
                               int n, bt_errors *err);
 
+/// The same from a text, which path names in messages; files that the text names lie beside path.
+bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, const char *const *overrides,
+                            const char *const *place, int n, bt_errors *err);
+
 /// The same from a text that a checkpoint has kept, with the tables of current and wind that it has kept, too: no file
 /// is read.
 bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, const bt_table *current,

@@ -23,10 +23,12 @@ const bt_comm *bt_comm_world(void);
 /// One rank, whatever else runs: for work of a rank by itself.
 extern const bt_comm bt_comm_alone;
 
-/// Collective. Start MPI if a launcher (mpirun, srun) started this process: a plain start must neither pay for MPI_Init
-/// nor need a network. From here on an MPI error, and an exit() of one rank alone, end all ranks; an exit(0) or
-/// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line.
-void bt_comm_start(int *argc, char ***argv);
+/// Collective. Use MPI as the program has started it, which ends it, too; otherwise start it if a launcher (mpirun,
+/// srun) started this process: a plain start must neither pay for MPI_Init nor need a network. From here on an error of
+/// MPI ends all ranks, and so does an exit() of one rank alone where MPI was started here; an exit(0) or
+/// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line. argc, argv may be NULL.
+/// Errors: BT_ERR_USAGE, told on stderr.
+bt_status bt_comm_start(int *argc, char ***argv);
 
 /// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst
 /// code.

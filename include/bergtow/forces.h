@@ -103,6 +103,7 @@ static inline void bt_load_damper(bt_load *l, double g, double u, double v)
 typedef struct bt_force_body {
     const bt_params *par;      ///< Δt, current, wind of the step
     const double *own;         ///< numbers of the law
+    const void *context;       ///< of the law
     const bt_drag *drag;
     bt_vel vel;                ///< U1, m/s, rad/s
     double time;               ///< of the middle of the step, s
@@ -129,7 +130,8 @@ static inline bt_pose bt_force_pose(const bt_force_body *b)
     return p;
 }
 
-/// A force law. It has no state: what it does follows from its numbers, the time and the body.
+/// A force law. What it does follows from its numbers, the time and the body; what is to survive a checkpoint cannot be
+/// kept anywhere else.
 typedef struct bt_force_law {
     const char *name;          ///< lower_snake; its series is NAME_force
     /// one line, "drag of water": the description of the series goes on "on the towed body against the tow direction"
@@ -147,6 +149,11 @@ typedef struct bt_force_law {
     /// of towed_only.
     bool (*rests)(const bt_params *p, const double *own);
     void (*add)(const bt_force_body *b, bt_load *l);
+    /// Once a step, by one thread, when all bodies have their places: for what a law needs of all of them together. It
+    /// may set own[]; when its `rests` then turns to no, floes at rest are woken. NULL = done, otherwise why it failed:
+    /// the run ends after this step. NULL in place of the function = nothing to do.
+    const char *(*begin)(const bt_world *w, double own[BT_MAX_FORCE_OWN], void *context);
+    void *context;             ///< handed to `begin`, and to `add` in the body
 } bt_force_law;
 
 /// in the order in which they add; written by bt_force_register alone
@@ -179,6 +186,8 @@ typedef struct bt_impulse { double x, y, turn; } bt_impulse; ///< N s, N s, N m 
 typedef struct bt_forces {
     int n;                     ///< laws
     int n_series;
+    const bt_force_law *failed; ///< a law whose `begin` has failed, and why; NULL = none
+    const char *why;
     double towed_at[2];        ///< where the towed body stands, not wrapped, m; NaN until the first step
     double own[BT_MAX_FORCE_LAWS][BT_MAX_FORCE_OWN];
     /// as really used by the step: what is implicit with U2; their sum with those of contacts and line is M (U2 − U1),
@@ -192,6 +201,9 @@ void bt_forces_free(bt_forces *f);
 
 /// The numbers of all laws from a case. Without a case a program sets w->forces->own itself; they are 0 before.
 void bt_forces_setup(bt_world *w, const bt_case *c);
+
+/// Collective. At the start of a step, before bt_forces_predict: `begin` of the laws that have one.
+void bt_forces_begin(bt_world *w);
 
 /// Fill vel_start (U1), vel and vel_free (U*) and inv (effective) of every dynamic body. Kinematic and static bodies
 /// keep vel.

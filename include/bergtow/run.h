@@ -22,6 +22,7 @@ typedef struct bt_run_options {
     /// a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for;
     /// or NULL
     volatile sig_atomic_t *told;
+    bool leave_signals;       ///< catch no signal: they are the caller's
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
 

@@ -71,22 +71,6 @@ static const struct argp run_argp = {.options = run_options,
                                      .children = children,
                                      .doc = "Tow the body of a case through its ice and write a result folder."};
 
-// A long run must not take the place of another by a slip of the hand.
-static bt_status check_folder(const char *dir, bool force, bt_errors *err)
-{
-    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_folder_begun(dir);
-    const bt_status foreign = bt_folder_check(dir, err);
-    if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
-    if (finished || !begun)
-        bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
-    else
-        bt_errors_add(err,
-                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, "
-                      "or --force to replace it",
-                      dir, dir);
-    return BT_ERR_IO;
-}
-
 int bt_cmd_run(int argc, char **argv)
 {
     options o = {.run = {.dump_step = -1}};
@@ -101,7 +85,7 @@ int bt_cmd_run(int argc, char **argv)
     bt_case c;
     bt_errors err = {0};
     bt_status status = bt_case_read(&c, o.file.path, o.file.set, o.file.n_set, &err);
-    if (status == BT_OK && comm->rank == 0) status = check_folder(o.run.dir, o.force, &err);
+    if (status == BT_OK && comm->rank == 0) status = bt_folder_may_take(o.run.dir, o.force, &err);
     if (status == BT_OK && comm->rank == 0 && o.run.dump_path)
         status = bt_cmd_may_write(o.run.dump_path, o.file.path, false, o.force, &err);
     status = bt_comm_agree(comm, status);

@@ -12,19 +12,31 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-/// The script of a command in the source tree that this program was built in, or in BERGTOW_HOME; the caller frees it.
-static char *find_script(const char *program, const char *command)
+/// The folder that is `up` steps above a program, with a name below it; the caller frees it.
+static char *beside(const char *program, int up, const char *name)
 {
-    const char *home = getenv("BERGTOW_HOME");
-    char folder[PATH_MAX], script[NAME_MAX];
-    snprintf(script, sizeof script, "postproc/%s.py", command);
-    if (home) return bt_file_join(home, script);
+    char folder[PATH_MAX];
     snprintf(folder, sizeof folder, "%s", program);
-    for (int up = 0; up < 3; up++) { // build/release/bergtow
+    for (; up > 0; up--) {
         char *slash = strrchr(folder, '/');
         if (slash) *slash = 0;
     }
-    return bt_file_join(folder, script);
+    return bt_file_join(folder, name);
+}
+
+/// The script of a command in BERGTOW_HOME, in share/bergtow of the prefix that this program was installed in, or in
+/// the source tree that it was built in; the caller frees it.
+static char *find_script(const char *program, const char *command)
+{
+    const char *home = getenv("BERGTOW_HOME");
+    char script[NAME_MAX], installed[NAME_MAX];
+    snprintf(script, sizeof script, "postproc/%s.py", command);
+    snprintf(installed, sizeof installed, "share/bergtow/%.200s", script);
+    if (home) return bt_file_join(home, script);
+    char *path = beside(program, 2, installed); // PREFIX/bin/bergtow
+    if (access(path, R_OK) == 0) return path;
+    free(path);
+    return beside(program, 3, script); // build/release/bergtow
 }
 
 /// Exit code of the script, −1 when it cannot be started.

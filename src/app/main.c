@@ -161,7 +161,7 @@ static int bergtow(int argc, char **argv)
 int main(int argc, char **argv)
 {
     start_with_settings(argv);
-    bt_comm_start(&argc, &argv);
+    if (bt_comm_start(&argc, &argv) != BT_OK) return BT_ERR_USAGE;
     argp_err_exit_status = BT_ERR_USAGE;
     argp_program_version_hook = print_version;
     return bt_comm_end(bergtow(argc, argv));

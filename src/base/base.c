@@ -7,13 +7,25 @@
 #include <string.h>
 #include <time.h>
 
+static void (*on_out_of_memory)(const char *message, void *user);
+static void *on_out_of_memory_user;
 static void (*leave)(int code) = _Exit;
+
+void bt_on_out_of_memory(void (*told)(const char *message, void *user), void *user)
+{
+    on_out_of_memory = told;
+    on_out_of_memory_user = user;
+}
+
 void bt_leave_by(void (*by)(int code)) { leave = by; }
 
 // Not by exit: HDF5 closes its files there, and may itself have called what asks for memory.
 static _Noreturn void out_of_memory(size_t n, size_t size)
 {
-    fprintf(stderr, "bergtow: out of memory: %zu items of %zu bytes; use fewer floes or a larger machine\n", n, size);
+    char text[160];
+    snprintf(text, sizeof text, "out of memory: %zu items of %zu bytes; use fewer floes or a larger machine", n, size);
+    if (on_out_of_memory) on_out_of_memory(text, on_out_of_memory_user);
+    else fprintf(stderr, "bergtow: %s\n", text);
     leave(BT_ERR_NUMERIC);
     _Exit(BT_ERR_NUMERIC);
 }

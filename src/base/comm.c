@@ -17,6 +17,7 @@
 const bt_comm bt_comm_alone = ALONE;
 static bt_comm world = ALONE;
 static bool running; // between start and end, with MPI
+static bool foreign; // the program has started MPI, and will end it
 static MPI_Datatype item_type;
 static MPI_Op item_op;
 
@@ -109,9 +110,8 @@ void bt_comm_split_end(bt_comm *part)
     *part = bt_comm_alone;
 }
 
-void bt_comm_start(int *argc, char ***argv)
+static bool start_mpi(int *argc, char ***argv)
 {
-    if (running || (!getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK"))) return;
     // Threads that MPI starts leave signals to the main thread: METIS must be able to hold SIGTERM back
     // (partition/cut.h).
     sigset_t block, before;
@@ -119,13 +119,24 @@ void bt_comm_start(int *argc, char ***argv)
     sigaddset(&block, SIGTERM);
     pthread_sigmask(SIG_BLOCK, &block, &before);
     int provided;
-    if (MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided) != MPI_SUCCESS) {
-        fprintf(stderr, "bergtow: MPI cannot be started; check the mpirun call, or start bergtow without it\n");
-        exit(BT_ERR_USAGE);
-    }
+    const bool started = MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided) == MPI_SUCCESS;
     pthread_sigmask(SIG_SETMASK, &before, NULL);
+    if (!started)
+        fprintf(stderr, "bergtow: MPI cannot be started; check the mpirun call, or start bergtow without it\n");
+    return started;
+}
+
+bt_status bt_comm_start(int *argc, char ***argv)
+{
+    if (running) return BT_OK;
+    int begun = 0;
+    MPI_Initialized(&begun);
+    if (!begun && !getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK")) return BT_OK;
+    if (!begun && !start_mpi(argc, argv)) return BT_ERR_USAGE;
     running = true;
+    foreign = begun != 0;
     world.mpi = MPI_COMM_WORLD;
+    if (foreign) MPI_Comm_dup(MPI_COMM_WORLD, &world.mpi); // messages and error handler are apart from the program's
     MPI_Comm_rank(world.mpi, &world.rank);
     MPI_Comm_size(world.mpi, &world.size);
     MPI_Errhandler handler;
@@ -136,8 +147,9 @@ void bt_comm_start(int *argc, char ***argv)
     MPI_Type_contiguous(4, MPI_UINT64_T, &item_type);
     MPI_Type_commit(&item_type);
     MPI_Op_create(combine, 1, &item_op);
-    on_exit(on_leaving, NULL);
+    if (!foreign) on_exit(on_leaving, NULL);
     bt_leave_by(bt_comm_abort);
+    return BT_OK;
 }
 
 int bt_comm_end(int code)
@@ -150,7 +162,8 @@ int bt_comm_end(int code)
     running = false;
     MPI_Op_free(&item_op);
     MPI_Type_free(&item_type);
-    MPI_Finalize();
+    if (foreign) MPI_Comm_free(&world.mpi);
+    else MPI_Finalize();
     world = (bt_comm)ALONE;
     return code;
 }

@@ -303,6 +303,15 @@ bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *o
     return status == BT_OK ? read_text(c, size, overrides, place, n, err) : status;
 }
 
+bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, const char *const *overrides,
+                            const char *const *place, int n, bt_errors *err)
+{
+    begin_case(c, path);
+    const size_t size = strlen(text);
+    c->text = memcpy(bt_alloc(size + 1, 1), text, size + 1);
+    return read_text(c, size, overrides, place, n, err);
+}
+
 static void keep_table(bt_table *t, const bt_table *from)
 {
     if (from->n == 0) return;

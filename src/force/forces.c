@@ -59,6 +59,23 @@ void bt_forces_predict(bt_world *w)
     }
 }
 
+void bt_forces_begin(bt_world *w)
+{
+    bt_forces *f = w->forces;
+    bool any = false;
+    for (int k = BT_LISTED_LAWS; k < f->n; k++) any = any || bt_force_laws[k]->begin;
+    if (!any) return;
+    const bool rested = bt_forces_rest(w);
+    for (int k = BT_LISTED_LAWS; k < f->n; k++) {
+        const bt_force_law *law = bt_force_laws[k];
+        const char *why = law->begin ? law->begin(w, f->own[k], law->context) : NULL;
+        if (why) f->failed = law, f->why = why;
+    }
+    if (!rested || bt_forces_rest(w)) return;
+    bt_cells_wake_all(w->cells);
+    for (bt_idx k = 0; k < w->cells->n; k++) w->cells->asleep[k] = BT_AWAKE;
+}
+
 bool bt_forces_rest(const bt_world *w)
 {
     for (int k = 0; k < w->forces->n; k++) {

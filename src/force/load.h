@@ -25,6 +25,7 @@ static inline void bt_load_add(const bt_forces *f, int k, bt_force_body *b, bt_l
     const bt_force_law *law = bt_force_laws[k];
     if (law->towed_only && !b->towed) return;
     b->own = f->own[k];
+    b->context = law->context;
     law->add(b, l);
 }
 

@@ -206,3 +206,18 @@ void bt_folder_settle(const char *dir)
     free(aside);
     bt_errors_free(&unheard);
 }
+
+bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err)
+{
+    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_folder_begun(dir);
+    const bt_status foreign = bt_folder_check(dir, err);
+    if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
+    if (finished || !begun)
+        bt_errors_add(err, "%s: holds a result; give another folder with -o, or --force to replace it", dir);
+    else
+        bt_errors_add(err,
+                      "%s: holds an unfinished run; go on with it by `bergtow resume %s`, give another folder with -o, "
+                      "or --force to replace it",
+                      dir, dir);
+    return BT_ERR_IO;
+}

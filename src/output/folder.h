@@ -23,6 +23,10 @@
 /// it is one: a request to stop is an empty file. The other calls leave such files where they are.
 bt_status bt_folder_check(const char *dir, bt_errors *err);
 
+/// May a run write its result here? A long run must not take the place of another by a slip of the hand: only with
+/// force. Errors: BT_ERR_IO.
+bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err);
+
 /// Does the folder hold a run that has begun and not come to its end?
 bool bt_folder_begun(const char *dir);
 

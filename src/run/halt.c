@@ -30,7 +30,7 @@ void bt_halt_begin(bt_halt *h)
     stop_signal = save_signal = 0;
     h->last = bt_clock();
     h->looked = 0;
-    for (int k = 0; k < BT_N_CAUGHT; k++) {
+    for (int k = 0; k < BT_N_CAUGHT && !h->deaf; k++) {
         // SA_RESTART: on a network disk a call would else fail by the very signal that asks for a checkpoint
         struct sigaction act = {.sa_handler = caught[k].handler, .sa_flags = SA_RESTART};
         sigemptyset(&act.sa_mask);
@@ -41,7 +41,7 @@ void bt_halt_begin(bt_halt *h)
 void bt_halt_end(bt_halt *h)
 {
     if (h->told && stop_signal) *h->told = stop_signal;
-    for (int k = 0; k < BT_N_CAUGHT; k++) sigaction(caught[k].number, &h->before[k], NULL);
+    for (int k = 0; k < BT_N_CAUGHT && !h->deaf; k++) sigaction(caught[k].number, &h->before[k], NULL);
 }
 
 uint64_t bt_halt_look(bt_halt *h, int64_t step)
@@ -58,7 +58,7 @@ uint64_t bt_halt_look(bt_halt *h, int64_t step)
     if (h->steps > 0 && step % h->steps == 0) bits |= save;
     if (h->wall > 0 && now - h->last >= h->wall) bits |= save;
     if (h->max_wall > 0 && now - h->started >= h->max_wall) bits |= by_clock;
-    if (now - h->looked >= LOOK_SECONDS) {
+    if (h->dir && now - h->looked >= LOOK_SECONDS) {
         h->looked = now;
         if (bt_file_there(h->dir, STOP_FILE)) bits |= by_file;
     }

@@ -23,8 +23,9 @@ typedef struct bt_halt {
     int64_t steps;          ///< between checkpoints, 0 = none
     double wall, max_wall;  ///< s between checkpoints, until the stop; 0 = none
     double started;         ///< bt_clock when the call began
-    const char *dir;
+    const char *dir;        ///< NULL = none
     volatile sig_atomic_t *told; ///< of the caller (bergtow/run.h), or NULL
+    bool deaf;              ///< signals are the caller's: none is caught
     bool first;             ///< this is rank 0
     // state
     double last, looked;    ///< bt_clock: of the last checkpoint, of the last look for the stop file

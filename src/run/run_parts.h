@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A run as its parts see it (private to run.c and run_state.c).
+// A run as its parts see it (private to this folder).
 #ifndef BT_RUN_PARTS_H
 #define BT_RUN_PARTS_H
 
@@ -21,20 +21,50 @@ typedef struct bt_running {
     bt_world *w;
     bt_field field;          ///< at time zero, with the lead in it; on rank 0, for the checkpoints
     bt_roster roster;
-    bt_record *record;
+    bt_record *record;       ///< NULL: the run leaves no files
     bt_progress progress;
     bt_halt halt;
     bt_guard guard;
     int64_t until;           ///< the run is only made again up to this step, −1 = it is not
-    bool failed;             ///< a step has not been sound: w->step is its number
+    bool begun;              ///< the record, if there is to be one, is open
+    int64_t failed;          ///< the step that was not sound, −1 = none
     uint64_t asked;          ///< what some rank has been asked for after the last step (halt.h)
     int64_t first_step, end_step; ///< of this call
     double began;            ///< bt_clock when its steps began
     int64_t frames_due;      ///< frames by the interval, so far
     int64_t frames;          ///< frames taken, but for one that the end of --steps has added
+    int64_t framed;          ///< step of the last frame, −1 = none in this call
+    bt_sample sample;        ///< of the last step
     double reference_speed;
     bt_run_totals totals;
 } bt_running;
+
+/// How a run begins.
+typedef struct bt_run_manner {
+    bt_snapshot *kept;   ///< go on from there, or NULL
+    double start;        ///< bt_clock when the call began
+    int64_t until;       ///< only up to this step, for failure.h5; −1 = as the options say
+    bool held;           ///< the folder is held already
+    int lock;            ///< out: by this, on rank 0
+} bt_run_manner;
+
+/// Collective. Field, world, folder and record of a run at its first step. comm, c and o must stay where they are until
+/// bt_running_end, which follows whatever the status is.
+bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
+                           bt_run_manner *m, bt_errors *err);
+
+/// Is a step left, and has nobody asked to stop?
+bool bt_running_goes_on(const bt_running *r);
+
+/// Collective. One step, observed, guarded and recorded; frame and checkpoint when they are due.
+bt_status bt_running_step(bt_running *r, bt_errors *err);
+
+/// Collective. The run ends here, before bt_running_end, as it does after --steps.
+bt_status bt_running_stop(bt_running *r, bt_errors *err);
+
+/// Collective. status: of the last step. Summary and last checkpoint of a run whose steps were sound; closes and frees
+/// everything but the lock. Returns the status of the run.
+bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err);
 
 /// Collective, between steps. The whole state of the run; complete on rank 0. Errors: BT_ERR_IO, BT_ERR_NUMERIC.
 bt_status bt_running_save(bt_running *r, bt_snapshot *s, bt_errors *err);

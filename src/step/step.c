@@ -247,6 +247,8 @@ void bt_world_step(bt_world *w)
     clock_phase(w, &st->detect_s, &t0);
     if (w->tow)
         memcpy(w->forces->towed_at, (const double[]){w->tow->travel_x, w->tow->travel_y}, sizeof w->forces->towed_at);
+    bt_tow_lead(w);
+    bt_forces_begin(w);
     bt_forces_predict(w); // U*, effective M
     bt_tow_begin(w);
     clock_phase(w, &st->forces_s, &t0);

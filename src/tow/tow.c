@@ -36,18 +36,24 @@ static void follow_path(bt_tow *t, double x, double y)
     t->end_speed = moves ? far / t->dt : 0;
 }
 
+void bt_tow_lead(bt_world *w)
+{
+    bt_tow *t = w->tow;
+    if (!t || w->towed < 0) return;
+    t->end_speed = bt_tow_speed(t, t->time + t->dt);
+    if (t->mode != BT_TOW_SPEED) return;
+    bt_bodies *b = &w->bodies;
+    const bt_idx i = bt_world_towed(w);
+    if (t->path.n > 0) follow_path(t, t->travel_x, t->travel_y);
+    b->vel_start[i] = b->vel[i];
+    b->vel[i] = b->vel_free[i] = (bt_vel){.x = t->end_speed * t->ux, .y = t->end_speed * t->uy};
+}
+
 void bt_tow_begin(bt_world *w)
 {
     bt_tow *t = w->tow;
     if (!t || w->towed < 0) return;
-    bt_bodies *b = &w->bodies;
-    const bt_idx i = bt_world_towed(w);
-    t->end_speed = bt_tow_speed(t, t->time + t->dt);
-    if (t->mode == BT_TOW_SPEED) {
-        if (t->path.n > 0) follow_path(t, t->travel_x, t->travel_y);
-        b->vel_start[i] = b->vel[i];
-        b->vel[i] = b->vel_free[i] = (bt_vel){.x = t->end_speed * t->ux, .y = t->end_speed * t->uy};
-    } else if (t->mode == BT_TOW_LINE) {
+    if (t->mode == BT_TOW_LINE) {
         if (t->path.n > 0) follow_path(t, t->carriage_x, t->carriage_y);
         bt_tow_begin_rows(w);
     } else if (t->mode == BT_TOW_THRUST) {

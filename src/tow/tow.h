@@ -120,7 +120,11 @@ static inline bool bt_tow_has_line(const bt_tow *t)
 /// Speed of the programme at this time, m/s.
 double bt_tow_speed(const bt_tow *t, double time);
 
-/// At the start of a step: prescribed velocity into a kinematic body, end moved, line rows set up.
+/// At the start of a step, before the forces are asked for: speed of the programme, and the prescribed velocity into a
+/// body that is led.
+void bt_tow_lead(bt_world *w);
+
+/// At the start of a step, after the free velocities: end moved, line rows set up.
 void bt_tow_begin(bt_world *w);
 
 /// Exact solution of the line rows at the velocity *v of the body, which changes with them; returns their natural-map

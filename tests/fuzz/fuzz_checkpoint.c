@@ -257,7 +257,7 @@ static void step_on(bt_running *r)
     if (r->w->impacts) bt_impacts_end(r->w->impacts);
 }
 
-/// As src/run/run.c does it, without the files. True when it was accepted.
+/// As src/run/running.c does it, without the files. True when it was accepted.
 static bool take_up_arrays(bt_snapshot *s)
 {
     bt_errors err = {0};

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+// A simulation that a program steps: libbergtow from outside. docs/library.md has examples in C and Python.
+//
+//     bt_simulation *s;
+//     if (bt_simulation_create(&s, &(bt_simulation_options){.path = "case.yml"})) die(bt_last_error());
+//     while (bt_simulation_steps_left(s) > 0 && bt_simulation_step(s, 100) == BT_OK) look(s);
+//     bt_simulation_end(s);
+//
+// The steps are those of `bergtow run`: the same begin, step and end, the same guards, and with a folder the same
+// files. A simulation that nobody interferes with has the state hash of the command.
+//
+// Errors. Whatever can fail returns a bt_status; bt_last_error has the texts, one a line, each with the reason and the
+// remedy. No call ends the program, with two exceptions that leave nothing to return to: memory that runs out
+// (bt_on_out_of_memory is told first) and an MPI call that fails (all ranks are ended). After a step that failed, the
+// state is for looking at; end the simulation.
+//
+// Threads. One thread of the program makes all calls, of all simulations; a simulation uses threads of OpenMP within a
+// step. Functions that a program adds to the table of force laws are called by those threads at once; applied forces
+// (bergtow/applied.h) and quantities by one. Several simulations may exist and be stepped in turn. What a program adds
+// (laws, applied forces, quantities, keys, shapes) is of the process, and comes before the simulations that use it.
+//
+// Signals. None is caught, unless options.signals asks for the handlers of the program, from create to end. While METIS
+// cuts the field into parts for several ranks, SIGTERM waits.
+//
+// MPI. Without bt_comm_start (bergtow/comm.h) a simulation is of one rank, whatever the launcher. After it, every call
+// below is collective: all ranks make it, with the same arguments. Arrays over bodies have NaN where another rank holds
+// the body.
+//
+// Output. Nothing is printed, but with options.progress, and warnings on stderr that a case earns.
+#ifndef BERGTOW_SIMULATION_H
+#define BERGTOW_SIMULATION_H
+
+#include "bergtow/applied.h"
+#include "bergtow/base.h"
+
+typedef struct bt_simulation bt_simulation;
+
+typedef struct bt_simulation_options {
+    const char *path;         ///< case file; with text: its name in messages, beside which files that it names are
+    const char *text;         ///< the case itself, or NULL: it is read from path
+    const char *const *set;   ///< [n_set] texts "key=value" that replace values of the case
+    int n_set;
+    const char *dir;          ///< result folder; NULL = no files
+    bool replace;             ///< what the folder holds of an earlier run, as --force does
+    bool signals;             ///< catch signals as the program does (docs/manual.md)
+    bool progress;            ///< print progress and the table at the end
+    int threads;              ///< of each rank; 0 = run.threads of the case, or all cores
+    const char *command_line; ///< for the provenance of the result; NULL = none
+} bt_simulation_options;
+
+/// Read the case, make or read its ice, open the folder. *s is NULL after an error: BT_ERR_CASE, BT_ERR_IO,
+/// BT_ERR_USAGE.
+bt_status bt_simulation_create(bt_simulation **s, const bt_simulation_options *o);
+
+/// n steps, or as many as are left. Errors: BT_ERR_NUMERIC (a guard, or a force that failed), BT_ERR_IO,
+/// BT_ERR_SIGNAL: asked to stop, as by the file `stop` in the folder; end the simulation then.
+bt_status bt_simulation_step(bt_simulation *s, int64_t n);
+
+/// The end: summary and last checkpoint, where there is a folder, of the steps that were made; frees s. Errors as for
+/// a step, and BT_ERR_SIGNAL for a simulation that was asked to stop and whose files are complete.
+bt_status bt_simulation_end(bt_simulation *s);
+
+/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is let through.
+void bt_simulation_drop(bt_simulation *s);
+
+int64_t bt_simulation_steps(const bt_simulation *s);
+int64_t bt_simulation_steps_left(const bt_simulation *s);
+double bt_simulation_time(const bt_simulation *s); ///< s
+double bt_simulation_dt(const bt_simulation *s);   ///< s
+
+/// Hash of the state, as state_hash of summary.json.
+uint64_t bt_simulation_hash(const bt_simulation *s);
+
+/// Checkpoint and result as they are now, from which `bergtow resume` goes on. Errors: BT_ERR_USAGE without a folder,
+/// BT_ERR_IO.
+bt_status bt_simulation_checkpoint(bt_simulation *s);
+
+// --- bodies ----------------------------------------------------------------------------------------------------------
+// Ids: floes of the field, floes given by hand, the towed body, walls.
+
+int64_t bt_simulation_bodies(const bt_simulation *s); ///< their number
+int64_t bt_simulation_towed(const bt_simulation *s);  ///< id, −1 = none
+
+/// What bt_simulation_read gives, and the numbers of a body.
+typedef enum {
+    BT_BODY_PLACE,     ///< 3: x, y (wrapped in periodic directions), yaw, m, m, rad
+    BT_BODY_VELOCITY,  ///< 3: m/s, m/s, rad/s
+    BT_BODY_MASS,      ///< 2: mass with and without added mass, kg
+    BT_BODY_INERTIA,   ///< 1: with that of the water, kg m²
+    BT_BODY_AREA,      ///< 1: m²
+    BT_BODY_RADIUS,    ///< 1: of the circle about the outline, m
+    BT_BODY_THICKNESS, ///< 1: of ice, m; 0 = no ice
+    BT_BODY_MOTION,    ///< 1: 0 moved by forces, 1 velocity prescribed, 2 at rest for ever
+    BT_BODY_DRAG,      ///< 5: skin and form drag of the water, of the air, drag as it turns (bt_drag)
+    BT_BODY_KINDS
+} bt_body_numbers;
+extern const int bt_body_widths[BT_BODY_KINDS];
+
+/// One kind of numbers of all bodies, out: [bodies][bt_body_widths[kind]]. Errors: BT_ERR_USAGE.
+bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out);
+
+/// Outline of a body where it is, anticlockwise, about its place: up to `room` points into xy, [room][2] m. Returns how
+/// many there are; 0 where another rank holds the body, or there is none of this id.
+int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room);
+
+/// Give a body another velocity, m/s, rad/s. Errors: BT_ERR_USAGE for no such body, one whose velocity is prescribed or
+/// that never moves, a number that is none.
+bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate);
+
+/// Put a body elsewhere, m, m, rad. Errors: BT_ERR_USAGE as above, for the towed body (its line or course would break),
+/// outside the domain, or where it would overlap another body.
+bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw);
+
+// --- numbers and contacts --------------------------------------------------------------------------------------------
+
+/// A number of the last step by the name of its series (bergtow --list-quantities): "ice_resistance", "drag_force",
+/// "line_tension", those that were added. NaN before the first step, and where it does not apply. Under MPI those of
+/// collisions are on rank 0. Errors: BT_ERR_USAGE for a name that is none.
+bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, double *value);
+
+/// Columns of a contact: ids of the bodies; number of points, 1 or 2 (0: floes over each other, whose impulse along x
+/// is NORMAL_1, along y TANGENTIAL); the points, m, carried along with body A since the start of the step; unit normal
+/// from A to B; impulses on B of the last step, N s: normal at each point, and tangential, along (−ny, nx), of both.
+enum {
+    BT_CONTACT_A, BT_CONTACT_B, BT_CONTACT_POINTS, BT_CONTACT_X1, BT_CONTACT_Y1, BT_CONTACT_X2, BT_CONTACT_Y2,
+    BT_CONTACT_NX, BT_CONTACT_NY, BT_CONTACT_NORMAL_1, BT_CONTACT_NORMAL_2, BT_CONTACT_TANGENTIAL, BT_CONTACT_COLUMNS
+};
+
+/// Contacts of the last step that this rank solves: up to `room` rows into out, [room][BT_CONTACT_COLUMNS]. Returns how
+/// many there are: those that bear nothing are contacts that might have come about.
+int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room);
+
+// --- cases and texts -------------------------------------------------------------------------------------------------
+
+/// Texts of the last call that failed, one a line; valid until the next call. "" = none.
+const char *bt_last_error(void);
+
+/// Read and check a case alone (path, text, set): every key with its value in SI units, as YAML. Release with
+/// bt_release. Errors: BT_ERR_CASE, BT_ERR_IO.
+bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved);
+
+/// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json); NULL for another word. Release
+/// with bt_release.
+char *bt_list_json(const char *what);
+void bt_release(char *text);
+
+/// "0.1.0"
+const char *bt_version(void);
+
+#endif

@@ -1,0 +1,146 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Man page and completions of bergtow, made from what the program says of itself.
+
+    install/from_help.py BERGTOW FOLDER
+
+writes FOLDER/bergtow.1, bergtow.bash and _bergtow (zsh). Rejected: texts kept by hand, which fall behind the options.
+"""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+OPTION = re.compile(r"^ {2,8}(?=-)(?:-(?P<short>[\w?])(?:[ =](?P<short_arg>[^\s,]+))?,? *)?"
+                    r"(?:--(?P<long>[\w-]+)(?:[ =](?P<arg>\S+))?)?(?: {2,}(?P<text>\S.*))?$")
+WORDS = {"DIR": "folder", "FILE": "file", "CASE.yml": "file", "STUDY.yml": "file"}
+
+
+def said(program, *arguments):
+    """Standard output of the program; '' and a line on stderr where it cannot say it."""
+    result = subprocess.run([program, *arguments], capture_output=True, text=True)
+    if result.returncode == 0:
+        return result.stdout
+    print(f"from_help.py: bergtow {' '.join(arguments)}: {result.stderr.strip()}", file=sys.stderr)
+    return ""
+
+
+class Option:
+    def __init__(self, match):
+        self.short, self.long = match["short"], match["long"]
+        self.arg, self.text = match["arg"] or match["short_arg"], match["text"] or ""
+
+    @property
+    def flags(self):
+        return [f for f in (self.short and f"-{self.short}", self.long and f"--{self.long}") if f]
+
+
+class Command:
+    """What `bergtow NAME --help` says: usage, a paragraph, options."""
+
+    def __init__(self, program, name, summary):
+        self.name, self.summary, self.options, about = name, summary, [], []
+        text = said(program, name, "--help")
+        usage, _, rest = text.partition("\n" if text.startswith("Usage") else "\n\n")
+        usage = re.sub(r"\s+", " ", usage)
+        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|A)\b\S*(?: \[B\])?)$", usage)
+        self.operands = self.operands[0] if self.operands else ""
+        for line in rest.splitlines():
+            match = OPTION.match(line)
+            if match and (match["short"] or match["long"]):
+                self.options.append(Option(match))
+            elif self.options and line.startswith(" " * 12):
+                self.options[-1].text = f"{self.options[-1].text} {line.strip()}".strip()
+            elif not self.options and not line.startswith(("positional", "options", "  ")):
+                about.append(line.strip())
+        self.about = re.sub(r"\s+", " ", " ".join(about)).strip() or f"{summary}."
+
+
+def commands(program):
+    """The commands and the program's own options, from `bergtow --help`."""
+    text = said(program, "--help")
+    listed = re.findall(r"^  ([a-z]+) +(\S.*)$", text, re.MULTILINE)
+    own = re.findall(r"^  (--[\w-]+) +(\S.*)$", text, re.MULTILINE)
+    codes = text[text.index("Exit codes:"):]
+    return [Command(program, *c) for c in listed], own, re.sub(r"\s+", " ", codes).strip()
+
+
+def roff(text):
+    text = text.replace("\\", "\\e").replace("-", "\\-")
+    return "\\&" + text if text.startswith((".", "'")) else text
+
+
+def man_page(found, own, codes, version):
+    out = [f'.TH BERGTOW 1 "" "bergtow {version}" "User Commands"', ".SH NAME",
+           "bergtow \\- simulate a body that is towed through broken sea ice", ".SH SYNOPSIS"]
+    for c in found:
+        out += [".B bergtow " + c.name, "[\\fIOPTION\\fR...] \\fI" + roff(c.operands) + "\\fR", ".br"]
+    out += [".SH OPTIONS"]
+    for flag, text in own:
+        out += [".TP", f"\\fB{roff(flag)}\\fR", roff(text)]
+    out += [".SH COMMANDS"]
+    for c in found:
+        out += [f".SS bergtow {c.name} [\\fIOPTION\\fR...] \\fI{roff(c.operands)}\\fR", roff(c.about)]
+        for o in c.options:
+            arg = f"=\\fI{roff(o.arg)}\\fR" if o.arg else ""
+            out += [".TP", ", ".join(f"\\fB{roff(f)}\\fR" for f in o.flags) + arg, roff(o.text)]
+    out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT"]
+    for name, text in (("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
+                       ("BERGTOW_HOME", "folder that holds postproc/, where the scripts of commands are"),
+                       ("PYTHON", "Python that starts these scripts; default /usr/bin/python3")):
+        out += [".TP", f"\\fB{name}\\fR", text]
+    return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"
+
+
+def bash(found, own):
+    cases = [f"    {c.name}) options='{' '.join(f for o in c.options for f in o.flags)}' ;;" for c in found]
+    takes_file = sorted({f for c in found for o in c.options if o.arg and WORDS.get(o.arg) for f in o.flags})
+    takes_word = sorted({f for c in found for o in c.options if o.arg and not WORDS.get(o.arg) for f in o.flags}
+                        - set(takes_file))
+    return "\n".join([
+        "# bash completion of bergtow, made by install/from_help.py", "_bergtow()", "{",
+        "    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} options=", "    COMPREPLY=()",
+        "    if [ \"$COMP_CWORD\" -eq 1 ]; then",
+        f"        COMPREPLY=($(compgen -W '{' '.join([c.name for c in found] + [f for f, _ in own])}' -- \"$word\"))",
+        "        return", "    fi", "    case $before in", f"    {'|'.join(takes_word)}) return ;;",
+        f"    {'|'.join(takes_file)}) COMPREPLY=($(compgen -f -- \"$word\")); return ;;", "    esac",
+        "    case ${COMP_WORDS[1]} in", *cases, "    esac", "    case $word in",
+        "    -*) COMPREPLY=($(compgen -W \"$options\" -- \"$word\")) ;;",
+        "    *) COMPREPLY=($(compgen -f -- \"$word\")) ;;", "    esac", "}",
+        "complete -o filenames -F _bergtow bergtow", ""])
+
+
+def quoted(text):
+    """A text inside a specification of _arguments in single quotes."""
+    return re.sub(r"([\[\]:\\])", r"\\\1", text).replace("'", "'\\''")
+
+
+def zsh(found, own):
+    out = ["#compdef bergtow", "# made by install/from_help.py", "local -a commands options", "commands=("]
+    out += [f"  '{c.name}:{quoted(c.summary)}'" for c in found] + [")"]
+    out += ["if (( CURRENT == 2 )); then", "  _describe command commands",
+            "  options=(" + " ".join(f"'{flag}:{quoted(text)}'" for flag, text in own) + ")",
+            "  _describe option options", "  return", "fi", "shift words; (( CURRENT-- ))", "case $words[1] in"]
+    for c in found:
+        out.append(f"  {c.name}) _arguments -s \\")
+        for o in c.options:
+            value = f":{quoted(o.arg)}:{'_files' if WORDS.get(o.arg) else ' '}" if o.arg else ""
+            equals = "=" if o.arg else ""
+            for flag in o.flags:
+                out.append(f"    '{flag}{equals if flag.startswith('--') else ''}[{quoted(o.text)}]{value}' \\")
+        out += ["    '*:file:_files' ;;"]
+    return "\n".join(out + ["esac", ""])
+
+
+def main():
+    program, folder = sys.argv[1], Path(sys.argv[2])
+    folder.mkdir(parents=True, exist_ok=True)
+    found, own, codes = commands(program)
+    version = said(program, "--version").split()[1]
+    (folder / "bergtow.1").write_text(man_page(found, own, codes, version))
+    (folder / "bergtow.bash").write_text(bash(found, own))
+    (folder / "_bergtow").write_text(zsh(found, own))
+
+
+if __name__ == "__main__":
+    main()

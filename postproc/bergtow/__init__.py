@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: MIT
+"""bergtow in Python: cases, simulations that are stepped, forces of one's own, results as xarray datasets.
+
+    import bergtow
+    case = bergtow.Case("cases/basin/basin-80.yml")
+    case["tow.speed"] = "0.2 m/s"
+    with bergtow.Simulation(case) as sim:
+        while sim.steps_left:
+            sim.step(100)
+            print(sim.time, sim["ice_resistance"])
+
+What computes is libbergtow; see docs/library.md.
+"""
+from ._library import BergtowError, CaseError, library_path, start_mpi
+from .case import Case, quantities
+from .force import Bodies
+from .results import Result, open_result
+from .simulation import Simulation, run
+
+__version__ = "0.1.0"
+__all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Result", "Simulation", "library_path", "open_result",
+           "quantities", "run", "start_mpi"]

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""Forces as Python functions, called once a step with arrays of all bodies (bergtow/applied.h)."""
+import ctypes
+
+import numpy as np
+
+from . import _library
+
+_FX, _FY, _MOMENT, _G, _GX, _GY, _GW, _JX, _JY, _JW = range(_library.LOADS)
+
+
+def _view(pointer, *shape, writeable=False):
+    view = np.ctypeslib.as_array(pointer, shape)
+    view.flags.writeable = writeable
+    return view
+
+
+class Bodies:
+    """The bodies at the start of a step, as a force sees them; the arrays are valid during the call alone.
+
+    id [n]; place [n, 3] x, y, yaw (m, rad); velocity [n, 3] (m/s, rad/s); mass, inertia [n] with those of the water
+    carried along (kg, kg m²); time of the middle of the step, dt (s); water, air: velocities [2] (m/s); towed: row of
+    the towed body, None without.
+
+    A force adds to `force` [n, 2] (N) and `moment` [n] (N m), which are explicit, or calls drag() or adds to `load`
+    [n, 10], the rows of bergtow/applied.h, for what falls with the velocity.
+    """
+
+    def __init__(self, a):
+        n = a.n
+        self.id = _view(a.id, n)
+        self.place, self.velocity = _view(a.place, n, 3), _view(a.velocity, n, 3)
+        self.mass, self.inertia = _view(a.mass, n), _view(a.inertia, n)
+        self.load = _view(a.load, n, _library.LOADS, writeable=True)
+        self.force, self.moment = self.load[:, _FX:_FY + 1], self.load[:, _MOMENT]
+        self.time, self.dt = a.time, a.dt
+        self.water, self.air = np.array(a.water), np.array(a.air)
+        rows = np.flatnonzero(self.id == a.towed)
+        self.towed = int(rows[0]) if len(rows) else None
+
+    def drag(self, k, velocity):
+        """The linear force k (velocity − U), taken at the end of the step, so that no step is too long for it. k: one
+        number or [n], kg/s; velocity: [2] or [n, 2], m/s. A quadratic drag has k = c |velocity − U|."""
+        u = np.broadcast_to(velocity, (len(self.id), 2))
+        self.load[:, _G] += k
+        self.load[:, _JX] += k * u[:, 0]
+        self.load[:, _JY] += k * u[:, 1]
+
+
+class Forces:
+    """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
+    in turn with this one, does nothing in the steps of this."""
+
+    _callbacks = {}  # name -> the C function; kept for ever, as the library keeps its address
+    _owner = {}      # name -> the Forces that have it now
+    stepping = None  # whose simulation is in a step
+
+    def __init__(self, functions):
+        self.functions = dict(functions or {})
+        self.raised = None
+        for name in self.functions:
+            if name in self._owner:
+                raise _library.BergtowError(f"force {name}: belongs to a simulation that has not ended; end it, or "
+                                            "choose another name")
+        done = []
+        try:
+            for name in self.functions:
+                self._register(name)
+                done.append(name)
+        except Exception:
+            self._owner.update(dict.fromkeys(done, self))
+            self.release()
+            raise
+        self._owner.update(dict.fromkeys(self.functions, self))
+
+    def _register(self, name):
+        if name not in self._callbacks:
+            callback = _library.APPLIED_FORCE(lambda a, user: Forces._call(name, a))
+        else:
+            callback = self._callbacks[name]
+        function = self.functions[name]
+        doc = ((function.__doc__ or "").strip().splitlines() or [""])[0].rstrip(".")
+        self._apply(name, callback, doc if len(doc) >= 8 else f"force {name} of a Python program")
+        self._callbacks[name] = callback
+
+    @staticmethod
+    def _apply(name, callback, doc):
+        err = _library.Errors()
+        status = _library.library().bt_force_apply(name.encode(), doc.encode(), callback, None, ctypes.byref(err))
+        text = "\n".join(err.text[k].decode() for k in range(err.n))
+        _library.library().bt_errors_free(ctypes.byref(err))
+        if status != _library.OK:
+            raise _library.BergtowError(text, status)
+
+    @classmethod
+    def _call(cls, name, a):
+        forces = cls.stepping
+        if forces is None or name not in forces.functions:
+            return 0
+        try:
+            bodies = Bodies(a.contents)
+            answer = forces.functions[name](bodies)
+            if answer is not None:
+                answer = np.asarray(answer, float)
+                bodies.load[:, :answer.shape[1]] += answer  # [n, 2], or [n, 3] with moments
+            return 0
+        except BaseException as error:  # goes on when the step has returned
+            forces.raised = error
+            return 1
+
+    def release(self):
+        for name in self.functions:
+            if self._owner.get(name) is self:
+                del self._owner[name]
+                self._apply(name, _library.APPLIED_FORCE(), "")

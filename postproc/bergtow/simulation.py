@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: MIT
+"""Simulations that are stepped, and runs from case to result folder."""
+import ctypes
+import os
+import sys
+from ctypes import POINTER, c_double, c_void_p
+
+import numpy as np
+
+from . import _library
+from ._library import BergtowError
+from .case import Case
+from .force import Forces
+from .results import Result
+
+_KINDS = {"place": (0, 3), "velocity": (1, 3), "mass": (2, 2), "inertia": (3, 1), "area": (4, 1), "radius": (5, 1),
+          "thickness": (6, 1), "motion": (7, 1), "drag": (8, 5)}
+
+#: a contact of the last step (bergtow/simulation.h): ids, points, unit normal from a to b, impulses on b in N s
+CONTACT = np.dtype([("a", "i8"), ("b", "i8"), ("n_points", "i8"), ("point", "f8", (2, 2)), ("normal", "f8", 2),
+                    ("normal_impulse", "f8", 2), ("tangential_impulse", "f8")])
+
+
+def _pointer(array):
+    return array.ctypes.data_as(POINTER(c_double))
+
+
+class Simulation:
+    """A simulation of a case, step by step.
+
+        with Simulation(case, "out/my-run", forces={"my_drag": my_drag}) as sim:
+            sim.step(100)
+            sim.positions, sim.velocities, sim.contacts, sim["ice_resistance"]
+
+    out: a result folder as `bergtow run -o`, complete when the block ends; without it nothing is written. forces:
+    functions of Bodies by the name of their series (NAME_force). The block that is left by an exception writes no
+    summary. Arrays are copies, in the order of the ids: floes, the towed body, walls.
+    """
+
+    def __init__(self, case, out=None, *, forces=None, threads=0, replace=False, progress=False):
+        self._address = None
+        self._library = _library.library()
+        self.case = case if isinstance(case, Case) else Case(case)
+        self._forces = Forces(forces)
+        try:
+            if forces:
+                self.case = self.case.copy()
+            address = c_void_p()
+            o = _library.options(self.case, dir=None if out is None else os.fspath(out), replace=replace,
+                                 progress=progress, threads=threads,
+                                 command_line=" ".join(["python", *map(os.path.basename, sys.argv[:1])]))
+            _library.check(self._library.bt_simulation_create(ctypes.byref(address), ctypes.byref(o)))
+        except BaseException:
+            self._forces.release()
+            raise
+        self._address = address
+        self.folder = None if out is None else os.fspath(out)
+        #: id of the towed body, None without
+        self.towed = None if (towed := self._library.bt_simulation_towed(address)) < 0 else towed
+        self.n_bodies = self._library.bt_simulation_bodies(address)
+        self.dt = self._library.bt_simulation_dt(address)
+
+    @property
+    def _s(self):
+        if self._address is None:
+            raise BergtowError("the simulation has ended")
+        return self._address
+
+    # --- steps --------------------------------------------------------------------------------------------------------
+
+    def step(self, n=1):
+        """Make n steps, or as many as are left. An exception of a force comes out of here."""
+        self._forces.raised = None
+        Forces.stepping = self._forces
+        try:
+            status = self._library.bt_simulation_step(self._s, n)
+        finally:
+            Forces.stepping = None
+        if self._forces.raised is not None:
+            raise self._forces.raised
+        _library.check(status)
+
+    def end(self):
+        """Summary and last checkpoint, where there is a folder. Returns its Result, None without."""
+        address, self._address = self._s, None
+        try:
+            _library.check(self._library.bt_simulation_end(address))
+        finally:
+            self._forces.release()
+        return None if self.folder is None else Result(self.folder)
+
+    def drop(self):
+        """End without summary."""
+        if self._address is not None:
+            address, self._address = self._address, None
+            self._library.bt_simulation_drop(address)
+            self._forces.release()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if kind is not None:
+            self.drop()
+        elif self._address is not None:
+            self.end()
+
+    def __del__(self):
+        if getattr(self, "_address", None) is not None:
+            self.drop()
+
+    def checkpoint(self):
+        """Write a checkpoint into the folder, from which `bergtow resume` goes on."""
+        _library.check(self._library.bt_simulation_checkpoint(self._s))
+
+    @property
+    def steps(self):
+        return self._library.bt_simulation_steps(self._s)
+
+    @property
+    def steps_left(self):
+        return self._library.bt_simulation_steps_left(self._s)
+
+    @property
+    def time(self):
+        """s"""
+        return self._library.bt_simulation_time(self._s)
+
+    @property
+    def state_hash(self):
+        """The same text as in summary.json."""
+        return f"{self._library.bt_simulation_hash(self._s):016x}"
+
+    # --- bodies -------------------------------------------------------------------------------------------------------
+
+    def _read(self, name):
+        kind, width = _KINDS[name]
+        out = np.empty((self.n_bodies, width))
+        _library.check(self._library.bt_simulation_read(self._s, kind, _pointer(out)))
+        return out[:, 0] if width == 1 else out
+
+    positions = property(lambda self: self._read("place"), doc="[n, 3] x, y, yaw, m, m, rad")
+    velocities = property(lambda self: self._read("velocity"), doc="[n, 3] m/s, m/s, rad/s")
+    masses = property(lambda self: self._read("mass"), doc="[n, 2] with and without added mass, kg")
+    inertias = property(lambda self: self._read("inertia"), doc="[n] kg m²")
+    areas = property(lambda self: self._read("area"), doc="[n] m²")
+    radii = property(lambda self: self._read("radius"), doc="[n] of the circle about the outline, m")
+    thicknesses = property(lambda self: self._read("thickness"), doc="[n] of ice, m")
+    motions = property(lambda self: self._read("motion").astype(int),
+                       doc="[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever")
+    drags = property(lambda self: self._read("drag"),
+                     doc="[n, 5] skin (kg/m) and form (kg/m²) drag of the water, of the air, drag of turning (kg m²)")
+
+    def outline(self, body):
+        """[n, 2] m, anticlockwise, where the body is."""
+        n = self._library.bt_simulation_outline(self._s, body, None, 0)
+        out = np.empty((n, 2))
+        self._library.bt_simulation_outline(self._s, body, _pointer(out), n)
+        return out
+
+    def set_velocity(self, body, x, y, rate=0.0):
+        """m/s, m/s, rad/s. Refused for a body whose velocity is prescribed."""
+        _library.check(self._library.bt_simulation_set_velocity(self._s, body, x, y, rate))
+
+    def set_position(self, body, x, y, yaw):
+        """m, m, rad. Refused outside of the domain, over another body, and for a body that is towed."""
+        _library.check(self._library.bt_simulation_set_place(self._s, body, x, y, yaw))
+
+    # --- numbers ------------------------------------------------------------------------------------------------------
+
+    def __getitem__(self, name):
+        """A number of the last step by the name of its series, in SI units; NaN where it does not apply."""
+        value = c_double()
+        status = self._library.bt_simulation_quantity(self._s, name.encode(), ctypes.byref(value))
+        if status != _library.OK:
+            raise KeyError(self._library.bt_last_error().decode())
+        return value.value
+
+    @property
+    def contacts(self):
+        """Contacts of the last step, an array of the type CONTACT; those without impulse might have come about."""
+        n = self._library.bt_simulation_contacts(self._s, None, 0)
+        rows = np.empty((n, _library.CONTACT_COLUMNS))
+        self._library.bt_simulation_contacts(self._s, _pointer(rows), n)
+        out = np.empty(n, CONTACT)
+        out["a"], out["b"], out["n_points"] = rows[:, 0], rows[:, 1], rows[:, 2]
+        out["point"], out["normal"] = rows[:, 3:7].reshape(n, 2, 2), rows[:, 7:9]
+        out["normal_impulse"], out["tangential_impulse"] = rows[:, 9:11], rows[:, 11]
+        return out
+
+    def __repr__(self):
+        if self._address is None:
+            return "<bergtow.Simulation, ended>"
+        return f"<bergtow.Simulation of {self.n_bodies} bodies at {self.time:g} s, {self.steps_left} steps left>"
+
+
+def run(case, out, *, forces=None, threads=0, replace=False, progress=False):
+    """Run a case to its end and return its Result. out: the result folder. It can be interrupted between steps."""
+    with Simulation(case, out, forces=forces, threads=threads, replace=replace, progress=progress) as sim:
+        while sim.steps_left:
+            sim.step(10)
+        return sim.end()

@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: MIT
+// A simulation that a program steps; see bergtow/simulation.h. Steps are those of a run (run_parts.h); what stands here
+// is the way in and out of it: options, texts of errors, arrays by the ids of bodies.
+#include "bergtow/simulation.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/lock.h"
+#include "bergtow/checkpoint.h"
+#include "bergtow/quantity.h"
+#include "output/folder.h"
+#include "output/quantity_list.h"
+#include "run/run_parts.h"
+#include "space/cells.h"
+#include "step/edit.h"
+
+struct bt_simulation {
+    bt_case c;
+    bt_run_options o;
+    char *dir, *command_line; ///< what o points to
+    bt_running r;
+    bt_run_manner m;
+    bt_status status;         ///< of the last step
+};
+
+// --- texts of errors -------------------------------------------------------------------------------------------------
+
+static char *last_error;
+
+const char *bt_last_error(void) { return last_error ? last_error : ""; }
+
+/// Keep and release the texts of a call; the status goes through.
+static bt_status told(bt_status status, bt_errors *err)
+{
+    bt_comm_errors(bt_comm_world(), err);
+    if (status != BT_OK || err->n > 0) {
+        bt_text t;
+        bt_text_begin(&t);
+        for (size_t i = 0; i < err->n; i++) fprintf(t.out, "%s%s", i ? "\n" : "", err->text[i]);
+        free(last_error);
+        last_error = bt_text_end(&t);
+    }
+    bt_errors_free(err);
+    return status;
+}
+
+static bt_status refuse(const char *why)
+{
+    bt_errors err = {0};
+    bt_errors_add(&err, "%s", why);
+    return told(BT_ERR_USAGE, &err);
+}
+
+// --- begin, steps, end -----------------------------------------------------------------------------------------------
+
+static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors *err)
+{
+    *c = (bt_case){0};
+    if (!o->path && !o->text) {
+        bt_errors_add(err, "no case: give its file in path, or the case itself in text");
+        return BT_ERR_USAGE;
+    }
+    const char **place = bt_alloc((size_t)o->n_set, sizeof *place);
+    for (int i = 0; i < o->n_set; i++) place[i] = ""; // messages name the value itself, and no option --set
+    const bt_status status =
+        o->text ? bt_case_read_text(c, o->path ? o->path : "case", o->text, o->set, place, o->n_set, err)
+                : bt_case_read_placed(c, o->path, o->set, place, o->n_set, err);
+    free(place);
+    return status;
+}
+
+static char *copy_of(const char *text) { return text ? strcpy(bt_alloc(strlen(text) + 1, 1), text) : NULL; }
+
+static void release(bt_simulation *s)
+{
+    bt_lock_drop(s->dir, s->m.lock);
+    bt_case_free(&s->c);
+    free(s->dir);
+    free(s->command_line);
+    free(s);
+}
+
+bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *o)
+{
+    const bt_comm *comm = bt_comm_world();
+    bt_errors err = {0};
+    bt_simulation *s = bt_alloc(1, sizeof *s);
+    *out = NULL;
+    s->dir = copy_of(o->dir);
+    s->command_line = copy_of(o->command_line);
+    s->o = (bt_run_options){.dir = s->dir,
+                            .threads = o->threads,
+                            .quiet = !o->progress || comm->rank != 0,
+                            .dump_step = -1,
+                            .command_line = s->command_line,
+                            .leave_signals = !o->signals};
+    s->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
+    bt_status status = read_case(&s->c, o, &err);
+    if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, &err);
+    status = bt_comm_agree(comm, status);
+    if (status == BT_OK) {
+        status = bt_running_begin(&s->r, comm, &s->c, &s->o, &s->m, &err);
+        if (status != BT_OK) bt_running_end(&s->r, status, &err);
+    }
+    if (status == BT_OK) *out = s;
+    else release(s);
+    return told(status, &err);
+}
+
+bt_status bt_simulation_step(bt_simulation *s, int64_t n)
+{
+    bt_errors err = {0};
+    if (s->status != BT_OK) return refuse("a step has failed before; end the simulation");
+    for (; n > 0 && s->status == BT_OK && bt_running_goes_on(&s->r); n--) s->status = bt_running_step(&s->r, &err);
+    if (s->status == BT_OK && bt_halt_stops(s->r.asked)) {
+        bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)s->r.w->step);
+        s->status = BT_ERR_SIGNAL;
+    }
+    return told(s->status, &err);
+}
+
+bt_status bt_simulation_end(bt_simulation *s)
+{
+    bt_errors err = {0};
+    bt_status status = s->status == BT_ERR_SIGNAL ? BT_OK : s->status;
+    if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
+    status = bt_running_end(&s->r, status, &err);
+    release(s);
+    return told(status, &err);
+}
+
+void bt_simulation_drop(bt_simulation *s)
+{
+    if (!s) return;
+    bt_errors err = {0};
+    bt_running_end(&s->r, s->status == BT_OK ? BT_ERR_USAGE : s->status, &err);
+    bt_errors_free(&err);
+    release(s);
+}
+
+bt_status bt_simulation_checkpoint(bt_simulation *s)
+{
+    bt_errors err = {0};
+    if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
+    if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
+    return told(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
+}
+
+int64_t bt_simulation_steps(const bt_simulation *s) { return s->r.w->step; }
+int64_t bt_simulation_steps_left(const bt_simulation *s)
+{
+    return s->status == BT_OK && bt_running_goes_on(&s->r) ? s->r.end_step - s->r.w->step : 0;
+}
+double bt_simulation_dt(const bt_simulation *s) { return s->r.w->par.dt; }
+double bt_simulation_time(const bt_simulation *s) { return (double)s->r.w->step * s->r.w->par.dt; }
+uint64_t bt_simulation_hash(const bt_simulation *s) { return bt_world_hash(s->r.w); }
+
+// --- bodies ----------------------------------------------------------------------------------------------------------
+
+const int bt_body_widths[BT_BODY_KINDS] = {
+    [BT_BODY_PLACE] = 3,  [BT_BODY_VELOCITY] = 3,  [BT_BODY_MASS] = 2,   [BT_BODY_INERTIA] = 1, [BT_BODY_AREA] = 1,
+    [BT_BODY_RADIUS] = 1, [BT_BODY_THICKNESS] = 1, [BT_BODY_MOTION] = 1, [BT_BODY_DRAG] = 5,
+};
+
+int64_t bt_simulation_bodies(const bt_simulation *s) { return s->r.w->bodies.n_global; }
+int64_t bt_simulation_towed(const bt_simulation *s) { return s->r.w->towed; }
+
+static void numbers_of(const bt_bodies *b, bt_idx i, bt_body_numbers kind, double *out)
+{
+    const bt_pose *p = &b->pose[i];
+    const bt_vel *v = &b->vel[i];
+    const bt_drag *d = &b->drag[i];
+    switch (kind) {
+    case BT_BODY_PLACE: out[0] = p->x, out[1] = p->y, out[2] = p->yaw; break;
+    case BT_BODY_VELOCITY: out[0] = v->x, out[1] = v->y, out[2] = v->w; break;
+    case BT_BODY_MASS: out[0] = b->mass[i], out[1] = b->share[i] * b->mass[i]; break;
+    case BT_BODY_INERTIA: out[0] = b->inertia[i]; break;
+    case BT_BODY_AREA: out[0] = b->area[i]; break;
+    case BT_BODY_RADIUS: out[0] = b->radius[i]; break;
+    case BT_BODY_THICKNESS: out[0] = b->thickness[i]; break;
+    case BT_BODY_MOTION: out[0] = b->motion[i]; break;
+    case BT_BODY_DRAG:
+        memcpy(out, (const double[]){d->water_skin, d->water_form, d->air_skin, d->air_form, d->yaw}, 5 * sizeof *out);
+        break;
+    case BT_BODY_KINDS: break;
+    }
+}
+
+bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out)
+{
+    if ((unsigned)kind >= BT_BODY_KINDS) return refuse("there are no such numbers of a body; see bt_body_numbers");
+    const bt_bodies *b = &s->r.w->bodies;
+    const int width = bt_body_widths[kind];
+    for (bt_gid gid = 0; gid < b->n_global; gid++) {
+        const bt_idx i = b->index_of[gid];
+        if (i >= 0) numbers_of(b, i, kind, out + width * gid);
+        else
+            for (int k = 0; k < width; k++) out[width * gid + k] = NAN;
+    }
+    return BT_OK;
+}
+
+int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room)
+{
+    const bt_bodies *b = &s->r.w->bodies;
+    const bt_idx i = id < 0 || id >= b->n_global ? -1 : b->index_of[id];
+    if (i < 0) return 0;
+    const int n = bt_body_corners(b, i);
+    const double *v = b->outline + 2 * b->offset[i];
+    for (int k = 0; k < n && k < room; k++) {
+        xy[2 * k] = b->pose[i].x + v[2 * k];
+        xy[2 * k + 1] = b->pose[i].y + v[2 * k + 1];
+    }
+    return n;
+}
+
+bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate)
+{
+    bt_errors err = {0};
+    return told(bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
+}
+
+static bool is_outside(double x, double low, double length) { return x < low || x > low + length; }
+
+bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double y, double yaw)
+{
+    bt_errors err = {0};
+    const bt_params *p = &s->r.w->par;
+    const double length = s->c.domain.length, width = s->c.domain.width;
+    if (is_outside(x, p->x0, length) || is_outside(y, p->y0, width)) {
+        bt_errors_add(&err, "body %lld: (%g, %g) m is outside of the domain, %g x %g m from (%g, %g)", (long long)id, x,
+                      y, length, width, p->x0, p->y0);
+        return told(BT_ERR_USAGE, &err);
+    }
+    return told(bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err), &err);
+}
+
+// --- numbers and contacts --------------------------------------------------------------------------------------------
+
+bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, double *value)
+{
+    const bt_quantity *q = bt_series_find(name);
+    *value = NAN;
+    if (!q) {
+        bt_errors err = {0};
+        bt_errors_add(&err, "%s: there is no series of this name; see bergtow --list-quantities", name);
+        return told(BT_ERR_USAGE, &err);
+    }
+    if (s->r.w->step > s->r.first_step) *value = bt_sample_value(&s->r.sample, q);
+    return BT_OK;
+}
+
+/// Arms from body a, from their components along normal and tangent: r·n = r×t, r·t = −r×n.
+static void columns_of(const bt_bodies *b, const bt_contact *c, double *out)
+{
+    const bt_pose *p = &b->pose[c->a];
+    double at[2][2];
+    for (int i = 0; i < 2; i++) {
+        at[i][0] = p->x + c->rat * c->nx + c->ran[i] * c->ny;
+        at[i][1] = p->y + c->rat * c->ny - c->ran[i] * c->nx;
+        if (i >= c->n) at[i][0] = at[i][1] = NAN;
+    }
+    memcpy(out,
+           (const double[BT_CONTACT_COLUMNS]){
+               (double)b->gid[c->a], (double)b->gid[c->b], c->n, at[0][0], at[0][1], at[1][0], at[1][1], c->nx, c->ny,
+               c->ln[0], c->ln[1], c->lt},
+           BT_CONTACT_COLUMNS * sizeof *out);
+}
+
+int64_t bt_simulation_contacts(const bt_simulation *s, double *out, int64_t room)
+{
+    const bt_world *w = s->r.w;
+    int64_t n = 0;
+    for (bt_idx k = 0; k < w->cells->n; k++) {
+        const bt_cell *cell = &w->cells->cell[k];
+        for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++, n++)
+            if (n < room) columns_of(&w->bodies, &cell->contacts[j], out + BT_CONTACT_COLUMNS * n);
+    }
+    return n;
+}
+
+// --- cases and texts -------------------------------------------------------------------------------------------------
+
+bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved)
+{
+    bt_errors err = {0};
+    bt_case c;
+    const bt_status status = read_case(&c, o, &err);
+    *resolved = status == BT_OK ? bt_case_resolved(&c) : NULL;
+    bt_case_free(&c);
+    return told(status, &err);
+}
+
+char *bt_list_json(const char *what)
+{
+    const bool keys = !strcmp(what, "keys");
+    if (!keys && strcmp(what, "quantities") != 0) return NULL;
+    bt_text t;
+    bt_text_begin(&t);
+    (keys ? bt_case_list_keys_json : bt_quantities_list_json)(t.out);
+    return bt_text_end(&t);
+}
+
+void bt_release(char *text) { free(text); }
+
+const char *bt_version(void) { return BT_VERSION; }

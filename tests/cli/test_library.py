@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""libbergtow as a program outside of the tree meets it: installed, found by pkg-config, stepped, taken away again."""
+import os
+import re
+import subprocess
+
+import pytest
+from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, run, write_case
+
+EXAMPLES = ROOT / "tests/examples"
+EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
+CASE = changed(TOW, run__duration=10)
+WAVES = {"amplitude": 0.02, "period": 2, "direction": 30}
+
+
+def make(*arguments):
+    # not as a part of the make that may have started this test
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    result = subprocess.run(["make", "--no-print-directory", *arguments], cwd=ROOT, capture_output=True, text=True,
+                            timeout=600, env=own)
+    assert result.returncode == DONE, result.stdout + result.stderr
+
+
+def everything(folder):
+    return {str(p.relative_to(folder)) for p in folder.rglob("*")}
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    """A prefix that holds something of another program."""
+    folder = tmp_path_factory.mktemp("prefix")
+    (folder / "lib").mkdir()
+    (folder / "lib/other.txt").write_text("not ours\n")
+    make("install", f"PREFIX={folder}")
+    return folder
+
+
+def flags(prefix, *what):
+    return subprocess.run(["pkg-config", *what, "bergtow"], capture_output=True, text=True, check=True,
+                          env=os.environ | {"PKG_CONFIG_PATH": str(prefix / "lib/pkgconfig")}).stdout.split()
+
+
+@pytest.fixture(scope="module", params=["shared", "static"])
+def program(request, prefix, tmp_path_factory):
+    """The example, outside of the tree, with the library as pkg-config has it."""
+    folder = tmp_path_factory.mktemp(request.param)
+    for name in ("simulation.c", "force_law.c"):
+        (folder / name).write_text((EXAMPLES / name).read_text())
+    static = request.param == "static"
+    libraries = flags(prefix, "--libs", *(["--static"] if static else []))
+    if static:  # the linker takes a shared library where both are there
+        libraries = [str(prefix / "lib/libbergtow.a") if word == "-lbergtow" else word for word in libraries]
+    subprocess.run(["gcc", "-std=c17", "-Wall", "-Wextra", "-Werror", "simulation.c", *flags(prefix, "--cflags"),
+                    *libraries, f"-Wl,-rpath,{prefix / 'lib'}", "-lm", "-o", "simulation"], cwd=folder, check=True)
+    needed = subprocess.run(["ldd", folder / "simulation"], capture_output=True, text=True, check=True).stdout
+    assert ("libbergtow.so.0" in needed) != static
+    return folder / "simulation"
+
+
+def stepped(program, case, *overrides):
+    result = subprocess.run([program, case, *overrides], capture_output=True, text=True, timeout=120,
+                            env=environment(OMP_NUM_THREADS=1))
+    assert result.returncode == 0, result.stderr
+    return re.search(r"state_hash (\w+)", result.stdout)[1]
+
+
+def test_a_program_has_the_state_of_the_command(program, tmp_path):
+    case = write_case(tmp_path, CASE)
+    assert stepped(program, case) == run(tmp_path, case).hash
+
+
+def test_a_program_with_a_law_has_the_state_of_the_extended_one(program, tmp_path):
+    case = write_case(tmp_path, CASE | {"wave_drift": WAVES})
+    subprocess.run([EXTENDED, "run", case, "-o", tmp_path / "out", "-q"], check=True, env=environment())
+    hash_of = re.search(r'"state_hash": "(\w+)"', (tmp_path / "out/summary.json").read_text())[1]
+    assert stepped(program, case) == hash_of
+    assert stepped(program, case, "wave_drift.amplitude=0") != hash_of
+
+
+def test_a_faulty_case_is_a_message_and_not_the_end(program, tmp_path):
+    case = write_case(tmp_path, changed(CASE, tow__sped=1))
+    result = subprocess.run([program, case], capture_output=True, text=True)
+    assert result.returncode == 1 and "tow.sped: unknown key; did you mean tow.speed?" in result.stderr
+
+
+def test_the_page_shows_the_example():
+    page = (ROOT / "docs/library.md").read_text()
+    assert re.search(r"```c\n(.*?)```", page, re.DOTALL)[1] == (EXAMPLES / "simulation.c").read_text()
+
+
+def test_the_library_exports_what_public_headers_name(prefix):
+    out = subprocess.run(["nm", "-D", "--defined-only", prefix / "lib/libbergtow.so"], capture_output=True, text=True,
+                         check=True).stdout
+    exported = {name.split("@")[0] for *_, kind, name in map(str.split, out.splitlines()) if kind != "A"}
+    headers = " ".join(h.read_text() for h in (prefix / "include/bergtow").glob("*.h"))
+    assert exported and all(re.search(rf"\b{name}\b", headers) for name in exported)
+    declared = set(re.findall(r"\b(bt_\w+)\(", (prefix / "include/bergtow/simulation.h").read_text()))
+    assert declared - {"bt_on_out_of_memory", "bt_comm_start"} <= exported
+    assert {"bt_on_out_of_memory", "bt_comm_start", "bt_force_apply", "bt_quantity_register"} <= exported
+
+
+def test_man_page_and_completions_know_every_option(prefix):
+    page = (prefix / "share/man/man1/bergtow.1").read_text().replace("\\-", "-")
+    bash = (prefix / "share/bash-completion/completions/bergtow").read_text()
+    zsh = (prefix / "share/zsh/site-functions/_bergtow").read_text()
+    commands = re.findall(r"^  ([a-z]+)  ", call("--help").stdout, re.MULTILINE)
+    assert len(commands) >= 9
+    for name in commands:
+        said = call(name, "--help").stdout
+        options = set(re.findall(r"(?<![\w-])--[a-z][\w-]*", re.sub(r"(?m)^.*\[-h\].*(\n {5,}.*)*", "", said)))
+        options = {o for o in options if re.search(rf"(?m)^ +(?:-\S(?: \S+)?, )?{o}\b", said)}
+        assert {"--help"} <= options
+        section = page[page.index(f".SS bergtow {name} "):].split(".SS", 2)[1]
+        in_bash = re.search(rf"^    {name}\) options='(.*)' ;;$", bash, re.MULTILINE)[1].split()
+        in_zsh = re.search(rf"^  {name}\) (.*?);;$", zsh, re.MULTILINE | re.DOTALL)[1]
+        for option in options:
+            assert f"\\fB{option}\\fR" in section and option in in_bash, (name, option)
+            assert re.search(rf"'{option}[=\[]", in_zsh), (name, option)
+    subprocess.run(["bash", "-n", prefix / "share/bash-completion/completions/bergtow"], check=True)
+
+
+def test_completion_offers_commands_and_options(prefix):
+    def offered(*words):
+        script = (f"source {prefix}/share/bash-completion/completions/bergtow; COMP_WORDS=({' '.join(words)}); "
+                  f"COMP_CWORD={len(words) - 1}; _bergtow; echo ${{COMPREPLY[@]}}")
+        return subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
+
+    assert offered("bergtow", "re") == ["resume"]
+    assert offered("bergtow", "run", "--st") == ["--steps"]
+    assert offered("bergtow", "check", "--st") == []
+
+
+def test_installed_commands_find_their_scripts(prefix, tmp_path):
+    result = subprocess.run([prefix / "bin/bergtow", "converge", "--help"], capture_output=True, text=True,
+                            cwd=tmp_path, env={k: v for k, v in os.environ.items() if k != "BERGTOW_HOME"})
+    assert result.returncode == 0 and "CASE.yml" in result.stdout
+
+
+def test_uninstall_leaves_what_is_not_ours(tmp_path):
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib/other.txt").write_text("not ours\n")
+    before = everything(tmp_path)
+    make("install", f"PREFIX={tmp_path}")
+    subprocess.run([tmp_path / "bin/bergtow", "converge", "--help"], stdout=subprocess.DEVNULL, check=True,
+                   env={k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"})
+    assert (tmp_path / "share/bergtow/postproc/__pycache__").exists()  # what Python adds goes, too
+    make("install", f"PREFIX={tmp_path}")  # over an older one
+    assert {"bin/bergtow", "lib/libbergtow.so.0", "share/man/man1/bergtow.1"} <= everything(tmp_path) - before
+    make("uninstall", f"PREFIX={tmp_path}")
+    assert everything(tmp_path) == before
+
+
+def test_destdir_is_no_part_of_what_is_installed(tmp_path):
+    make("install", "PREFIX=/usr", f"DESTDIR={tmp_path}")
+    assert str(tmp_path) not in (tmp_path / "usr/lib/pkgconfig/bergtow.pc").read_text()
+    make("uninstall", "PREFIX=/usr", f"DESTDIR={tmp_path}")
+    assert everything(tmp_path) == set()
