@@ -26,6 +26,7 @@ static const struct {
      true},
     {"converge", "find out what of the computation a result depends on: width, length, time step, tolerance, start",
      bt_cmd_script, false},
+    {"design", "from a case or a study to the report of the design tow force, as a page and as PDF", bt_cmd_script, false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},
