@@ -34,7 +34,7 @@ import yaml
 BUDGET = 13.0                # min
 CONCENTRATIONS = "0.6,0.7,0.8,0.9"
 MOST_FIELDS = 40
-RESERVE = 60.0               # s of the budget for statistics and pages
+RESERVE = 45.0, 15.0         # s of the budget for pages, and for the statistics of each condition
 MARGIN = 0.95                # of what is left is given to fields
 SHARE = 0.6                  # of these are run before it is measured anew how long one takes
 REPLAY_FRAMES = 120
@@ -250,8 +250,9 @@ def main(argv=None):
     for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         command.may_write(a.output / name, a.force)
     a.output.mkdir(parents=True, exist_ok=True)
-    end = began + 60 * a.budget - RESERVE if a.budget else np.inf
-    work = Work(program(), a.output, a.set, a.jobs, max(end, began + 5), a.quiet)
+    reserve = RESERVE[0] + RESERVE[1] * len(a.concentrations)
+    end = began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
+    work = Work(program(), a.output, a.set, a.jobs, end, a.quiet)
     if study:
         work.ensemble(a.file)
     else:

@@ -223,7 +223,7 @@ def of_part(name, part):
     """(heading, blocks) of a part of report_parts.py."""
     figure = part.get("figure")
     drawn = report_run.picture(name, part["heading"], figure) if figure else None
-    return part["heading"], blocks(part["markdown"]) + ([drawn] if drawn else [])
+    return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
 
 
 def beside(folders):
@@ -274,7 +274,8 @@ def context(folder, place=None, given=None, also=()):
     intro, found = sections(ensemble_text.report(s, markdown=True))
     rows, other_builds = provenance(e)
     values, texts, attributes = first_run(e)
-    values = [replace(v, value=report_case.short(v.value)) for v in varied(e, values)]
+    values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
+              for v in varied(e, values)]
     case = statement.case_of(e, e.used)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())

@@ -275,7 +275,7 @@ def provenance(run):
             ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
             ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"),
             ("state hash", run.summary.get("state_hash")), ("folder", run.path.resolve().name)]
-    return [(name, str(value)) for name, value in rows if value not in (None, "")]
+    return [(name, report_case.scrubbed(str(value))) for name, value in rows if value not in (None, "")]
 
 
 def stamp(run):
