@@ -141,7 +141,7 @@ DEPS := build-essential pkg-config git \
         libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libxxhash-dev libcmocka-dev \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
-        python3-pytest ffmpeg chromium chromium-driver python3-selenium
+        python3-pytest ffmpeg chromium chromium-driver python3-selenium poppler-utils
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \

@@ -5,10 +5,10 @@
     design.py STUDY.yml -o DIR                     the same of a study, with the fields that it asks for
 
 Of a case a study is made: over concentrations, with as many fields of each as the budget allows. The first field of
-each condition is run, then some of those that fit into what is left, by the time which the last ones took, and so on; so
-conditions have equally many, and nothing is cut off half-way. Should the time run out all the same, the fields that are
-complete in every condition are taken. Members are independent: one process of one thread a core. The same call goes on where an
-earlier one ended.
+each condition is run, then some of those that fit into what is left, by the time which the last ones took, and so on;
+so conditions have equally many, and nothing is cut off half-way. Should the time run out all the same, the fields that
+are complete in every condition are taken. Members are independent: one process of one thread a core. The same call
+goes on where an earlier one ended.
 """
 import argparse
 import os
@@ -120,7 +120,8 @@ def write_study(a, case, repeats):
     if values:
         study["parameters"] = {"ice.concentration": values}
     path = a.output / "design.yml"
-    command.write_text(f"# {command.MARK}\n" + yaml.safe_dump(study, sort_keys=False, allow_unicode=True), path, a.force)
+    text = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
+    command.write_text(f"# {command.MARK}\n{text}", path, a.force)
     return path
 
 
@@ -190,9 +191,9 @@ def make_replay(work, a, left):
             return
         step = run.value("run.duration") / REPLAY_FRAMES
     with tempfile.TemporaryDirectory(dir=a.output, prefix="replay-") as folder:
-        done = subprocess.run([str(work.program), "run", str(e.folder(m) / "case.resolved.yml"), "-o", folder, "--quiet",
-                               "--set", f"output.frame_interval={step:g}s", "--threads", str(work.jobs)],
-                              capture_output=True, text=True)
+        call = [str(work.program), "run", str(e.folder(m) / "case.resolved.yml"), "-o", folder, "--quiet", "--threads",
+                str(work.jobs), "--set", f"output.frame_interval={step:g}s"]
+        done = subprocess.run(call, capture_output=True, text=True)
         if done.returncode:
             print(f"design.py: warning: no replay: {(done.stderr.strip().splitlines() or ['no reason given'])[0]}",
                   file=sys.stderr)

@@ -271,6 +271,7 @@ def draw_sweep(e, key):
         handles, labels, away = style.legend_of(axes)
         extra |= {label: handle for handle, label in zip(handles, labels) if label not in extra}
         lost |= dict.fromkeys(away)
+    lost = [label for label in lost if label not in extra]
     for axes in grid.flat[len(shown):]:
         axes.set_visible(False)
     for k, axes in enumerate(grid.flat[:len(shown)]):
@@ -283,7 +284,7 @@ def draw_sweep(e, key):
     note = " ".join(
         ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
         (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else []) +
-        ([f"Out of the picture: {', '.join(away)}."] if (away := [label for label in lost if label not in extra]) else []) +
+        ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
             stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
     height = figure.get_size_inches()[1]

@@ -30,7 +30,8 @@ from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
 
 import numpy as np
 
-PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")  #: keys that no result follows from
+#: keys that no result follows from
+PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 WARNED = "WARNING: "
 #: as ensemble.py has them
@@ -149,7 +150,7 @@ def members(e, s):
             "name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "doubts": ", ".join(sorted(e.doubts(m))),
-            "told": [scrubbed(w) for w in (told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else [])]
+            "told": [scrubbed(w) for w in (told(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
         })
     return out
 
@@ -200,9 +201,9 @@ def pictures(e, options, s):
 #: chapters of the tables of ensemble_text.py: heading, tables, beginnings of the names of the pictures behind each
 CHAPTERS = (("Loads", (("Loads", ()), ("Return levels of loads", ("returns", )),
                        ("Peaks of collisions", ("exceedance", )))),
-            ("Mean ice resistance", (("Mean ice resistance", ("sweep", "map", "variants")), ("Beside the estimates", ()),
-                                     ("Distributions", ()), ("Sensitivity of the mean ice resistance",
-                                                             ("sensitivity", )))))
+            ("Mean ice resistance",
+             (("Mean ice resistance", ("sweep", "map", "variants")), ("Beside the estimates", ()),
+              ("Distributions", ()), ("Sensitivity of the mean ice resistance", ("sensitivity", )))))
 
 
 def parts(found, drawn):
@@ -283,7 +284,8 @@ def context(folder, place=None, given=None, also=()):
     warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
-        "answer": answer(e, s, case), "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
+        "answer": answer(e, s, case),
+        "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
         "method": report_method.method(s, case), "limits": report_method.limits(s, case),
         "assumed": [v for v in values if v.kind not in ("source", "default", "unused", "field")
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],

@@ -75,8 +75,8 @@ def limits(s, case):
                                   _one(texts, "ice.crushing.pressure", "their edges crush at")
                                   if not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ") else "") if word]
         out.append(f"Floes are otherwise rigid, {' and '.join(ways)}; they neither break nor bend.")
-    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and there "
-               "are no waves.")
+    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
+               "there are no waves.")
     out.append({
         "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
                  "the tow force holds no dynamics of the line.",

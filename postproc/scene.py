@@ -216,7 +216,8 @@ class Scene:
         self._track = Line2D([], [], color=style.TRACK, linewidth=1.1, dashes=(1, 2.2), dash_capstyle="round",
                              alpha=0.9, zorder=3, **kept)
         self._line = Line2D([], [], color=style.BODY_EDGE, linewidth=1.3, marker="s", markersize=4.5, markevery=[1],
-                            path_effects=[patheffects.withStroke(linewidth=3, foreground=style.HALO)], zorder=5.5, **kept)
+                            path_effects=[patheffects.withStroke(linewidth=3, foreground=style.HALO)], zorder=5.5,
+                            **kept)
         self._body = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY, edgecolor=style.BODY_EDGE,
                              linewidth=1.2, zorder=6, visible=run.towed is not None, **kept)
         self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """A figure as SVG that stands in a page: its colours follow the page's, light or dark, and its text is text.
 
-Each colour of style.DARK becomes a variable of the page's styles, so that one drawing serves both and the printed page;
-all other colours, those of ice and water, stay as they are. Rejected: two drawings, of which the browser shows one; they
-double the page. Letters stay letters, in the font that the sizes were computed with or in Verdana, whose letters are as
-wide; as outlines they could be neither searched nor copied.
+Each colour of style.DARK becomes a variable of the page's styles, so that one drawing serves both and the printed
+page; all other colours, those of ice and water, stay as they are. Rejected: two drawings, of which the browser shows
+one; they double the page. Letters stay letters, in the font that the sizes were computed with or in Verdana, whose
+letters are as wide; as outlines they could be neither searched nor copied.
 """
 import io
 import re

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""No script of postproc/ replaces a file that none of them made, unless it is told to: each script, each kind of file."""
+"""No script of postproc/ replaces a file that none of them made, unless it is told to: every script, every kind of
+file."""
 import re
 import shutil
 import sys
@@ -10,7 +11,7 @@ import pytest
 from PIL import Image
 
 import made_up_ensemble as made_up
-from harness import TOW, call, changed, run, write_case
+from harness import TOW, call, changed, write_case
 from test_postproc import script
 
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
@@ -33,6 +34,7 @@ import report_run  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 
 DEAR = b"dear to somebody"
+REFUSED = ": is there already, and was not made by these scripts; .*--force"
 #: script: (module, arguments; RUN and ALL stand for the folders of a run and of an ensemble, and files it writes into
 #: the working folder), in each line another kind of file
 CALLS = [
@@ -92,14 +94,14 @@ def test_files_of_others_are_kept(quick, tmp_path, module, words, files, monkeyp
     if module is design:  # what it writes is made below, by the others, and by test_design.py
         for name in files:
             (tmp_path / name).write_bytes(DEAR)
-            with pytest.raises(RunError, match=f"{name}: is there already, and was not made by these scripts; .*--force"):
+            with pytest.raises(RunError, match=name + REFUSED):
                 module.main(words)
             assert (tmp_path / name).read_bytes() == DEAR
             (tmp_path / name).unlink()
         return
     for name in files:
         (tmp_path / name).write_bytes(DEAR)
-        with pytest.raises(RunError, match=f"{name}: is there already, and was not made by these scripts; .*--force"):
+        with pytest.raises(RunError, match=name + REFUSED):
             module.main(words)
         assert (tmp_path / name).read_bytes() == DEAR
         if name != files[-1]:

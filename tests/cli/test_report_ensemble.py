@@ -93,11 +93,24 @@ def test_numbers_are_those_of_the_statistics(page, study):
     assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
     answer = found["Answer"]
     assert [row[0] for row in answer[1:]] == ["concentration 0.2", "concentration 0.5"] and answer[1][-2] == "4"
-    for row, c in zip(answer[1:], s["conditions"]):
-        d = c["design"]["tow"]
-        wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
-        assert abs(newtons(row[1]) - d["value"]) <= 0.06 * wide + 0.006 * d["value"]
-        assert row[1].endswith("*") == d["beyond_data"] and newtons(row[3]) == pytest.approx(d["mean"], rel=0.006)
+
+
+def test_the_answer_is_the_design_statement(tmp_path):
+    """Rounded to what the interval leaves; of fields that are long enough for a tail."""
+    rng = np.random.default_rng(8)
+    e = Ensemble(made_up.write(tmp_path / "out", [
+        member(made_up.ar1(0.6, 4000, rng, 100.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
+    s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
+    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None)
+    row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
+    wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
+    assert abs(newtons(row[1]) - d["value"]) <= max(0.06 * wide, 0.006 * d["value"])
+    assert row[1].endswith("*") == d["beyond_data"] and newtons(row[3]) == pytest.approx(d["mean"], rel=0.006)
+    ends = row[2].removesuffix(" N").split(" to ")
+    assert [float(v) for v in ends if v != "no bound"] == pytest.approx(
+        [v for v in d["interval_95"] if np.isfinite(v)], abs=max(0.06 * wide, 0.006 * d["value"]))
+    figure = next(b for b in blocks if b["kind"] == "figure")
+    assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
 
 
 def test_every_member_stands_there_with_its_doubts(page, study):
