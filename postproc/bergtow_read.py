@@ -128,6 +128,18 @@ def parse_case(text):
     return out
 
 
+def case_value(case, key, default=np.nan):
+    """Number of a key of parse_case in SI units and radians; default where it is missing or no number."""
+    match = re.match(r"^([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)", case.get(key, ""))
+    if not match or match[2] not in _UNITS:
+        return default
+    up, down = _UNITS[match[2] or ("deg" if key in _ANGLES else "")]
+    try:
+        return float(match[1]) * up / down
+    except ValueError:
+        return default
+
+
 class Run:
     """The output folder of one run.
 
@@ -340,14 +352,7 @@ class Run:
 
     def value(self, key, default=np.nan):
         """Number of a case key in SI units and radians; default where it is missing or no number."""
-        match = re.match(r"^([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)", self.case.get(key, ""))
-        if not match or match[2] not in _UNITS:
-            return default
-        up, down = _UNITS[match[2] or ("deg" if key in _ANGLES else "")]
-        try:
-            return float(match[1]) * up / down
-        except ValueError:
-            return default
+        return case_value(self.case, key, default)
 
     @property
     def geographic(self):

@@ -19,27 +19,22 @@ look is made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejec
 too small where floes jam and too large where nothing happens.
 """
 import argparse
-import hashlib
-import json
 import os
-import shutil
-import subprocess
 import time
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import command
 import converge_text
 import stat_mean
 from bergtow_read import Run, RunError
+from case_runs import SPENT, CaseRuns, above_zero, plain, program
 
 import numpy as np
 from scipy import stats
 
 FIELDS = (4, 8, 16, 32, 64)  # of each look
 LOOKS = len(FIELDS)
-STOPPED, SPENT = 6, "the budget is spent"  # exit code of a run that met its limit
 TRIES = 3                   # values of a quantity after each other, at most
 MARGIN = 0.1
 BUDGET = 10.0               # min
@@ -100,90 +95,6 @@ KINDS = (
          "tighter"),
 )
 NAMES = tuple(k.name for k in KINDS) + ("window", "fields")
-
-
-# ---- runs
-
-
-@dataclass
-class Study:
-    """The runs of a convergence study, made when they are asked for and kept in folders."""
-
-    case: Path
-    folder: Path
-    program: Path
-    given: list            #: --set of the user's
-    jobs: int
-    end: float             #: of what is left to a quantity, by time.monotonic()
-    last: float            #: of the budget
-    seconds: dict = field(default_factory=dict)  #: of a run, by setting
-
-    def __post_init__(self):
-        version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
-        #: a run is kept while the case, the program and the values are what they were
-        self.identity = hashlib.sha256(self.case.read_bytes() + version).hexdigest()
-
-    def path(self, name, i):
-        return self.folder / "converge" / name / f"f{i + 1:03d}"
-
-    def arguments(self, name, i, values):
-        sets = [*self.given, "output.frame_interval=-1 s", *(f"{k}={v:.12g}" for k, v in values.items()),
-                f"ice.seed={1000 + i}"]
-        out = [str(self.program), "run", str(self.case), "-o", str(self.path(name, i)), "--quiet", "--threads", "1"]
-        return out + [part for text in sets for part in ("--set", text)]
-
-    def kept(self, name, i, values):
-        path = self.path(name, i)
-        try:
-            return (path / "summary.json").exists() and json.loads(
-                (path / "call.json").read_text()) == [self.identity, *self.arguments(name, i, values)]
-        except (OSError, ValueError):
-            return False
-
-    def one(self, name, i, values):
-        """One run, unless it is there already; None, or why it failed."""
-        path, call = self.path(name, i), self.arguments(name, i, values)
-        told = path / "call.json"
-        if self.kept(name, i, values):
-            return None
-        shutil.rmtree(path, ignore_errors=True)
-        path.mkdir(parents=True)
-        t0 = time.monotonic()
-        left = max(1.0, self.last - time.monotonic())
-        done = subprocess.run([*call, "--max-wall", f"{left:.3f}"],
-                              capture_output=True,
-                              text=True,
-                              env=os.environ | {"OMP_NUM_THREADS": "1"})
-        if done.returncode == STOPPED:
-            return SPENT
-        if done.returncode:
-            lines = done.stderr.strip().splitlines()
-            return lines[0] if lines else f"exit code {done.returncode}"
-        told.write_text(json.dumps([self.identity, *call]))
-        self.seconds[name] = time.monotonic() - t0
-        return None
-
-    def there(self, name, n, values):
-        """Are n runs there now, or could they be made? False where the budget does not reach so far."""
-        missing = [i for i in range(n) if not self.kept(name, i, values)]
-        expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-len(missing) // self.jobs)
-        if missing and time.monotonic() + expected > self.end:
-            return False
-        with ThreadPoolExecutor(self.jobs) as pool:
-            why = [w for w in pool.map(lambda i: self.one(name, i, values), range(n)) if w]
-        if SPENT in why:
-            return False
-        if why:
-            raise RunError(self.path(name, 0), f"a run of {name} failed: {why[0]}",
-                           "mend the case" if name == "case" else "leave it out of --vary")
-        return True
-
-    def measured(self, name, n, measure):
-        out = []
-        for i in range(n):
-            with Run(self.path(name, i)) as run:
-                out.append(measure(run))
-        return np.array(out, dtype=float)
 
 
 # ---- effects
@@ -317,38 +228,12 @@ def converge(study, names, margin, tries=TRIES):
     return rows
 
 
-def plain(value):
-    """As JSON has it: what is not finite is null."""
-    if isinstance(value, dict):
-        return {k: plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
-
-
 def names_of(text):
     found = [part.strip() for part in text.split(",") if part.strip()]
     for name in found:
         if name not in NAMES:
             raise argparse.ArgumentTypeError(f"{name}: is none of {', '.join(NAMES)}")
     return found
-
-
-def above_zero(text):
-    value = float(text)
-    if not (np.isfinite(value) and value > 0):
-        raise argparse.ArgumentTypeError(f"{text} is not above zero")
-    return value
-
-
-def program():
-    """The binary: BERGTOW, or the one built beside this script."""
-    path = Path(os.environ.get("BERGTOW") or Path(__file__).resolve().parents[1] / "build/release/bergtow")
-    if not os.access(path, os.X_OK):
-        raise RunError(path, "no such program", "build it with make, or name it in BERGTOW")
-    return path.resolve()
 
 
 def main(argv=None):
@@ -372,8 +257,8 @@ def main(argv=None):
         raise RunError(a.case, "no such file", "name a case file")
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
     command.may_write(folder / "converge.json", a.force)
-    study = Study(a.case.resolve(), folder, program(), a.set, max(1, a.jobs), began + 60 * a.budget,
-                  began + 60 * a.budget)
+    study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, max(1, a.jobs), began + 60 * a.budget,
+                     began + 60 * a.budget)
     rows = converge(study, a.vary, a.margin, a.tries)
     found = {"case": str(a.case), "set": a.set, "margin": a.margin, "budget_min": a.budget, "looks": LOOKS,
              "spent_min": (time.monotonic() - began) / 60, "rows": rows}

@@ -23,7 +23,7 @@ import command
 import pdf
 import report
 from bergtow_read import Run, RunError
-from converge import above_zero, program
+from case_runs import STOPPED, above_zero, program
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
 from report_case import TITLE_BLOCK
@@ -39,7 +39,6 @@ MARGIN = 0.95                # of what is left is given to fields
 SHARE = 0.6                  # of these are run before it is measured anew how long one takes
 REPLAY_FRAMES = 120
 FEW = 5                      # fields below which nothing is known of the scatter between them
-STOPPED = 6                  # exit code of an ensemble that met its limit
 
 
 @dataclass

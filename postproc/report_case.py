@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 
 from bergtow_read import RunError
-from converge import program
+from case_runs import program
 
 import numpy as np
 import yaml
@@ -104,9 +104,11 @@ def of_study(run):
         for name, keys in (variants if isinstance(variants, dict) else {}).items()
         if isinstance(keys, dict)
     }
-    return {"ice.seed": ""
-            } | {str(key): said.get(f"{name}.{key}", ("", ""))[1]
-                 for name, keys in groups.items() for key in keys}
+    def words(name, key, value):
+        """The comment beside a key, or the source that a range names."""
+        return said.get(f"{name}.{key}", ("", ""))[1] or (str(value.get("source", "")) if isinstance(value, dict) else "")
+    return {"ice.seed": ""} | {str(key): words(name, key, value) for name, keys in groups.items()
+                               for key, value in keys.items()}
 
 
 def classify(words):

@@ -253,9 +253,14 @@ def first_run(e):
 
 
 def varied(e, values):
-    """The values, those that differ between members named so."""
-    keys = {key for key, some in e.parameters.items() if len(set(some.tolist())) > 1} | {"ice.seed"}
-    return [replace(v, value="varied") if v.key in keys else v for v in values]
+    """The values; of those that differ between members, their range."""
+    words = {"ice.seed": "varied"}
+    for key, some in e.parameters.items():
+        if len(set(some.tolist())) > 1:
+            unit = e.units[key] if e.units[key] != "1" else ""
+            words[key] = "varied" if some.dtype == object else \
+                f"varied, {np.nanmin(some):.4g} to {np.nanmax(some):.4g} {unit}".strip()
+    return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
 
 
 def replays(e, place):

@@ -8,6 +8,7 @@
 //     parameters:
 //       ice.concentration: [0.2, 0.5, 0.8]                                    # a list
 //       tow.speed: {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}             # a range
+//       ice.friction: {from: 0.05, to: 0.5, distribution: triangular, source: Sukhorukov & Løset 2013}
 //     variants:                            # sets of keys that go together, as one more parameter
 //       squares: {ice.shape: rectangles}
 //       hexagons: {ice.shape: polygons, ice.sides: 6}
@@ -24,6 +25,10 @@
 // The keys, with defaults and ranges: src/case/study_keys.c, bergtow --list-keys. Members write no frames unless the
 // study sets output.frame_interval: eighty members of 300,000 floes with the frames of a single run would fill 630 GB.
 //
+// A range is a distribution, which a Latin hypercube draws from: uniform between its ends; triangular, its peak in the
+// middle; normal, with 95 % between its ends and nothing beyond three standard deviations; each on the linear scale or,
+// with scale log, of the logarithm. The source stands in ensemble.h5 and in the reports.
+//
 // A condition is a combination of values; a member is one field of a condition, named cCCC-rRRR. Its ice.seed follows
 // from (seed, condition, repeat) alone (with common fields from (seed, repeat)), so more repeats may be asked for later
 // without changing a member.
@@ -33,6 +38,7 @@
 #include "bergtow/case.h"
 
 typedef enum { BT_SAMPLING_GRID, BT_SAMPLING_LATIN_HYPERCUBE } bt_sampling;
+typedef enum { BT_UNIFORM, BT_TRIANGULAR, BT_NORMAL } bt_distribution;
 
 enum { BT_MAX_PARAMETERS = 32, BT_MAX_MEMBERS = 100000 };
 
@@ -43,7 +49,9 @@ typedef struct bt_study_parameter {
     int key;             ///< index into the keys of a case, −1 = the variants
     bool continuous;     ///< a range: a Latin hypercube draws from all of it
     bool logarithmic;
+    bt_distribution distribution; ///< of a range, in a Latin hypercube
     double from, to;     ///< of a range, SI
+    char *source;        ///< of a range: where it is from; or NULL
     int n;               ///< values of a list, or of a range in a grid
     char **value;        ///< [n] texts; of the variants: their names
     int64_t *stratum;    ///< [n_conditions] place of each condition in a Latin hypercube; NULL in a grid
@@ -95,6 +103,9 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
 /// then. Errors: BT_ERR_CASE, also for a key that the study varies.
 bt_status bt_study_override(bt_study *s, const char *const *set, int n, bt_errors *err);
 void bt_study_free(bt_study *s);
+
+/// The distribution of a parameter in words, "" for one without; the caller frees it.
+char *bt_study_distribution(const bt_study_parameter *p);
 
 /// Are there ranks enough for a member? Errors: BT_ERR_CASE.
 bt_status bt_study_fits(const bt_study *s, int ranks, bt_errors *err);

@@ -180,7 +180,9 @@ static void print_parameter(const bt_study *s, const bt_study_parameter *p)
 {
     printf("%-20s ", p->name);
     if (p->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
-        printf("%.6g to %.6g%s\n", p->from, p->to, p->logarithmic ? ", logarithmic" : "");
+        char *distribution = bt_study_distribution(p);
+        printf("%s%s%s\n", distribution, p->source ? "; source: " : "", p->source ? p->source : "");
+        free(distribution);
         return;
     }
     const int shown = p->n > MOST_LISTED ? MOST_LISTED - 2 : p->n;

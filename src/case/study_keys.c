@@ -19,7 +19,8 @@ const bt_key bt_study_keys[] = {
     ROW("base", TEXT, NULL, "the case that is varied; relative to the folder of the study file"),
     ROW("set", MAP, "none", "keys of the case that are replaced in every member: {run.duration: 600 s}"),
     ROW("parameters", MAP, "none",
-        "keys that are varied, each with a list [0.2, 0.5] or a range {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}"),
+        "keys that are varied, each with a list [0.2, 0.5] or a range {from: 0.1 m/s, to: 0.4 m/s, n: 3, scale: log}, "
+        "in a Latin hypercube with a distribution (uniform, triangular; normal: 95 % from ... to) and a source"),
     ROW("variants", MAP, "none", "names of sets of keys that go together, varied as one more parameter"),
     ROW("with", MAP, "none", "keys that go with a value of a list, as in "
         "{ice.concentration=0.2: {domain.width: 5 km}}"),

@@ -203,6 +203,10 @@ static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
     const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
     bt_h5_attr_text(h, name, "units", *unit ? unit : "1");
     bt_h5_attr_text(h, name, "key", q->name);
+    char *distribution = bt_study_distribution(q);
+    bt_h5_attr_text(h, name, "distribution", distribution);
+    bt_h5_attr_text(h, name, "source", q->source ? q->source : "");
+    free(distribution);
     free(name);
     for (int64_t m = 0; m < n; m++) free(text[m]);
     free(text);

@@ -188,7 +188,31 @@ static void read_list(const reader *r, const bt_node *list, int line, bt_study_p
     }
 }
 
-/// Value at 0 ... 1 of a range, in SI with all its digits.
+static const char *const distributions[] = {"uniform", "triangular", "normal", NULL};
+
+/// Standard deviations of a normal distribution between the middle and an end of its range: 95 % lie between the ends;
+/// and those to where it is cut off.
+static const double ends_at = 1.959963984540054, cut_at = 3;
+
+static double normal_below(double z) { return 0.5 * erfc(-z / sqrt(2)); }
+
+/// Place within a range, 0 at its beginning and 1 at its end, below which lies the share u of a distribution.
+static double quantile(bt_distribution d, double u)
+{
+    if (d == BT_UNIFORM) return u;
+    if (d == BT_TRIANGULAR) return u < 0.5 ? sqrt(0.5 * u) : 1 - sqrt(0.5 * (1 - u));
+    // bisection: a study draws a few thousand numbers, once
+    double low = -cut_at, high = cut_at;
+    const double below = normal_below(low) + u * (normal_below(high) - normal_below(low));
+    for (int i = 0; i < 60; i++) {
+        const double middle = 0.5 * (low + high);
+        if (normal_below(middle) < below) low = middle;
+        else high = middle;
+    }
+    return 0.5 * (1 + low / ends_at);
+}
+
+/// Value at a place of a range, 0 ... 1 between its ends, in SI with all its digits.
 static char *range_value(const bt_study_parameter *p, double at)
 {
     double x = p->logarithmic ? p->from * pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
@@ -203,10 +227,44 @@ static char *range_value(const bt_study_parameter *p, double at)
     return print("%.17g", x);
 }
 
+static void read_distribution(const reader *r, const bt_node *value, int line, bt_study_parameter *p)
+{
+    if (!scalar(r, value, line, "distribution")) return;
+    int d = 0;
+    while (distributions[d] && strcmp(distributions[d], value->text)) d++;
+    if (distributions[d]) p->distribution = (bt_distribution)d;
+    else
+        COMPLAIN(r, line, "%s.distribution: %.40s: give uniform, triangular or normal", p->name, value->text);
+}
+
+/// Does all that a normal distribution draws beyond the ends of its range belong to the key? A complaint if not.
+static bool in_range_of_key(const reader *r, int line, const bt_study_parameter *p)
+{
+    if (p->distribution != BT_NORMAL) return true;
+    bool good = true;
+    for (int k = 0; k < 2 && good; k++) {
+        char *text = range_value(p, quantile(BT_NORMAL, k));
+        const bt_node node = {.kind = BT_NODE_SCALAR, .text = text, .plain = true};
+        char name[160];
+        snprintf(name, sizeof name, "%.80s: a normal distribution with 95 %% from %g to %g reaches", p->name, p->from,
+                 p->to);
+        good = check_value(r, line, name, p->key, &node);
+        free(text);
+    }
+    return good;
+}
+
+char *bt_study_distribution(const bt_study_parameter *p)
+{
+    if (!p->continuous) return strdup("");
+    return print("%s%s%s %.6g to %.6g", p->logarithmic ? "log-" : "", distributions[p->distribution],
+                 p->distribution == BT_NORMAL ? ", 95 % from" : " from", p->from, p->to);
+}
+
 static void read_range(const reader *r, const bt_node *map, int line, bt_study_parameter *p)
 {
     const bt_key *key = &bt_case_keys[p->key];
-    static const char *const known[] = {"from", "to", "n", "scale", NULL};
+    static const char *const known[] = {"from", "to", "n", "scale", "distribution", "source", NULL};
     if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
         COMPLAIN(r, line, "%s: has no range; give a list of its values", p->name);
         return;
@@ -243,17 +301,22 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
             p->logarithmic = !strcmp(value->text, "log");
             if (!p->logarithmic && strcmp(value->text, "linear"))
                 COMPLAIN(r, at, "%s.scale: %.40s: give linear or log", p->name, value->text);
+        } else if (!strcmp(map->key[i], "distribution")) {
+            read_distribution(r, value, at, p);
+        } else if (!strcmp(map->key[i], "source")) {
+            if (scalar(r, value, at, "source") && !p->source) p->source = strdup(value->text);
         } else {
             const char *near = bt_suggest(map->key[i], known);
             COMPLAIN(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i],
-                     near ? "did you mean " : "a range has from, to, n and scale", near ? near : "");
+                     near ? "did you mean " : "a range has from, to, n, scale, distribution and source",
+                     near ? near : "");
         }
     }
     p->from = end[0], p->to = end[1];
     if (good && !(p->from < p->to)) COMPLAIN(r, line, "%s: needs from and to, from below to", p->name);
     else if (good && p->logarithmic && !(p->from > 0))
         COMPLAIN(r, line, "%s: a logarithmic range begins above zero; raise from", p->name);
-    else if (good) {
+    else if (good && in_range_of_key(r, line, p)) {
         p->value = bt_alloc((size_t)n, sizeof *p->value);
         for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
     }
@@ -463,6 +526,10 @@ static void read_entries(const reader *r, const bt_node *root)
     if ((node = entry(root, "with", &line))) read_with(r, node, line);
     s->sampling = (bt_sampling)read_choice(r, root, "sampling");
     s->common_fields = read_choice(r, root, "fields") == 1;
+    for (int i = 0; i < s->n_parameters && s->sampling == BT_SAMPLING_GRID; i++)
+        if (s->parameter[i].distribution != BT_UNIFORM)
+            bt_errors_add(r->err, "%s%s: a distribution is drawn from; set sampling: latin-hypercube and samples",
+                          s->parameter[i].at, s->parameter[i].name);
     if (!read_number(r, root, "samples", &s->samples) && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
         bt_errors_add(r->err, "%s: samples: missing; a Latin hypercube needs the number of its conditions", s->path);
     read_number(r, root, "repeats", &s->repeats);
@@ -577,6 +644,7 @@ void bt_study_free(bt_study *s)
     for (int i = 0; i < s->n_parameters; i++) {
         free(s->parameter[i].name);
         free(s->parameter[i].at);
+        free(s->parameter[i].source);
         free(s->parameter[i].stratum);
         free_texts(s->parameter[i].value, s->parameter[i].n);
     }
@@ -602,7 +670,7 @@ static char *value_in(const bt_study *s, int p, int64_t c)
         bt_rng r = draw(s, p, c);
         bt_rng_bits(&r); // the first was for the stratum
         const double at = ((double)q->stratum[c] + bt_rng_uniform(&r)) / (double)s->n_conditions;
-        if (q->continuous) return range_value(q, at);
+        if (q->continuous) return range_value(q, quantile(q->distribution, at));
         const int i = (int)(at * q->n);
         return strdup(q->value[i < q->n ? i : q->n - 1]);
     }
@@ -681,10 +749,12 @@ char *bt_study_resolved(const bt_study *s, bt_errors *err)
             row_of("sampling")->choices[s->sampling], s->n_conditions, s->common_fields ? "fields: common\n" : "");
     for (int p = 0; p < s->n_parameters; p++) {
         fprintf(out, "%s:", s->parameter[p].name);
-        if (s->parameter[p].continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE)
-            fprintf(out, " %s from %.17g to %.17g", s->parameter[p].logarithmic ? "log" : "linear",
-                    s->parameter[p].from, s->parameter[p].to);
-        else
+        const bt_study_parameter *q = &s->parameter[p];
+        if (q->continuous && s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+            fprintf(out, " %s from %.17g to %.17g", q->logarithmic ? "log" : "linear", q->from, q->to);
+            // uniform is not named: studies of earlier versions go on
+            if (q->distribution != BT_UNIFORM) fprintf(out, ", %s", distributions[q->distribution]);
+        } else
             for (int i = 0; i < s->parameter[p].n; i++) fprintf(out, "%s %s", i ? "," : "", s->parameter[p].value[i]);
         fputc('\n', out);
     }

@@ -98,7 +98,7 @@ def test_a_hypercube_and_variants(tmp_path):
             "parameters": {"ice.friction": {"from": 0.1, "to": 0.4, "scale": "log"}
                            }, "variants": {"squares": {"ice.shape": "rectangles", "ice.aspect": 1}, "cells": {}}
         })
-    assert line(text, "ice.friction") == "0.1 to 0.4, logarithmic" and line(
+    assert line(text, "ice.friction") == "log-uniform from 0.1 to 0.4" and line(
         text, "variant") == "squares, cells" and line(text, "  squares") == "ice.shape=rectangles, ice.aspect=1"
     assert line(text, "members"
                 ) == "30 conditions x 1 fields = 30, a Latin hypercube, the same fields in all conditions, 2 ranks each"

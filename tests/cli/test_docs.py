@@ -15,7 +15,7 @@ DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [*DOCS, *sorted((ROOT / "cases").glob("*/README.md"))]
 PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
 HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
-COMMANDS = {"converge", "run", "check", "field", "ensemble", "resume", "diff", "estimate"}
+COMMANDS = {"budget", "capability", "converge", "run", "check", "field", "ensemble", "resume", "diff", "estimate"}
 MADE_BY_RUNS = {"bench.csv", "statistics.csv"}
 # Words with a dot that begin like a section of a case and are none of its keys: files, and members of Python objects.
 NO_KEYS = "h5 h c sh yml csv png md html json geojson py mp4 part resolved append summary units polygons".split()

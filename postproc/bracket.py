@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Where along a value do fewer than a given share of random trials succeed? A search that makes no more trials than it
+needs.
+
+At one value the trials are independent, and the question is on which side of the share q the probability p of success
+lies. The likelihood ratio of any p against q, and so that of a mixture of them, is a fair bet while p <= q: it
+exceeds 1/a, ever, with a probability of at most a [Ville 1939; Robbins 1970, Ann. Math. Stat. 41, 1397]. So one may
+look after each trial, and stop when a side is sure at 1 - LEVEL. The mixture is p = 1, and p of density (1 - p)^-1/2
+in (q, 1]: at q = 1/2 it takes 6 of 6 successes, or 11 of 12. Rejected: Wald's sequential test, which at p near q
+picks a side by chance; an interval for a fixed number of trials, which looking again and again does not leave valid.
+
+Along the value success is taken to be monotonic. Between a value that succeeds and one that fails the middle is tried
+next; one that stays undecided has p near q, and the gaps to both sides of it are narrowed.
+"""
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import special
+
+LEVEL = 0.025
+SURE = 0.3    # weight of p = 1
+YES, NO, OPEN = "yes", "no", "open"
+
+
+def log_evidence(good, bad, share):
+    """Logarithm of the bet that p > share, after so many good and bad trials."""
+    # the mixture of density (1 - p)^-1/2 over (share, 1]: the integral of p^good (1 - p)^(bad - 1/2), over its weight
+    inside = special.betainc(bad + 0.5, good + 1, 1 - share)
+    mixed = -np.inf if inside <= 0 else np.log(inside) + special.betaln(good + 1, bad + 0.5) - np.log(
+        2 * np.sqrt(1 - share))
+    bets = [np.log(1 - SURE) + mixed - good * np.log(share) - bad * np.log1p(-share)]
+    if not bad:
+        bets.append(np.log(SURE) - good * np.log(share))
+    return float(special.logsumexp(bets))
+
+
+def verdict(good, bad, share=0.5, level=LEVEL):
+    """YES where p > share is sure, NO where p < share is, OPEN else."""
+    if log_evidence(good, bad, share) >= -np.log(level):
+        return YES
+    return NO if log_evidence(bad, good, 1 - share) >= -np.log(level) else OPEN
+
+
+@dataclass
+class Point:
+    """Trials at a value."""
+
+    value: float
+    good: int = 0
+    bad: int = 0
+    spent: bool = False  #: no more trials there
+
+    @property
+    def n(self):
+        return self.good + self.bad
+
+
+@dataclass
+class Bracket:
+    """The search between two ends, of which neither need be the lower."""
+
+    start: float
+    end: float
+    resolution: float            #: width at which the search ends
+    share: float = 0.5
+    most: int = 24               #: trials of a value
+    points: dict = field(default_factory=dict)  #: by value
+
+    def point(self, value):
+        """The trials at a value, which is one as far as eight digits tell."""
+        value = float(f"{value:.8g}")
+        return self.points.setdefault(value, Point(value))
+
+    def judged(self, value):
+        p = self.point(value)
+        return verdict(p.good, p.bad, self.share)
+
+    def more(self, value):
+        """Is the value undecided, and may more trials decide it?"""
+        p = self.point(value)
+        return self.judged(value) == OPEN and p.n < self.most and not p.spent
+
+    def ends(self):
+        """(the value of a success, that of a failure) next to each other; where there are none of one kind, None and
+        that of the other next to an undecided end."""
+        yes = [v for v in self.points if self.judged(v) == YES]
+        no = [v for v in self.points if self.judged(v) == NO]
+        if not yes or not no:
+            last = self.start if self.judged(self.start) == OPEN else self.end
+            near = min(yes + no, key=lambda v: abs(v - last), default=None)
+            return (near if yes else None), (near if no else None)
+        return min(((a, b) for a in yes for b in no), key=lambda pair: abs(pair[0] - pair[1]))
+
+    def next(self):
+        """The value to try next, None when the search is over."""
+        for value in (self.start, self.end):
+            if self.more(value):
+                return value
+        yes, no = self.ends()
+        if yes is None or no is None:
+            undecided = [v for v in (self.start, self.end) if self.judged(v) == OPEN]
+            if len(undecided) != 1:
+                return None
+            # the limit is near that end, on this side of it or beyond: the other one comes closer
+            yes, no = undecided[0], no if yes is None else yes
+        low, high = min(yes, no), max(yes, no)
+        inner = sorted(v for v in self.points if low < v < high)
+        for value in inner:
+            if self.more(value):
+                return value
+        # all that lie between were tried in vain: the gaps beside them, the wider one first
+        stops = [low, *inner, high]
+        gaps = [(b - a, a, b) for a, b in zip(stops, stops[1:]) if not inner or a == low or b == high]
+        width, a, b = max(gaps)
+        return None if width <= self.resolution * (1 + 1e-6) else float(f"{0.5 * (a + b):.8g}")
+
+    def estimate(self):
+        """The value at which the share crosses q: shares made monotonic (pool adjacent violators), linear between the
+        values; NaN where they do not cross it."""
+        rows = sorted((p for p in self.points.values() if p.n), key=lambda p: p.value)
+        if len(rows) < 2:
+            return np.nan
+        yes, no = self.ends()
+        falls = yes is not None and no is not None and yes < no
+        blocks = []  # [share, trials, values]
+        for p in rows:
+            blocks.append([p.good / p.n, p.n, [p.value]])
+            while len(blocks) > 1 and (blocks[-2][0] < blocks[-1][0]) == falls and blocks[-2][0] != blocks[-1][0]:
+                b = blocks.pop()
+                a = blocks.pop()
+                blocks.append([(a[0] * a[1] + b[0] * b[1]) / (a[1] + b[1]), a[1] + b[1], a[2] + b[2]])
+        v = np.array([x for _, _, some in blocks for x in some])
+        above = np.array([s for s, _, some in blocks for _ in some]) - self.share
+        for a, b, fa, fb in zip(v, v[1:], above, above[1:]):
+            if fa * fb <= 0 and fa != fb:
+                return float(a + (b - a) * fa / (fa - fb))
+        return np.nan

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: MIT
+"""The uncertainty budget of budget.py as one table and one picture."""
+import json
+from pathlib import Path
+
+import style
+from stat_budget import TRUSTED_Q2
+from text_table import number, table
+
+import numpy as np
+
+
+def _force(found, x):
+    return "–" if x is None or not np.isfinite(x) else style.quantity(x, found["units"])
+
+
+def _ends(found, ends):
+    if ends is None or None in ends:
+        return ""
+    return f" ({_force(found, ends[0])} to {_force(found, ends[1])})"
+
+
+def _percent(x):
+    return "–" if x is None or not np.isfinite(x) else f"{100 * x:.0f} %"
+
+
+def _index(i, what):
+    low, high = i[f"{what}_95"]
+    ends = "" if low is None else f" ({number(low, 2)} to {number(high, 2)})"
+    return number(i[what], 2) + ends
+
+
+def rows(found):
+    """The lines of the table."""
+    mean, b = found["mean"], found
+    out = [["mean", _force(found, mean) + _ends(found, b["mean_95"]), "", "", "", "", ""]]
+    one = b["fields"]["sd"] is None
+    parts = [("fields: one tow", b["fields"]), ("parameters" + (" and fields" if one else ""), b["parameters"])]
+    for name, p in parts[one:]:
+        out.append([name, _force(found, p["sd"]) + _ends(found, p["sd_95"]), _percent(p["sd"] / abs(mean)),
+                    _percent(p["share"]), "", "", ""])
+    indices = b["shares"].get("indices", {})
+    for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
+        i, told = indices.get(name), found["assumed"][name]
+        source = told["source"] or "assumed"
+        out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
+                    "; ".join(t for t in (told["distribution"], source) if t)])
+    n = b["numerics"]
+    out.append(["numerics", "at most " + _force(found, n["sd"]) if n else "not studied",
+                _percent(n["sd"] / abs(mean)) if n else "", _percent(n["share"]) if n else "", "", "", ""])
+    out.append(["together", _force(found, b["together"]["sd"]), _percent(b["together"]["sd"] / abs(mean)), "", "", "",
+                ""])
+    return out
+
+
+def notes(found):
+    s = found["shares"]
+    if "refused" in s:
+        told = f"The parameters' part is not shared out: {s['refused']}."
+    else:
+        trust = "" if s["q2"] >= TRUSTED_Q2 else (
+            " That is little: take the shares as a rough guide, and more conditions for better ones.")
+        told = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
+                f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
+    n = found["numerics"]
+    rest = "" if n else " Numerics: run `bergtow converge` on the base case and name its file with --converge."
+    left = found["wanted"] - found["members"]
+    missing = f" {left} of {found['wanted']} members are missing." if left else ""
+    return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
+            f"{found['members']} tows.{missing} {told}{rest}")
+
+
+def text(found, markdown=False):
+    head = ["part", "standard deviation", "of the mean", "share of the variance", "Sobol, first order", "total",
+            "range and source"]
+    return table(head, rows(found), markdown) + "\n\n" + notes(found)
+
+
+def figure(found):
+    """Standard deviations of the parts, and the indices of the parameters."""
+    import matplotlib.pyplot as plt
+    indices = found["shares"].get("indices", {})
+    names = sorted(indices, key=lambda k: indices[k]["total"] or 0.0)
+    fig, (left, right) = plt.subplots(1, 2, figsize=(10.4, 2.3 + 0.36 * max(4, len(names))))
+    width, height = fig.get_size_inches()
+    fig.subplots_adjust(left=1.2 / width, right=1 - 0.25 / width, top=1 - 0.95 / height, bottom=0.7 / height,
+                        wspace=0.55)
+    some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k]["sd"] is not None]
+    factor, unit = style.scale([found["together"]["sd"]], found["units"])
+    for y, (name, p) in enumerate([*reversed(some), ("together", found["together"])]):
+        left.barh(y, p["sd"] / factor, height=0.6, color=style.FAINT if name == "together" else style.ICE)
+        ends = p.get("sd_95")
+        if ends and None not in ends:
+            left.plot(np.array(ends) / factor, [y, y], color=style.INK, linewidth=1.2)
+    left.set_yticks(range(len(some) + 1), [*(k for k, _ in reversed(some)), "together"])
+    left.set_xlabel(f"standard deviation, {unit}")
+    for y, name in enumerate(names):
+        for what, colour, at in (("total", style.TOW, y - 0.18), ("first", style.DRAG, y + 0.18)):
+            i = indices[name]
+            right.barh(at, i[what] or 0.0, height=0.32, color=colour, label={"total": "total", "first": "alone"}[what]
+                       if y == 0 else None)
+            if None not in i[f"{what}_95"]:
+                right.plot(i[f"{what}_95"], [at, at], color=style.INK, linewidth=1.2)
+    right.set_yticks(range(len(names)), names)
+    right.set_xlabel("share of the parameters' part (Sobol index)")
+    if names:
+        right.legend(loc="lower right")
+    else:
+        right.text(0.5, 0.5, "not shared out", transform=right.transAxes, ha="center", color=style.FAINT)
+    for axes in (left, right):
+        axes.set_xlim(left=0)
+        axes.grid(True, axis="x")
+    style.head(fig, f"{style.plain(found['title'])}: uncertainty budget",
+               f"{found['meaning']}: {_force(found, found['mean'])} on average; black: 95 %", left=0.15 / width)
+    return fig
+
+
+def of_folder(folder):
+    """What budget.py left in a folder, None where it has not been there, or its file cannot be read."""
+    try:
+        return json.loads((Path(folder) / "budget.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def block(folder):
+    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments. None where there is no
+    budget.json."""
+    found = of_folder(folder)
+    if found is None:
+        return None
+    return {"heading": "Uncertainty budget", "markdown": text(found, True), "figure": lambda: figure(found)}

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: MIT
+"""Towing capability: the speed that a tow reaches, and the value of a key - concentration, thickness, bollard pull - at
+which half of the tows no longer make it.
+
+    capability.py CASE.yml --for "ice.thickness=0.5 m,1 m" -o DIR       concentration 20 to 95 %, two thicknesses
+    capability.py CASE.yml --search tow.vessel.bollard_pull --from "0.5 MN" --to "4 MN"      the vessel that is enough
+
+A tow in one field makes it when it keeps `--speed` (a tenth of tow.speed where none is given) in the mean over the
+window and no branch of its line parts. The case tows by a vessel (tow.mode thrust), which slows down and stops, or on a
+line that may part; a prescribed speed is kept whatever it takes. The search is that of bracket.py; what it has tried is
+a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
+"""
+import argparse
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bracket
+import capability_text
+import command
+import stat_mean
+from bergtow_read import Run, RunError, case_value, parse_case
+from case_runs import SPENT, CaseRuns, above_zero, plain, program
+
+import numpy as np
+
+BUDGET = 15.0            # min
+FIELDS = 12              # trials of a value, at most
+POINTS, CURVE = 5, 4     # of the curve: values, and fields of each
+PARTS = 16               # the range over the resolution
+STOPPED = 0.1            # of tow.speed: what is slower has stopped
+RANGES = {"ice.concentration": ("0.2", "0.95")}
+FAILING = 3              # runs that fail at a value before it is given up
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one run says."""
+
+    field: int
+    speed: float      #: m/s, mean over the window
+    parted: bool
+    tow_force: float  #: N, mean
+    tension: float    #: N, largest step mean of the window
+
+    def made(self, least):
+        return self.speed >= least and not self.parted
+
+
+def trial(run, number):
+    """Of a run that is there. Errors: RunError."""
+    if run.window is None:
+        raise RunError(run.path, "the run has no window", "make run.duration longer")
+    t, (start, end) = run["time"], run.window
+    inside = (t >= start) & (t <= end)
+    x, y, t = run["body_x"][inside], run["body_y"][inside], t[inside]
+    if len(t) < 2:
+        raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
+    # a straight tow that sways on its line is not faster for it
+    straight = run.case.get("tow.waypoints", "none") in ("none", "[]")
+    way = np.hypot(x[-1] - x[0], y[-1] - y[0]) if straight else np.hypot(np.diff(x), np.diff(y)).sum()
+    return Trial(number, way / (t[-1] - t[0]),
+                 any(e["kind"] == "line_broken" for e in run.summary.get("events") or []),
+                 run.number("mean_tow_force_n"), run.number("peak_line_tension_n"))
+
+
+@dataclass
+class Condition:
+    """The search under one value of --for."""
+
+    name: str         #: of the folders
+    label: str
+    number: float     #: the value of --for, NaN where there is none
+    sets: dict
+    search: bracket.Bracket
+    trials: dict = field(default_factory=dict)   #: [Trial] by value
+    failed: dict = field(default_factory=dict)   #: [why] by value
+    why: str = ""     #: the search ended before it was through
+
+
+@dataclass
+class Search:
+    """What is searched, and by which runs."""
+
+    runs: CaseRuns
+    key: str
+    least: float      #: m/s
+    say: object       #: where the progress goes, None for nowhere
+
+    def folder(self, c, value):
+        return f"{c.name}/{value:.8g}"
+
+    def add(self, c, value, n):
+        """n more trials; False where the budget is spent. A run that fails is no trial: another field stands for it."""
+        point = c.search.point(value)
+        value = point.value
+        name, some = self.folder(c, value), c.trials.setdefault(value, [])
+        failed = c.failed.setdefault(value, [])
+        first = len(some) + len(failed)
+        if time.monotonic() + self.runs.seconds.get(name, 0.0) > self.runs.end:
+            return False
+        numbers = range(first, first + n)
+        why = self.runs.make(name, numbers, c.sets | {self.key: value})
+        for i, w in zip(numbers, why):
+            if w == SPENT:
+                return False
+            if w:
+                failed.append(w)
+                continue
+            with Run(self.runs.path(name, i)) as run:
+                some.append(trial(run, i + 1))
+            good = int(some[-1].made(self.least))
+            point.good, point.bad = point.good + good, point.bad + 1 - good
+        if self.say:
+            print(f"\r{c.label}, {self.key} {value:.4g}: {point.good} of {point.n} make it\x1b[K", end="",
+                  file=self.say, flush=True)
+        if len(failed) >= FAILING:
+            point.spent = True
+            if not some:
+                raise RunError(self.runs.path(name, 0), f"every run failed: {failed[0]}", "mend the case")
+        return True
+
+    def find(self, c):
+        """Narrow the bracket until it is narrow enough or the budget is spent."""
+        s = c.search
+        while (value := s.next()) is not None:
+            p = s.point(value)
+            sure = next((k for k in range(1, s.most) if bracket.OPEN not in (
+                bracket.verdict(p.good + k, p.bad, s.share), bracket.verdict(p.good, p.bad + k, s.share))), s.most)
+            if not self.add(c, value, max(1, min(self.runs.jobs, sure, s.most - p.n))):
+                c.why = SPENT
+                return
+
+    def fill(self, c, points, fields):
+        """The curve between the values of the search."""
+        for value in np.linspace(c.search.start, c.search.end, points) if points > 1 else ():
+            value = float(value)
+            while c.search.point(value).n < fields and not c.search.point(value).spent:
+                if not self.add(c, value, min(self.runs.jobs, fields - c.search.point(value).n)):
+                    return
+
+
+# ---- what was found
+
+
+def row_of(c, value, least):
+    """Numbers of a value of a condition."""
+    some = c.trials[value]
+    out = {"value": value, "fields": len(some), "made": sum(int(t.made(least)) for t in some),
+           "parted": sum(t.parted for t in some), "failed": len(c.failed[value])}
+    for name in ("speed", "tow_force", "tension"):
+        x = np.array([getattr(t, name) for t in some])
+        out[name] = x.tolist()
+        out[f"mean_{name}"] = x.mean()
+        out[f"mean_{name}_95"] = stat_mean.t_interval(x) if len(x) > 1 else (np.nan, np.nan)
+    return out
+
+
+def found_of(c, least):
+    """The limit of a condition, and its curve."""
+    s = c.search
+    yes, no = s.ends()
+    why, sure = c.why, False
+    if not why and yes is not None and no is not None and abs(no - yes) > s.resolution * (1 + 1e-6):
+        why = f"between them near {100 * s.share:g} % make it, and {s.most} fields do not decide"
+    elif not why and (yes is None or no is None):
+        sure = all(s.judged(v) != bracket.OPEN for v in (s.start, s.end))
+        why = (f"{s.most} fields do not decide an end of the range" if not sure else
+               "every value of the range makes it" if no is None else "no value of the range makes it")
+    return {"label": c.label, "for": c.number, "makes_it": yes, "does_not": no, "estimate": s.estimate(),
+            "resolved": sure or not why, "why": why,
+            "runs": sum(len(t) for t in c.trials.values()) + sum(len(f) for f in c.failed.values()),
+            "points": [row_of(c, v, least) for v in sorted(c.trials) if c.trials[v]]}
+
+
+# ---- command line
+
+
+def resolved(binary, case, sets):
+    """{key: text} of the case with keys replaced, as the program reads it. Errors: RunError in the program's words."""
+    done = subprocess.run([str(binary), "check", str(case), "--scale", "1", *(w for t in sets for w in ("--set", t))],
+                          capture_output=True, text=True)
+    if done.returncode:
+        said = (done.stderr.strip().splitlines() or ["the case is refused"])[0].removeprefix("bergtow: ")
+        raise RunError(case, said, "mend it")
+    return parse_case(done.stdout)
+
+
+def number_of(binary, case, sets, key, text):
+    """A value of a key in SI units."""
+    value = case_value(resolved(binary, case, [*sets, f"{key}={text}"]), key)
+    if not np.isfinite(value):
+        raise RunError(case, f"{key}={text} is no number", "search a key that is a number")
+    return value
+
+
+def conditions(a, binary, given, start, end, resolution):
+    """Those of --for, or the case alone."""
+    def search():
+        return bracket.Bracket(start, end, resolution, a.share, a.fields)
+    if not a.conditions:
+        return [Condition("case", "the case", np.nan, {}, search())]
+    key, _, texts = a.conditions.partition("=")
+    texts = [t.strip() for t in texts.split(",") if t.strip()]
+    if not texts:
+        raise RunError(a.case, f"--for {a.conditions}: no values", 'write it as "ice.thickness=0.5 m,1 m"')
+    out = []
+    for k, text in enumerate(texts):
+        case = resolved(binary, a.case, [*given, f"{key}={text}"])
+        out.append(Condition(f"c{k + 1}", f"{key} {text}", case_value(case, key), {key: text}, search()))
+    return out
+
+
+def check(case, key):
+    """A case in which a tow may stop. Errors: RunError."""
+    mode, load = case.get("tow.mode"), case_value(case, "tow.line.breaking_load", 0.0)
+    if mode != "thrust" and not (mode == "line" and load > 0):
+        raise RunError("tow.mode", f"the tow of this case is of mode {mode}, which no ice stops",
+                       "set tow.mode to thrust, with mass, bollard_pull and free_speed of tow.vessel, or to line with "
+                       "tow.line.breaking_load")
+    if key == "ice.seed":
+        raise RunError(key, "the fields are its values already", "search another key")
+
+
+def share(text):
+    value = above_zero(text)
+    if not 0.05 <= value <= 0.95:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0.05 to 0.95")
+    return value
+
+
+def arguments(argv):
+    p = argparse.ArgumentParser(prog="capability", description="Find the speed that a tow reaches, and the ice that "
+                                "stops it or the vessel that is enough.")
+    p.add_argument("case", metavar="CASE.yml", type=Path)
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/capability-CASE; runs are kept "
+                   "there, and the same call takes those of the same case file and program")
+    p.add_argument("--search", default="ice.concentration", metavar="KEY", help="key along which the limit is searched "
+                   "(default ice.concentration)")
+    p.add_argument("--from", dest="start", metavar="V", help="one end of its range (ice.concentration: 0.2)")
+    p.add_argument("--to", dest="end", metavar="V", help="the other end (ice.concentration: 0.95)")
+    p.add_argument("--resolution", metavar="V", help="width of the bracket at which the search ends (default: "
+                   f"1/{PARTS} of the range)")
+    p.add_argument("--for", dest="conditions", metavar="KEY=V,V", help="search under each of these values")
+    p.add_argument("--speed", metavar="V", help=f"speed that a tow must keep (default: {STOPPED:g} tow.speed)")
+    p.add_argument("--share", type=share, default=0.5, metavar="Q", help="share of the tows that make it at the limit "
+                   "(default 0.5)")
+    p.add_argument("--fields", type=int, choices=range(6, 1001), default=FIELDS, metavar="N",
+                   help=f"fields of a value, at most (default {FIELDS})")
+    p.add_argument("--points", type=int, choices=range(0, 101), default=POINTS, metavar="N",
+                   help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
+                   "search alone)")
+    p.add_argument("--budget", type=above_zero, default=BUDGET, metavar="MIN",
+                   help=f"wall time, min (default {BUDGET:g})")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
+    p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
+                   help="runs at a time (default: the cores)")
+    command.add_force(p)
+    a = p.parse_args(argv)
+    for name, k in (("start", 0), ("end", 1)):
+        if getattr(a, name) is None:
+            if a.search not in RANGES:
+                p.error(f"--search {a.search}: say its range with --from and --to")
+            setattr(a, name, RANGES[a.search][k])
+    return a
+
+
+def main(argv=None):
+    a = arguments(argv)
+    if not a.case.is_file():
+        raise RunError(a.case, "no such file", "name a case file")
+    a.case, began, binary = a.case.resolve(), time.monotonic(), program()
+    case = resolved(binary, a.case, a.set)
+    check(case, a.search)
+    start, end = (number_of(binary, a.case, a.set, a.search, text) for text in (a.start, a.end))
+    if start == end:
+        raise RunError(a.search, "the range has no extent", "give --from and --to two values")
+    def number(key, text, otherwise):
+        return number_of(binary, a.case, a.set, key, text) if text else otherwise
+    resolution = number(a.search, a.resolution, abs(end - start) / PARTS)
+    least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
+    folder, last = a.output or Path("out") / f"capability-{a.case.stem}", began + 60 * a.budget
+    for name in ("capability.json", "capability.png"):
+        command.may_write(folder / name, a.force)
+    runs = CaseRuns(a.case, folder, "capability", binary, a.set, max(1, a.jobs), last, last)
+    search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None)
+    some = conditions(a, binary, a.set, start, end, resolution)
+    for k, c in enumerate(some):
+        runs.end = time.monotonic() + (last - time.monotonic()) / (len(some) - k)
+        search.find(c)
+    runs.end = last
+    for c in some:
+        search.fill(c, a.points, CURVE)
+    if search.say:
+        print(file=search.say)
+    grid = (round(abs(end - start) / resolution) + 1) * a.fields * len(some)
+    unit = case.get(a.search, "").partition(" ")[2]
+    load = case_value(case, "tow.line.breaking_load", 0.0)
+    found = {
+        "case": a.case.name, "title": case.get("run.title", ""), "set": a.set, "search": a.search, "unit": unit,
+        "range": [start, end], "resolution": resolution, "for": (a.conditions or "").partition("=")[0],
+        "for_unit": case.get((a.conditions or "").partition("=")[0], "").partition(" ")[2],
+        "speed": least, "share": a.share, "most_fields": a.fields, "breaking_load": load if load > 0 else None,
+        "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
+        "conditions": [found_of(c, least) for c in some]
+    }
+    found = plain(found)
+    command.write_json(found, folder / "capability.json", a.force)
+    print(capability_text.text(found))
+    print()
+    command.save(capability_text.figure(found), folder / "capability.png", a.force)
+    print(folder / "capability.json")
+
+
+if __name__ == "__main__":
+    command.guarded(main)

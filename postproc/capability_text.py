@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""What capability.py found, as tables and as a picture."""
+import json
+from pathlib import Path
+
+import style
+from text_table import number, table
+
+import numpy as np
+
+COLOURS = (style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT)
+
+
+def value(found, x):
+    """A value of the searched key with its unit, a ratio in %."""
+    if x is None:
+        return "–"
+    if found["search"] == "ice.concentration":
+        return f"{style.short(100 * x)} %"
+    return style.quantity(x, "N") if found["unit"] == "N" else f"{style.short(x)} {found['unit']}".strip()
+
+
+def force(x):
+    return "–" if x is None or not np.isfinite(x) else style.quantity(x, "N")
+
+
+def limits(found, markdown=False):
+    head = [found["for"] or "case", "makes it at", "does not at", "limit about", "runs", "verdict"]
+    rows = []
+    for c in found["conditions"]:
+        verdict = ": ".join(w for w in ("resolved" if c["resolved"] else "not resolved", c["why"]) if w)
+        ends = [value(found, c[k]) for k in ("makes_it", "does_not", "estimate")]
+        rows.append([c["label"], *ends, str(c["runs"]), verdict])
+    return table(head, rows, markdown)
+
+
+def curve(found, markdown=False):
+    head = [found["for"] or "case", found["search"], "make it", "line parted", "speed, m/s (95 %)", "mean tow force",
+            "largest tension: mean", "of all"]
+    rows = []
+    for c in found["conditions"]:
+        for p in c["points"]:
+            low, high = p["mean_speed_95"]
+            band = "" if low is None else f" ({number(max(low, 0.0))} to {number(high)})"
+            tension = [x for x in p["tension"] if x is not None]
+            rows.append([c["label"], value(found, p["value"]), f"{p['made']} of {p['fields']}", str(p["parted"]),
+                         number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
+                         force(max(tension, default=None))])
+    return table(head, rows, markdown)
+
+
+def meaning(found):
+    """What the words of the tables mean, and what it took."""
+    runs, failed = sum(c["runs"] for c in found["conditions"]), sum(
+        p["failed"] for c in found["conditions"] for p in c["points"])
+    line = ", and no branch of its line parts" if found["breaking_load"] else ""
+    more = f" {failed} runs failed and were replaced by other fields." if failed else ""
+    return (f"A tow makes it in a field where it keeps {number(found['speed'])} m/s in the mean over the window{line}. "
+            f"At a value that makes it more than {100 * found['share']:g} % of all tows do, at one that does not "
+            f"fewer, each at 97.5 % however often one looks. {runs} runs in {found['spent_min']:.3g} of "
+            f"{found['budget_min']:g} min; a grid of this resolution with {found['most_fields']} fields has "
+            f"{found['grid_runs']}.{more}")
+
+
+def text(found, markdown=False):
+    return "\n\n".join([limits(found, markdown), curve(found, markdown), meaning(found)])
+
+
+def _numbers(values):
+    return np.array([np.nan if v is None else v for v in values], dtype=float)
+
+
+def _curve(axes, c, name, colour, factor, unit):
+    x = _numbers([p["value"] for p in c["points"]]) * factor
+    mean = _numbers([p[f"mean_{name}"] for p in c["points"]])
+    low, high = np.array([_numbers(p[f"mean_{name}_95"]) for p in c["points"]]).reshape(-1, 2).T
+    for at, p in zip(x, c["points"]):
+        axes.plot(np.full(p["fields"], at), _numbers(p[name]) / unit, ".", color=colour, alpha=0.35, markersize=5)
+    axes.plot(x, mean / unit, color=colour, label=c["label"])
+    axes.fill_between(x, np.maximum(low, 0) / unit, high / unit, color=colour, alpha=0.15, linewidth=0)
+
+
+def figure(found):
+    """Speed and largest tension over the searched key, and the limit over the values of --for where they are
+    numbers."""
+    import matplotlib.pyplot as plt
+    some, percent = found["conditions"], found["search"] == "ice.concentration"
+    factor = 100.0 if percent else 1.0
+    across = len(some) > 1 and all(c["for"] is not None for c in some)
+    fig, grid = plt.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
+    width, height = fig.get_size_inches()
+    fig.subplots_adjust(left=0.75 / width, right=1 - 0.2 / width, top=1 - 1.0 / height, bottom=0.95 / height,
+                        wspace=0.3)
+    words = "concentration, %" if percent else f"{found['search']}, {found['unit']}".rstrip(", ")
+    largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
+    kilo, newton = style.scale([*largest, found["breaking_load"] or 0.0], "N")
+    for axes, name, label, unit in ((grid[0, 0], "speed", "speed made good, m/s", 1.0),
+                                    (grid[0, 1], "tension", f"largest line tension, {newton}", kilo)):
+        for c, colour in zip(some, COLOURS * len(some)):
+            if c["points"]:
+                _curve(axes, c, name, colour, factor, unit)
+            if c["makes_it"] is not None and c["does_not"] is not None:
+                axes.axvspan(factor * c["makes_it"], factor * c["does_not"], color=colour, alpha=0.10, linewidth=0)
+        axes.set_xlabel(words)
+        axes.set_ylabel(label)
+        axes.set_ylim(bottom=0)
+        axes.grid(True)
+    grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                       label=f"to be kept: {number(found['speed'])} m/s")
+    if found["breaking_load"]:
+        grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
+                           label="breaking load")
+        grid[0, 1].legend()
+    grid[0, 0].legend()
+    if across:
+        axes, x = grid[0, 2], [c["for"] for c in some]
+        for at, c in zip(x, some):
+            ends = [v for v in (c["makes_it"], c["does_not"]) if v is not None]
+            if len(ends) == 2:
+                axes.plot([at, at], [factor * v for v in ends], color=style.INK, linewidth=2)
+        axes.plot(x, factor * _numbers([c["estimate"] for c in some]), "o-", color=style.ICE, markersize=5)
+        axes.set_xlabel(f"{found['for']}, {found['for_unit']}".rstrip(", "))
+        axes.set_ylabel(f"limit, {words}")
+        axes.set_ylim(*sorted(factor * v for v in found["range"]))
+        axes.grid(True)
+    style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
+               "dots: fields; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
+    return fig
+
+
+def of_folder(folder):
+    """What capability.py left in a folder, None where it has not been there, or its file cannot be read."""
+    try:
+        return json.loads((Path(folder) / "capability.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def block(folder):
+    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments. None where there is no
+    capability.json."""
+    found = of_folder(folder)
+    if found is None:
+        return None
+    return {"heading": "Towing capability", "markdown": text(found, True), "figure": lambda: figure(found)}

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: MIT
+"""Runs of one case with some keys replaced, made when they are asked for, as many as it takes, and kept in folders.
+What converge.py and capability.py decide from.
+
+    DIR/SUBJECT/NAME/fNNN       field NNN with the values that NAME stands for, and call.json: what it was made by
+
+A run is kept while the case file, the program and the values are what they were.
+"""
+import argparse
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bergtow_read import Run, RunError
+
+import numpy as np
+
+STOPPED, SPENT = 6, "the budget is spent"  # exit code of a run that met its limit
+
+
+@dataclass
+class CaseRuns:
+    """The runs of a study of one case."""
+
+    case: Path
+    folder: Path
+    subject: str           #: name of the folder that holds them
+    program: Path
+    given: list            #: --set of the user's
+    jobs: int
+    end: float             #: of what is left to a quantity, by time.monotonic()
+    last: float            #: of the budget
+    seconds: dict = field(default_factory=dict)  #: of a run, by setting
+
+    def __post_init__(self):
+        version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
+        #: a run is kept while the case, the program and the values are what they were
+        self.identity = hashlib.sha256(self.case.read_bytes() + version).hexdigest()
+
+    def path(self, name, i):
+        return self.folder / self.subject / name / f"f{i + 1:03d}"
+
+    def arguments(self, name, i, values):
+        texts = (f"{k}={v if isinstance(v, str) else f'{v:.12g}'}" for k, v in values.items())
+        sets = [*self.given, "output.frame_interval=-1 s", *texts, f"ice.seed={1000 + i}"]
+        out = [str(self.program), "run", str(self.case), "-o", str(self.path(name, i)), "--quiet", "--threads", "1"]
+        return out + [part for text in sets for part in ("--set", text)]
+
+    def kept(self, name, i, values):
+        path = self.path(name, i)
+        try:
+            return (path / "summary.json").exists() and json.loads(
+                (path / "call.json").read_text()) == [self.identity, *self.arguments(name, i, values)]
+        except (OSError, ValueError):
+            return False
+
+    def one(self, name, i, values):
+        """One run, unless it is there already; None, or why it failed."""
+        path, call = self.path(name, i), self.arguments(name, i, values)
+        if self.kept(name, i, values):
+            return None
+        shutil.rmtree(path, ignore_errors=True)
+        path.mkdir(parents=True)
+        t0 = time.monotonic()
+        left = max(1.0, self.last - time.monotonic())
+        done = subprocess.run([*call, "--max-wall", f"{left:.3f}"],
+                              capture_output=True,
+                              text=True,
+                              env=os.environ | {"OMP_NUM_THREADS": "1"})
+        if done.returncode == STOPPED:
+            return SPENT
+        if done.returncode:
+            lines = done.stderr.strip().splitlines()
+            return lines[0] if lines else f"exit code {done.returncode}"
+        (path / "call.json").write_text(json.dumps([self.identity, *call]))
+        self.seconds[name] = time.monotonic() - t0
+        return None
+
+    def make(self, name, fields, values):
+        """Runs of these fields, as many at a time as there are jobs: None, or why it failed, of each."""
+        with ThreadPoolExecutor(self.jobs) as pool:
+            return list(pool.map(lambda i: self.one(name, i, values), fields))
+
+    def there(self, name, n, values):
+        """Are n runs there now, or could they be made? False where the budget does not reach so far."""
+        missing = [i for i in range(n) if not self.kept(name, i, values)]
+        expected = self.seconds.get(name, self.seconds.get("case", 0.0)) * -(-len(missing) // self.jobs)
+        if missing and time.monotonic() + expected > self.end:
+            return False
+        why = [w for w in self.make(name, range(n), values) if w]
+        if SPENT in why:
+            return False
+        if why:
+            raise RunError(self.path(name, 0), f"a run of {name} failed: {why[0]}",
+                           "mend the case" if name == "case" else "leave it out of --vary")
+        return True
+
+    def measured(self, name, n, measure):
+        out = []
+        for i in range(n):
+            with Run(self.path(name, i)) as run:
+                out.append(measure(run))
+        return np.array(out, dtype=float)
+
+
+def plain(value):
+    """As JSON has it: what is not finite is null."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def above_zero(text):
+    value = float(text)
+    if not (np.isfinite(value) and value > 0):
+        raise argparse.ArgumentTypeError(f"{text} is not above zero")
+    return value
+
+
+def program():
+    """The binary: BERGTOW, or the one built beside this script."""
+    path = Path(os.environ.get("BERGTOW") or Path(__file__).resolve().parents[1] / "build/release/bergtow")
+    if not os.access(path, os.X_OK):
+        raise RunError(path, "no such program", "build it with make, or name it in BERGTOW")
+    return path.resolve()

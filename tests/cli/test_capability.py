@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: MIT
+"""postproc/capability.py: the search of a limit on trials of known chance, and the curve against brute-force runs."""
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from harness import BERGTOW, ROOT, TOW, changed, environment, write_case
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
+
+import bracket  # noqa: E402
+import capability  # noqa: E402
+import capability_text  # noqa: E402
+import case_runs  # noqa: E402
+from bergtow_read import Run  # noqa: E402
+
+THRUST = changed(TOW, run__duration=30, run__dt=0.1, output__window_start=10, domain__length=16, domain__width=6,
+                 ice__concentration=0.5, ice__size=0.6, ice__friction=0.2, body__length=1, tow__mode="thrust",
+                 tow__speed=0.15, tow__ramp=5, tow__line_length=2, tow__line_stiffness=5000, tow__line_damping=200,
+                 tow__vessel__mass=300, tow__vessel__bollard_pull=10, tow__vessel__free_speed=0.5)
+
+
+def searched(b, chance, rng):
+    while (value := b.next()) is not None:
+        good = int(rng.random() < chance(value))
+        point = b.point(value)
+        point.good, point.bad = point.good + good, point.bad + 1 - good
+    return b
+
+
+# ---- the search
+
+
+def test_how_many_trials_decide():
+    assert [bracket.verdict(n, 0) for n in (5, 6)] == ["open", "yes"]
+    assert [bracket.verdict(0, n) for n in (5, 6)] == ["open", "no"]
+    assert bracket.verdict(11, 1) == "yes" and bracket.verdict(10, 1) == "open" == bracket.verdict(30, 30)
+    assert bracket.verdict(40, 12) == "yes" and bracket.verdict(12, 40) == "no"
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8])
+def test_the_evidence_is_a_fair_bet(share):
+    """At p = share its mean over all outcomes is 1, and over a thousand looks it is sure in at most LEVEL of tries."""
+    for n in (1, 4, 9):
+        mean = sum(stats.binom.pmf(k, n, share) * np.exp(bracket.log_evidence(k, n - k, share)) for k in range(n + 1))
+        assert mean == pytest.approx(1, abs=1e-12)
+    rng, crossed = np.random.default_rng(2), 0
+    for _ in range(200):
+        good = np.cumsum(rng.random(150) < share)
+        crossed += any(bracket.verdict(int(g), k + 1 - int(g), share) == "yes" for k, g in enumerate(good))
+    assert crossed / 200 <= bracket.LEVEL + 2 * np.sqrt(bracket.LEVEL / 200)
+
+
+@pytest.mark.parametrize("falls", [True, False])
+@pytest.mark.parametrize("scale", [0.001, 0.03])
+def test_the_bracket_holds_the_limit(scale, falls):
+    """Logistic chances with the limit anywhere; a steep one needs few trials and is found to the resolution."""
+    rng, missed, trials, errors = np.random.default_rng(3), 0, [], []
+    for _ in range(60):
+        limit = rng.uniform(0.5, 0.85)
+        sign = 1 if falls else -1
+        b = searched(bracket.Bracket(0.3, 0.95, 0.04, most=12),
+                     lambda v: 1 / (1 + np.exp(np.clip(sign * (v - limit) / scale, -50, 50))), rng)
+        yes, no = b.ends()
+        # an end of the range may stay undecided
+        right = [v is None or (v - limit) * sign * side <= 0 for v, side in ((yes, 1), (no, -1))]
+        missed += not all(right)
+        trials.append(sum(p.n for p in b.points.values()))
+        errors.append(b.estimate() - limit)
+        if scale < 0.01:
+            assert abs(no - yes) <= 0.0401 or any(b.point(v).n == 12 for v in b.points)
+    assert missed <= 3
+    assert np.mean(trials) < (45 if scale < 0.01 else 90)
+    assert abs(np.mean(errors)) < 0.01 and np.std(errors) < 0.025
+
+
+def test_ranges_without_a_limit_and_ends_that_are_open():
+    rng = np.random.default_rng(4)
+    all_make = searched(bracket.Bracket(0, 1, 0.1), lambda v: 1.0, rng)
+    assert all_make.ends() == (1, None) and set(all_make.points) == {0, 1} and np.isnan(all_make.estimate())
+    open_end = searched(bracket.Bracket(0, 1, 0.1, most=12), lambda v: 1.0 if v < 0.7 else 0.5,
+                        np.random.default_rng(1))
+    yes, no = open_end.ends()
+    assert 0.6 <= yes < 0.8 and no is None and open_end.point(1.0).n == 12
+
+
+# ---- trials and runs
+
+
+def found_in(folder, case, *more, code=0):
+    write_case(folder, case)
+    done = subprocess.run([BERGTOW, "capability", "case.yml", "-o", "out", *map(str, more)], cwd=folder,
+                          env=environment(BERGTOW_HOME=ROOT), capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, done.stderr
+    if code:
+        return done.stderr
+    return json.loads((folder / "out/capability.json").read_text()), done.stdout
+
+
+def brute(folder, value, n, least):
+    """Share of n other fields that keep the speed, by plain runs."""
+    made = 0
+    for i in range(n):
+        out = folder / f"brute-{value:g}-{i}"
+        done = subprocess.run([BERGTOW, "run", "case.yml", "-o", out, "--quiet", "--threads", "1", "--set",
+                               f"ice.concentration={value}", "--set", f"ice.seed={70 + i}"], cwd=folder,
+                              env=environment(), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        with Run(out) as run:
+            start, end = run.window
+            x = np.interp([start, end], run["time"], run["body_x"])
+        made += (x[1] - x[0]) / (end - start) >= least
+    return made / n
+
+
+def test_the_limit_of_concentration_against_brute_force(tmp_path):
+    found, text = found_in(tmp_path, THRUST, "--from", 0.3, "--to", 0.9, "--speed", 0.1, "--points", 3, "--budget", 3,
+                           "--resolution", 0.15)
+    one = found["conditions"][0]
+    assert 0.5 <= one["makes_it"] < one["does_not"] <= 0.9 and one["makes_it"] <= one["estimate"] <= one["does_not"]
+    assert brute(tmp_path, one["makes_it"], 7, 0.1) >= 4 / 7
+    assert brute(tmp_path, one["does_not"], 7, 0.1) <= 3 / 7
+    assert one["runs"] < 0.6 * found["grid_runs"] and f"{one['runs']} runs in" in text
+    speeds = [p["mean_speed"] for p in one["points"]]
+    assert 0.12 < speeds[0] < 0.16 and speeds[-1] < 0.09 and len(one["points"]) >= 3
+    assert (tmp_path / "out/capability.png").stat().st_size > 20_000
+    # the same call makes no run again
+    before = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/capability/**/summary.json")}
+    again, _ = found_in(tmp_path, THRUST, "--from", 0.3, "--to", 0.9, "--speed", 0.1, "--points", 3, "--budget", 3,
+                        "--resolution", 0.15)
+    assert again["conditions"] == found["conditions"]
+    assert before == {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/capability/**/summary.json")}
+
+
+OPEN_WATER = changed(THRUST, ice__concentration=0.01, domain__length=30, run__duration=60, output__window_start=45,
+                     tow__ramp=1, tow__speed=0.4)
+
+
+def test_the_bollard_pull_that_open_water_asks_for(tmp_path):
+    """Hardly any ice: the vessel is enough where its net pull at the speed meets the drag of the body."""
+    found, text = found_in(tmp_path, OPEN_WATER, "--search", "tow.vessel.bollard_pull", "--from", "1 N", "--to", "60 N",
+                           "--speed", 0.2, "--points", 0, "--budget", 3, "--resolution", "4 N")
+    one = found["conditions"][0]
+    assert one["resolved"] and one["makes_it"] > one["does_not"]
+    # net pull B (1 - (v / v_free)^2) = drag at 0.2 m/s, by a run that holds it
+    held = changed(OPEN_WATER, tow__mode="speed", tow__speed=0.2)
+    for key in [k for k in held["tow"] if k not in ("mode", "speed", "ramp")]:
+        del held["tow"][key]
+    write_case(tmp_path, held, "held.yml")
+    subprocess.run([BERGTOW, "run", "held.yml", "-o", "held", "--quiet"], cwd=tmp_path, env=environment(), check=True,
+                   capture_output=True)
+    needed = json.loads((tmp_path / "held/summary.json").read_text())["mean_drag_force_n"] / (1 - 0.4 ** 2)
+    assert one["does_not"] - 1 <= needed <= one["makes_it"] + 1
+    assert "N" in text.splitlines()[2]
+
+
+def test_a_line_that_parts_is_no_tow(tmp_path):
+    case = changed(THRUST, tow__mode="line", tow__line__breaking_load=9, run__duration=20)
+    del case["tow"]["vessel"]
+    found, text = found_in(tmp_path, case, "--from", 0.3, "--to", 0.9, "--points", 0, "--budget", 0.5, "--fields", 6,
+                           "--resolution", 0.6)
+    points = found["conditions"][0]["points"]
+    assert points[-1]["parted"] == points[-1]["fields"] and points[-1]["made"] == 0
+    assert "no branch of its line parts" in text and found["breaking_load"] == 9
+
+
+def test_what_is_refused(tmp_path):
+    assert "mode speed, which no ice stops; set tow.mode to thrust" in found_in(tmp_path, TOW, code=4)
+    assert "say its range with --from and --to" in found_in(tmp_path, THRUST, "--search", "ice.friction", code=2)
+    assert "unknown key" in found_in(tmp_path, THRUST, "--set", "ice.sise=1", code=4)
+    assert "no extent" in found_in(tmp_path, THRUST, "--from", 0.5, "--to", 0.5, code=4)
+    assert "no values" in found_in(tmp_path, THRUST, "--for", "ice.thickness", code=4)
+    assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
+
+
+def test_runs_that_fail_are_replaced_and_a_spent_budget_is_told(tmp_path, monkeypatch):
+    """Every third field fails: others stand for it; and a search without time says so."""
+    case = write_case(tmp_path, THRUST)
+    runs = case_runs.CaseRuns(case, tmp_path, "capability", Path(BERGTOW), [], 1, np.inf, np.inf)
+    monkeypatch.setattr(runs, "make", lambda name, fields, sets: ["diverged" if i % 3 == 2 else None for i in fields])
+    monkeypatch.setattr(capability, "Run", made_up_run)
+    c = capability.Condition("case", "the case", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2, most=6))
+    search = capability.Search(runs, "ice.concentration", 0.1, None)
+    search.find(c)
+    found = capability.found_of(c, 0.1)
+    assert found["resolved"] and found["points"][0]["failed"] == 2 and found["points"][0]["fields"] == 6
+    assert [t.field for t in c.trials[0.2]] == [1, 2, 4, 5, 7, 8]
+    monkeypatch.setattr(runs, "end", 0.0)
+    late = capability.Condition("late", "late", np.nan, {}, bracket.Bracket(0.2, 0.8, 0.2))
+    search.find(late)
+    assert late.why == case_runs.SPENT and not capability.found_of(late, 0.1)["resolved"]
+
+
+class made_up_run:
+    """A run whose body keeps 0.15 m/s below a concentration of 0.5, and stops above."""
+
+    window, case, summary = (0.0, 10.0), {}, {}
+
+    def __init__(self, path):
+        self.path, self.speed = path, 0.15 if float(path.parent.name) < 0.5 else 0.0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *exc):
+        return False
+
+    def __getitem__(self, name):
+        t = np.arange(11.0)
+        return t if name == "time" else self.speed * t if name == "body_x" else 0 * t
+
+    def number(self, key):
+        return 1.0
+
+
+def test_its_block_for_a_report(tmp_path):
+    assert capability_text.block(tmp_path) is None
+    point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 1, "speed": [0.4, 0.5], "mean_speed": 0.45,
+             "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
+             "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
+             "mean_tension_95": [None, None]}
+    hard = point | {"value": 0.9, "made": 0, "mean_speed_95": [None, None]}
+    rows = [{"label": f"ice.thickness {h} m", "for": h, "makes_it": 0.5, "does_not": None, "estimate": None,
+             "resolved": False, "why": case_runs.SPENT, "runs": 5, "points": [point, hard]} for h in (0.5, 1.0)]
+    found = {"case": "case.yml", "title": "a $ in the title", "set": [], "search": "ice.concentration", "unit": "",
+             "range": [0.2, 0.95], "resolution": 0.05, "for": "ice.thickness", "for_unit": "m", "speed": 0.3,
+             "share": 0.5, "most_fields": 12, "breaking_load": 1e6, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
+             "conditions": rows}
+    (tmp_path / "capability.json").write_text(json.dumps(found))
+    block = capability_text.block(tmp_path)
+    assert "| ice.thickness 0.5 m | 50.0 % | – | – | 5 | not resolved: the budget is spent |" in block["markdown"]
+    assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
+    axes = block["figure"]().axes
+    assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
+    assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3
