@@ -106,7 +106,8 @@ def of_study(run):
     }
     def words(name, key, value):
         """The comment beside a key, or the source that a range names."""
-        return said.get(f"{name}.{key}", ("", ""))[1] or (str(value.get("source", "")) if isinstance(value, dict) else "")
+        source = str(value.get("source", "")) if isinstance(value, dict) else ""
+        return said.get(f"{name}.{key}", ("", ""))[1] or source
     return {"ice.seed": ""} | {str(key): words(name, key, value) for name, keys in groups.items()
                                for key, value in keys.items()}
 
