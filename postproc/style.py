@@ -176,7 +176,7 @@ def in_sight(axes, line):
         return bool(inside.any())
     def meets(v, least, most):
         return (np.fmin(v[:-1], v[1:]) <= most) & (np.fmax(v[:-1], v[1:]) >= least)
-    return bool(inside.any() or np.any(meets(x, left, right) & meets(y, low, high) & known[:-1] & known[1:]))
+    return bool(inside.any() or np.any(meets(x, left, right) & meets(y, low, high)))
 
 
 def legend_of(axes):

@@ -85,11 +85,19 @@ def quick(places, tmp_path, monkeypatch):
     write_case(tmp_path, changed(TOW, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4,
                                  tow__line__breaking_load=1e5), "line.yml")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
-    monkeypatch.setattr(converge, "converge", lambda *_: [])
+    monkeypatch.setattr(converge, "converge", work_of(tmp_path / "converge.json"))
     monkeypatch.setattr(converge.converge_text, "verdicts", lambda _: "")
     monkeypatch.setattr(report_run, "pictures", lambda _: [])
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     return {"RUN": str(places / "run"), "ALL": str(places / "all")}
+
+
+def work_of(file):
+    """In place of hours of work, which must not begin where its result cannot be written."""
+    def work(*_):
+        assert not file.exists() or file.read_bytes() != DEAR
+        return []
+    return work
 
 
 def test_every_script_that_writes_is_here():
@@ -113,8 +121,10 @@ def test_files_of_others_are_kept(quick, tmp_path, module, words, files, monkeyp
         with pytest.raises(RunError, match=name + REFUSED):
             module.main(words)
         assert (tmp_path / name).read_bytes() == DEAR
+        assert not [other for other in files if other != name and (tmp_path / other).exists()]
         if name != files[-1]:
             (tmp_path / name).unlink()
+    monkeypatch.setattr(converge, "converge", lambda *_: [])
     module.main([*words, "--force"])
     made = {name: (tmp_path / name).read_bytes() for name in files}
     assert all(content != DEAR for content in made.values())

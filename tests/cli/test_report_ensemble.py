@@ -99,7 +99,7 @@ def test_the_answer_is_the_design_statement(tmp_path):
     """Rounded to what the interval leaves; of fields that are long enough for a tail."""
     rng = np.random.default_rng(8)
     e = Ensemble(made_up.write(tmp_path / "out", [
-        member(made_up.ar1(0.6, 4000, rng, 100.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
+        member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
     d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None)
     row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
