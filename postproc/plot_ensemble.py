@@ -620,10 +620,13 @@ def main(argv=None):
     drawn = pictures(e, a, conditions_with_loads(e, a))
     if not drawn:
         raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")
+    places = {name: (a.output or e.path) / f"{name}.{a.format}" for name, _ in drawn}
+    for path in places.values():
+        command.may_write(path, a.force)
     for name, draw in drawn:
         figure = draw()
         if figure is not None:
-            command.save(figure, (a.output or e.path) / f"{name}.{a.format}", a.force)
+            command.save(figure, places[name], a.force)
             plt.close(figure)
 
 
