@@ -175,7 +175,7 @@ DEPS := build-essential pkg-config git \
         libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
         libxxhash-dev libcmocka-dev \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
-        python3-pytest ffmpeg chromium chromium-driver python3-selenium
+        python3-pytest ffmpeg chromium chromium-driver python3-selenium poppler-utils
 
 # For the tests of the Python package; it runs without them, but for open_result.
 DEPS_TEST := python3-xarray python3-pip python3-setuptools python3-wheel

@@ -5,7 +5,6 @@ Pillow.
 What stands still is drawn once; per frame only floes, bodies and the moving parts of the curve are drawn over it
 (a full redraw spends most of its time on text and ticks).
 """
-import os
 import subprocess
 import tempfile
 
@@ -123,7 +122,7 @@ def write_mp4(film, frames, fps, path):
     width, height = film.size
     call = ["ffmpeg", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}",
             "-r", str(fps), "-i", "-", "-an", "-c:v", "libx264", "-preset", "fast", "-crf", "20", "-pix_fmt", "yuv420p",
-            "-movflags", "+faststart", "-f", "mp4", str(path)]
+            "-movflags", "+faststart", "-metadata", f"comment={command.MARK}", "-f", "mp4", str(path)]
     with tempfile.TemporaryFile() as messages:
         try:
             coder = subprocess.Popen(call, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=messages)
@@ -175,6 +174,7 @@ def write_gif(film, frames, fps, path):
                        duration=max(20, round(1000 / fps)),
                        loop=0,
                        optimize=False,
+                       comment=command.MARK.encode(),
                        transparency=255,
                        disposal=1)
 
@@ -210,17 +210,8 @@ def main(argv=None):
         count = min(a.frames or (120 if gif else run.n_frames), run.n_frames)
         frames = sorted({int(i) for i in np.linspace(0, run.n_frames - 1, count).round()})
         film = Film(run, frames, a.colour, width, a.window)
-        # Written beside its place and then renamed: a film that is there is whole.
-        part = path.with_name(path.name + ".part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            (write_gif if gif else write_mp4)(film, frames, a.fps, part)
-            os.replace(part, path)
-        except OSError as error:
-            raise RunError(path, f"cannot be written ({error.strerror or error})",
-                           "choose another place with -o") from None
-        finally:
-            part.unlink(missing_ok=True)
+        with command.written(path, a.force) as new:
+            (write_gif if gif else write_mp4)(film, frames, a.fps, new)
     print(path)
 
 

@@ -9,7 +9,6 @@ The study is a Latin hypercube (`sampling`, `samples`) with fields of its own fo
 converge` on the base case (`--converge FILE`, or converge.json in DIR).
 """
 import argparse
-import json
 import os
 import subprocess
 import time
@@ -101,16 +100,19 @@ def main(argv=None):
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="members at a time (default: the cores)")
+    command.add_force(p)
     a = p.parse_args(argv)
     if not a.study.is_file():
         raise RunError(a.study, "no such file", "name a study file")
     folder = a.output or Path("out") / a.study.stem
+    for name in ("budget.json", "budget.png"):
+        command.may_write(folder / name, a.force)
     run(program(), a.study, folder, a.set, max(1, a.jobs), a.budget)
     found = plain(of_ensemble(Ensemble(folder), a.of, read_converge(a.converge, folder)))
-    (folder / "budget.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    command.write_json(found, folder / "budget.json", a.force)
     print(budget_text.text(found))
     print()
-    command.save(budget_text.figure(found), folder / "budget.png")
+    command.save(budget_text.figure(found), folder / "budget.png", a.force)
     print(folder / "budget.json")
 
 

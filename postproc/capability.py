@@ -11,7 +11,6 @@ line that may part; a prescribed speed is kept whatever it takes. The search is 
 a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
 """
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -259,6 +258,7 @@ def arguments(argv):
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")
+    command.add_force(p)
     a = p.parse_args(argv)
     for name, k in (("start", 0), ("end", 1)):
         if getattr(a, name) is None:
@@ -283,6 +283,8 @@ def main(argv=None):
     resolution = number(a.search, a.resolution, abs(end - start) / PARTS)
     least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
     folder, last = a.output or Path("out") / f"capability-{a.case.stem}", began + 60 * a.budget
+    for name in ("capability.json", "capability.png"):
+        command.may_write(folder / name, a.force)
     runs = CaseRuns(a.case, folder, "capability", binary, a.set, max(1, a.jobs), last, last)
     search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None)
     some = conditions(a, binary, a.set, start, end, resolution)
@@ -305,12 +307,11 @@ def main(argv=None):
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]
     }
-    folder.mkdir(parents=True, exist_ok=True)
     found = plain(found)
-    (folder / "capability.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    command.write_json(found, folder / "capability.json", a.force)
     print(capability_text.text(found))
     print()
-    command.save(capability_text.figure(found), folder / "capability.png")
+    command.save(capability_text.figure(found), folder / "capability.png", a.force)
     print(folder / "capability.json")
 
 

@@ -19,7 +19,6 @@ look is made at a level of 1 - 0.05/LOOKS, so that all together have 95 %. Rejec
 too small where floes jam and too large where nothing happens.
 """
 import argparse
-import json
 import os
 import time
 from dataclasses import dataclass
@@ -252,17 +251,18 @@ def main(argv=None):
     p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
     p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
                    help="runs at a time (default: the cores)")
+    command.add_force(p)
     a = p.parse_args(argv)
     if not a.case.is_file():
         raise RunError(a.case, "no such file", "name a case file")
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
+    command.may_write(folder / "converge.json", a.force)
     study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, max(1, a.jobs), began + 60 * a.budget,
                      began + 60 * a.budget)
     rows = converge(study, a.vary, a.margin, a.tries)
     found = {"case": str(a.case), "set": a.set, "margin": a.margin, "budget_min": a.budget, "looks": LOOKS,
              "spent_min": (time.monotonic() - began) / 60, "rows": rows}
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "converge.json").write_text(json.dumps(plain(found), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    command.write_json(plain(found), folder / "converge.json", a.force)
     print(converge_text.verdicts(found))
     print(f"\n{folder / 'converge.json'}")
 

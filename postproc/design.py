@@ -1,156 +1,270 @@
 # SPDX-License-Identifier: MIT
-"""The design statement of an ensemble: for each condition the tow force that is exceeded with a stated probability in a
-tow of stated length, its interval over fields, what it holds for, and what speaks against it.
+"""From a case or a study to the report of the design tow force, as a page and as PDF.
 
-    p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
-Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
-domain that is too narrow, windows that are not steady, a tail that is extrapolated far.
+    design.py CASE.yml -o DIR --budget 13          DIR/design.yml, the ensemble, report.html, report.pdf, replay.html
+    design.py STUDY.yml -o DIR                     the same of a study, with the fields that it asks for
+
+Of a case a study is made: over concentrations, with as many fields of each as the budget allows. The first field of
+each condition is run, then some of those that fit into what is left, by the time which the last ones took, and so on;
+so conditions have equally many, and nothing is cut off half-way. Should the time run out all the same, the fields that
+are complete in every condition are taken. Members are independent: one process of one thread a core. The same call
+goes on where an earlier one ended.
 """
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
 from dataclasses import dataclass
+from pathlib import Path
+
+import command
+import pdf
+import report
+from bergtow_read import Run, RunError
+from case_runs import STOPPED, above_zero, program
+from ensemble import whole
+from ensemble_read import FINISHED, Ensemble
+from report_case import TITLE_BLOCK
 
 import numpy as np
+import yaml
 
-import stat_load
-import stat_profile
-import style
-from bergtow_read import Run, RunError
-
-RIGID = 0.75        # concentration from which on rigid floes jam and nothing limits the force
-FAR = 10.0          # times the hours simulated: an extrapolation beyond is told
-WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
-SHORT_FIELDS = stat_profile.LEAST_FIELDS
-#: doubts about members (ensemble_read.DOUBTS) that concern the value
-DOUBTFUL = {
-    "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
-    "unsteady": "members that are not steady", "short": "members with a short window",
-    "stopped": "members that stopped early"
-}
-TENSIONS = ("line_tension_1", "line_tension_2")
-#: what stands in the line of what the values hold for: case key, words in front and behind
-HOLDS_FOR = (("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
-             ("body.length", "body of", ""), ("tow.mode", "tow mode", ""), ("tow.speed", "", ""),
-             ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
+BUDGET = 13.0                # min
+CONCENTRATIONS = "0.6,0.7,0.8,0.9"
+MOST_FIELDS = 40
+RESERVE = 45.0, 15.0         # s of the budget for pages, and for the statistics of each condition
+MARGIN = 0.95                # of what is left is given to fields
+SHARE = 0.6                  # of these are run before it is measured anew how long one takes
+REPLAY_FRAMES = 120
+FEW = 5                      # fields below which nothing is known of the scatter between them
 
 
-@dataclass(frozen=True)
-class Case:
-    """What a statement has to know of a condition's case."""
+@dataclass
+class Work:
+    """One call: program, folder, options, and the end of the budget by time.monotonic()."""
 
-    rigid: bool            #: nothing limits the force of a floe
-    mode: str
-    breaking_load: float   #: N, NaN without one
-    bollard_pull: float    #: N, NaN without a vessel
-    texts: dict            #: {key: value as written}
+    program: Path
+    folder: Path
+    given: list              #: --set of the user's
+    jobs: int
+    end: float               #: inf without a budget
+    quiet: bool
 
+    def left(self):
+        return self.end - time.monotonic()
 
-def case_of(e, rows):
-    """Case of the first member of a condition that can be read, None where none can."""
-    for m in rows:
+    def made(self):
+        """When ensemble.h5 was made, None where it is not there."""
         try:
-            with Run(e.folder(m)) as run:
-                limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
-                load, pull = run.value("tow.line.breaking_load", 0.0), run.value("tow.vessel.bollard_pull", 0.0)
-                mode = run.case.get("tow.mode", "")
-                return Case(not any(x > 0 for x in limits), mode, load if load > 0 and mode != "speed" else np.nan,
-                            pull if mode == "thrust" and pull > 0 else np.nan, run.case)
-        except RunError:
-            continue
-    return None
+            return (self.folder / "ensemble.h5").stat().st_mtime_ns
+        except FileNotFoundError:
+            return None
+
+    def ensemble(self, study):
+        """Run the members that are not there yet, one process a core. True when all have settled. Errors: RunError."""
+        call = [str(self.program), "ensemble", str(study), "-o", str(self.folder), "--threads", "1"]
+        call += [part for text in self.given for part in ("--set", text)]
+        if np.isfinite(self.end):
+            call += ["--max-wall", f"{max(1.0, self.left()):.0f}"]
+        before = self.made()
+        first = subprocess.Popen(call + ["--quiet"] * self.quiet, stderr=subprocess.PIPE, text=True)
+        # the folder and its study are the first's to make
+        time.sleep(1.0)
+        others = [subprocess.Popen([*call, "--quiet", "--no-wait"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL) for _ in range(self.jobs - 1) if first.poll() is None]
+        said = first.communicate()[1]
+        for other in others:
+            other.wait()
+        if first.returncode not in (0, STOPPED) and self.made() == before:  # refused; not a member that failed
+            raise RunError(study, (said.strip().splitlines() or [f"exit code {first.returncode}"])[0],
+                           "mend the case or the study")
+        sys.stderr.write(said)
+        return first.returncode == 0
 
 
-def _of_the_case(e, rows, case, tow):
-    """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
-    out = []
-    concentration = e.summary.get("concentration", np.full(e.n, np.nan))[rows]
-    dense = np.nanmax(concentration, initial=0.0)
-    if case is None:
-        out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
-    elif case.rigid and dense >= RIGID:
-        out.append((f"rigid floes at {100 * RIGID:.0f} % and more: nothing in the model limits the force of a jam, so "
-                    "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
-                    f"{100 * dense:.0f} %"))
-    if case is not None and case.mode == "speed":
-        out.append(("the tow holds its speed whatever it takes: no vessel slows down, no line stretches", ""))
-    narrow = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows)
-    if narrow:
-        out.append(("the domain is narrow for this ice: the value belongs to its width, and bergtow converge says "
-                    "how much", f"{narrow} of {len(rows)} members"))
-    if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
-        out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
-                    style.quantity(case.bollard_pull, "N")))
-    return out
+def contents(path):
+    """The file as YAML. Errors: RunError."""
+    try:
+        found = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file") from None
+    if not isinstance(found, dict):
+        raise RunError(path, "is neither a case nor a study", "name a case or a study file")
+    return found
 
 
-def _of_the_sample(e, rows, c, load):
-    """The same of how much was simulated, and of the tail."""
-    out, d = [], load["design"]
-    for kind, words in DOUBTFUL.items():
-        n = c["members"]["doubts"][kind]
-        if n:
-            out.append((words, f"{n} of {len(rows)} members"))
-    if c["drift"]["verdict"] == "not steady":
-        out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
-    if load["fields"] < SHORT_FIELDS:
-        out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
-                    f"{load['fields']}"))
-    if load["step_mean"]:
-        out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
-    if "refused" in d:
-        return out + [("no value", d["refused"])]
-    if d["times_the_hours_simulated"] > FAR:
-        more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
-        out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{style.short(d['times_the_hours_simulated'], 2)} times; {more} fields would leave {FAR:g}"))
-    if d["irregular"]:
-        out.append(("the fitted tail ends at little more than the largest value simulated", ""))
-    if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
-        out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
-    return out + _of_the_models(load)
+def reads_ice(case):
+    """Is the ice of a case read, so that it has no concentration to vary?"""
+    ice = case.get("ice")
+    return isinstance(ice, dict) and any(str(ice.get(k, "none")) != "none" for k in ("outlines", "field"))
 
 
-def _of_the_models(load):
-    """Do the two models of the tail agree?"""
-    over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
-    if not over or not blocks or not np.isfinite([over["level"], blocks["level"]]).all():
-        return []
-    low, high = over["level_95"]
-    if low <= blocks["level"] <= high:
-        return []
-    return [("peaks over a threshold and block maxima disagree on the tail",
-             f"{style.quantity(over['level'], load['units'])} and {style.quantity(blocks['level'], load['units'])}")]
+def title_of(case, name, values):
+    run = case.get("run")
+    title = run.get("title") if isinstance(run, dict) else None
+    words = f"ice of {100 * min(values):g} to {100 * max(values):g} %" if len(values) > 1 else \
+        f"ice of {100 * values[0]:g} %" if values else ""
+    return ": ".join(part for part in (str(title or name), words) if part)
 
 
-def statement(e, rows, c):
-    """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "warnings",
-    "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
-    case, loads = case_of(e, rows), c["loads"]
-    tow = loads.get("tow_force")
-    tensions = [(loads[name]["design"], loads[name]["label"]) for name in TENSIONS
-                if name in loads and "value" in loads[name]["design"]]
-    worst = max(tensions, key=lambda found: found[0]["value"], default=None)
-    warned = _of_the_case(e, rows, case, tow and tow["design"])
-    if tow is None:
-        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
-                       "something is towed", ""))
-    else:
-        warned += _of_the_sample(e, rows, c, tow)
-    breaking = case.breaking_load if case else np.nan
-    if worst and worst[0]["value"] > breaking:
-        warned.append(("the tension is above the breaking load of the line", style.quantity(breaking, "N")))
-    return {
-        "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
-                        "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
-                        "largest": tow["largest"]},
-        "tension": worst and {**worst[0], "label": worst[1]},
-        "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
-        "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
+def write_study(a, case, repeats):
+    """The study of a case: DIR/design.yml. Errors: RunError."""
+    values = [] if reads_ice(case) else a.concentrations
+    study = {
+        "title": a.title or title_of(case, a.file.stem, values),
+        "base": os.path.relpath(a.file.resolve(), a.output.resolve()), "repeats": repeats, "seed": a.seed
     }
+    if values:
+        study["parameters"] = {"ice.concentration": values}
+    path = a.output / "design.yml"
+    text = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
+    command.write_text(f"# {command.MARK}\n{text}", path, a.force)
+    return path
 
 
-def _holds_for(e, case):
-    """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
-    if case is None:
-        return ""
-    said = [(case.texts[key], before, behind) for key, before, behind in HOLDS_FOR
-            if key in case.texts and key not in e.parameters]
-    return ", ".join(" ".join(part for part in (before, value, behind) if part) for value, before, behind in said)
+def fields_done(e):
+    """Fields that have finished in every condition, from the first on."""
+    done = [int(np.argmin(np.append(e.status[c.members] == FINISHED, False))) for c in e.conditions()]
+    return min(done, default=0)
+
+
+def seconds_a_field(e):
+    """Wall time of one field of all conditions, by the members that are there."""
+    took = {}
+    for m in np.flatnonzero(e.status == FINISHED):
+        with Run(e.folder(m)) as run:
+            took.setdefault(int(e.condition[m]), []).append(run.number("wall_time_s"))
+    return sum(np.mean(some) for some in took.values())
+
+
+def run_case(work, a, case):
+    """Fields of a case as the budget allows. Errors: RunError."""
+    n = 1
+    whole_round = work.ensemble(write_study(a, case, n))
+    if not whole_round and fields_done(Ensemble(a.output)) < 1:
+        raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
+                       "raise --budget; what was begun is kept, and the same call goes on")
+    rate = seconds_a_field(Ensemble(a.output)) / work.jobs
+    print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
+    while whole_round and n < a.fields:
+        more = min(int(MARGIN * work.left() / rate), a.fields - n)
+        if more < 1:
+            break
+        more = int(np.ceil(SHARE * more))
+        start = time.monotonic()
+        whole_round = work.ensemble(write_study(a, case, n + more))
+        rate = (time.monotonic() - start) / more
+        n += more
+    if not whole_round:
+        n = max(1, fields_done(Ensemble(a.output)))
+        work.end = np.inf  # nothing is left to run; the members are gathered once more
+        work.ensemble(write_study(a, case, n))
+    if n < min(FEW, a.fields):
+        need = a.budget * FEW / n
+        print(f"design.py: warning: {n} fields say nothing of the scatter between them; {FEW} need some {need:.0f} min "
+              "(--budget), or a shorter run (--set run.duration=1h)", file=sys.stderr)
+
+
+def hardest(e):
+    """The first field of the condition with the largest mean tow force, None without one."""
+    force = e.summary.get("mean_tow_force_n", np.full(e.n, np.nan))
+    there = [m for m in np.flatnonzero((e.status == FINISHED) & np.isfinite(force)) if e.folder(m).is_dir()]
+    if not there:
+        return None
+    condition = max({int(e.condition[m]) for m in there},
+                    key=lambda c: np.mean([force[m] for m in there if e.condition[m] == c]))
+    return next(m for m in there if e.condition[m] == condition)
+
+
+def make_replay(work, a, left):
+    """One tow once more, with frames: DIR/replay.html. It has the same state to the last bit."""
+    e = Ensemble(a.output)
+    m = hardest(e)
+    if m is None:
+        return
+    with Run(e.folder(m)) as run:
+        if run.number("wall_time_s") > left or reads_ice({"ice": {k.split(".", 1)[1]: v for k, v in run.case.items()
+                                                                  if k.startswith("ice.")}}):
+            return
+        step = run.value("run.duration") / REPLAY_FRAMES
+    with tempfile.TemporaryDirectory(dir=a.output, prefix="replay-") as folder:
+        call = [str(work.program), "run", str(e.folder(m) / "case.resolved.yml"), "-o", folder, "--quiet", "--threads",
+                str(work.jobs), "--set", f"output.frame_interval={step:g}s"]
+        done = subprocess.run(call, capture_output=True, text=True)
+        if done.returncode:
+            print(f"design.py: warning: no replay: {(done.stderr.strip().splitlines() or ['no reason given'])[0]}",
+                  file=sys.stderr)
+        else:
+            report.main([folder, "-o", str(a.output / "replay.html"), *["--force"] * a.force])
+
+
+def concentrations(text):
+    try:
+        values = sorted({float(part) for part in text.split(",")})
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: give numbers with commas, as in {CONCENTRATIONS}") from None
+    if not all(0 <= v <= 0.95 for v in values):
+        raise argparse.ArgumentTypeError(f"{text}: concentrations are 0 to 0.95")
+    return values
+
+
+def arguments(argv):
+    p = argparse.ArgumentParser(description="From a case or a study to the report of the design tow force: "
+                                "report.html and report.pdf.")
+    p.add_argument("file", metavar="CASE-or-STUDY.yml", type=Path)
+    p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/design-NAME; the same call goes on "
+                   "where an earlier one ended")
+    p.add_argument("--budget", type=above_zero, metavar="MIN",
+                   help=f"wall time for all of it, min (default: {BUDGET:g} for a case, none for a study)")
+    p.add_argument("--concentrations", type=concentrations, metavar="A,...", default=concentrations(CONCENTRATIONS),
+                   help=f"of a case (default: {CONCENTRATIONS})")
+    p.add_argument("--fields", type=whole, default=MOST_FIELDS, metavar="N",
+                   help="of a case: at most so many of each condition (default: %(default)s)")
+    p.add_argument("--seed", type=whole, default=1, metavar="N", help="of a case: of its fields (default: 1)")
+    p.add_argument("--title", metavar="TEXT", help="of a case: title of the report")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
+    p.add_argument("--jobs", type=whole, default=len(os.sched_getaffinity(0)), metavar="N",
+                   help="runs at a time (default: the cores)")
+    p.add_argument("--no-pdf", action="store_true", help="the page alone")
+    p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
+    p.add_argument("--quiet", action="store_true", help="no line for each member")
+    for name in TITLE_BLOCK:
+        p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
+    command.add_force(p)
+    a = p.parse_args(argv)
+    a.output = a.output or Path("out") / f"design-{a.file.stem}"
+    return a
+
+
+def main(argv=None):
+    a, began = arguments(argv), time.monotonic()
+    found = contents(a.file)
+    study = "base" in found
+    if a.budget is None and not study:
+        a.budget = BUDGET
+    if not a.no_pdf:
+        pdf.browser()
+    made = ["report.html"] + ["report.pdf"] * (not a.no_pdf)
+    for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
+        command.may_write(a.output / name, a.force)
+    a.output.mkdir(parents=True, exist_ok=True)
+    reserve = RESERVE[0] + RESERVE[1] * len(a.concentrations)
+    end = began + max(60 * a.budget - reserve, 30 * a.budget) if a.budget else np.inf
+    work = Work(program(), a.output, a.set, a.jobs, end, a.quiet)
+    if study:
+        work.ensemble(a.file)
+    else:
+        run_case(work, a, found)
+    if not a.no_replay:
+        make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
+    report.write_all(a.output, [a.output / name for name in made], a)
+    print(f"{(time.monotonic() - began) / 60:.1f} min")
+    holes = Ensemble(a.output).holes()
+    if holes:
+        raise RunError(a.output, holes, "call again: it goes on; bergtow ensemble --retry-failed tries failed ones")
+
+
+if __name__ == "__main__":
+    command.guarded(main)

@@ -7,16 +7,14 @@ Where members of the study are in no number (they wait, failed, are not sound, o
 are named, and the exit code is 4, so that no script takes a part for the whole; --partial allows it.
 """
 import argparse
-import csv
-import json
 from pathlib import Path
 
 import command
 import converge_text
-import design
 import ensemble_text
 import loads
 import soundness
+import statement
 import stat_extreme
 import stat_fit
 import stat_mean
@@ -148,7 +146,7 @@ def condition(e, c, members, options):
         }, "extremes": extremes(e, rows, options), "loads": loads.statistics(e, rows, options),
         "panels": loads.panels(e, rows)
     }
-    return out | {"design": design.statement(e, rows, out)}
+    return out | {"design": statement.statement(e, rows, out)}
 
 
 def sensitivity(e, members):
@@ -271,21 +269,11 @@ def csv_row(c, load_names):
     return {k: "" if isinstance(v, float) and not np.isfinite(v) or v is None else v for k, v in row.items()}
 
 
-def write(s, folder):
+def write(s, folder, force):
     """statistics.json and statistics.csv in the folder. Errors: RunError."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "statistics.json").write_text(json.dumps(plain(s), indent=1, allow_nan=False) + "\n",
-                                                encoding="utf-8")
-        names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
-        rows = [csv_row(c, names) for c in s["conditions"]]
-        with open(folder / "statistics.csv", "w", newline="", encoding="utf-8") as f:
-            table = csv.DictWriter(f, list(rows[0]))
-            table.writeheader()
-            table.writerows(rows)
-    except OSError as error:
-        raise RunError(folder, f"cannot be written ({error.strerror or error})",
-                       "choose another folder with -o") from None
+    names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
+    command.write_json(plain(s), folder / "statistics.json", force)
+    command.write_csv([csv_row(c, names) for c in s["conditions"]], folder / "statistics.csv", force)
 
 
 def positive(text):
@@ -373,11 +361,14 @@ def main(argv=None):
     p.add_argument("--partial",
                    action="store_true",
                    help="exit with 0 even where members of the study are in no number")
+    command.add_force(p)
     a = p.parse_args(argv)
     e = Ensemble(a.folder)
-    s = statistics(e, a)
     folder = a.output or e.path
-    write(s, folder)
+    for name in ("statistics.json", "statistics.csv"):
+        command.may_write(folder / name, a.force)
+    s = statistics(e, a)
+    write(s, folder, a.force)
     print(ensemble_text.report(s, a.markdown))
     print(f"\n{folder / 'statistics.csv'}\n{folder / 'statistics.json'}")
     if s["holes"] and not a.partial:

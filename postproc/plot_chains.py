@@ -186,10 +186,11 @@ def main(argv=None):
     p.add_argument("--whole",
                    action="store_true",
                    help="draw the whole domain (default: what holds the towed body and the forces)")
+    command.add_force(p)
     a = p.parse_args(argv)
     path = command.output(p, a, "chains.png", command.PICTURES)
     with Run(a.run) as run:
-        command.save(draw(run, read(a.contacts), a.whole), path)
+        command.save(draw(run, read(a.contacts), a.whole), path, a.force)
 
 
 if __name__ == "__main__":

@@ -29,12 +29,10 @@ from ensemble_read import DOUBTS, Ensemble, short_key
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import LogNorm
-from matplotlib.ticker import FuncFormatter
 
 MOST_PANELS = 6
 MOST_LINES = 8
 CYCLE = ("#0072b2", "#d55e00", "#009e73", "#8c6bb1", "#b8860b", "#56b4e9", "#4d4d4d", "#cc79a7")
-JAM = "#c1121f"
 
 
 def numeric(e):
@@ -106,7 +104,7 @@ def draw_fields(axes, e, some, key, factor, log_x):
                   markersize=3.6,
                   markeredgewidth=0,
                   zorder=3)
-        axes.plot(at[jam], y[order][jam] / factor, "x", color=JAM, markersize=5, markeredgewidth=1.2, zorder=3.5)
+        axes.plot(at[jam], y[order][jam] / factor, "x", color=style.JAM, markersize=5, markeredgewidth=1.2, zorder=3.5)
     centre = np.array([y.mean() for y in means])
     if np.isfinite(band).all() and len(x) > 1:
         axes.fill_between(x,
@@ -144,7 +142,7 @@ def fields_legend(jams):
            (line([], [], marker="_", color=style.INK, linestyle="none", markersize=12,
                  markeredgewidth=2), "median of the fields")]
     if jams:
-        out.append((line([], [], marker="x", color=JAM, linestyle="none",
+        out.append((line([], [], marker="x", color=style.JAM, linestyle="none",
                          markersize=5), "a field where the body stood still"))
     return out
 
@@ -204,11 +202,12 @@ def draw_speed(axes, e, some, key, factor):
     weights = np.array([len(y) for y in means], dtype=float)
     centre = np.exp(np.dot(weights, np.log(x)) / weights.sum())
     axes.plot(v,
-              scale * centre**exponent * (v / centre)**2 / factor,
-              color=style.TOW,
-              linewidth=1.2,
-              dashes=(5, 2),
-              zorder=2.5)
+                      scale * centre**exponent * (v / centre)**2 / factor,
+                      color=style.TOW,
+                      linewidth=1.2,
+                      dashes=(5, 2),
+                      zorder=2.5,
+                      label="∝ V², through the middle of the fields")
     axes.annotate(f"exponent {exponent:.2g} ({low:.2g} to {high:.2g})", (0.98, 0.03),
                   xycoords="axes fraction",
                   ha="right",
@@ -245,7 +244,7 @@ def draw_sweep(e, key):
                                 squeeze=False,
                                 sharex=True,
                                 sharey=True)
-    extra = {}
+    extra, lost = {}, {}
     for axes, (words, some) in zip(grid.flat, shown):
         draw_fields(axes, e, some, key, factor, log_x)
         if key == "ice.concentration":
@@ -254,21 +253,13 @@ def draw_sweep(e, key):
                 plot_resistance.draw_estimates(axes, [point], factor)
         elif key == "tow.speed":
             draw_speed(axes, e, some, key, factor)
-            extra["∝ V², through the middle of the fields"] = plt.Line2D([], [],
-                                                                         color=style.TOW,
-                                                                         linewidth=1.2,
-                                                                         dashes=(5, 2))
-        for handle, label in zip(*axes.get_legend_handles_labels()):
-            extra.setdefault(label, handle)
         axes.set_title(words, fontsize=10)
         axes.grid(True)
         if log_x:
-            axes.set_xscale("log")
+            style.logarithmic(axes.xaxis)
             axes.set_xticks(np.unique(values), [f"{v:g}" for v in np.unique(values)])
-            axes.xaxis.set_minor_formatter(FuncFormatter(lambda *_: ""))
         if log_y:
-            axes.set_yscale("log")
-            axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            style.logarithmic(axes.yaxis)
     grid.flat[0].set_ylim(low / factor, high / factor)
     if not log_x:
         margin = 0.06 * (values.max() - values.min())
@@ -276,6 +267,11 @@ def draw_sweep(e, key):
                                   values.min() - margin),
                               min(1.0,
                                   values.max() + margin) if key == "ice.concentration" else values.max() + margin)
+    for axes in grid.flat[:len(shown)]:
+        handles, labels, away = style.legend_of(axes)
+        extra |= {label: handle for handle, label in zip(handles, labels) if label not in extra}
+        lost |= dict.fromkeys(away)
+    lost = [label for label in lost if label not in extra]
     for axes in grid.flat[len(shown):]:
         axes.set_visible(False)
     for k, axes in enumerate(grid.flat[:len(shown)]):
@@ -288,6 +284,7 @@ def draw_sweep(e, key):
     note = " ".join(
         ([f"{len(panels) - MOST_PANELS} more combinations are not shown."] if len(panels) > MOST_PANELS else []) +
         (["Estimates dotted outside the range they are meant for."] if key == "ice.concentration" else []) +
+        ([f"Out of the picture: {', '.join(lost)}."] if lost else []) +
         (["A bar down to the lower edge includes zero."] if log_y and any(
             stat_mean.t_interval(of(e, c.finished))[0] <= 0 for _, some in shown for c in some) else []))
     height = figure.get_size_inches()[1]
@@ -327,7 +324,7 @@ def draw_scatter(e, key):
               markeredgewidth=0,
               label="a member")
     if jam.any():
-        axes.plot(x[jam], y[jam] / factor, "x", color=JAM, markersize=5, label="a member whose body stood still")
+        axes.plot(x[jam], y[jam] / factor, "x", color=style.JAM, markersize=5, label="a member whose body stood still")
     bins = np.array_split(np.argsort(x), min(8, len(x) // 8)) if len(x) >= 24 else []
     if bins:
         centre = np.array([y[b].mean() for b in bins])
@@ -348,9 +345,8 @@ def draw_scatter(e, key):
                   markeredgewidth=2,
                   label="median of a bin")
     if log_y:
-        axes.set_yscale("log")
+        style.logarithmic(axes.yaxis)
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel(axis_label(e, key))
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(True)
@@ -363,7 +359,7 @@ def draw_exceedance(e, options):
     """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks."""
     some = [c for c in e.conditions() if len(c.finished)]
     step = max(1, -(-len(some) // MOST_LINES))
-    figure, axes = plt.subplots(figsize=(10.5, 6.4))
+    figure, axes = plt.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.08, right=0.66, top=0.86, bottom=0.14)
     conversion, top, least = None, 0.0, np.inf
     for colour, c in zip(CYCLE, some[::step]):
@@ -374,12 +370,12 @@ def draw_exceedance(e, options):
         if not some_above.any():
             continue
         conversion, top, least = hits[0][4], max(top, peaks[0]), min(least, peaks[some_above][-1])
-        axes.loglog(peaks[some_above],
-                    rate[some_above],
-                    color=colour,
-                    drawstyle="steps-post",
-                    linewidth=1.4,
-                    label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
+        axes.plot(peaks[some_above],
+                  rate[some_above],
+                  color=colour,
+                  drawstyle="steps-post",
+                  linewidth=1.4,
+                  label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
         tail = extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
             z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
@@ -394,6 +390,7 @@ def draw_exceedance(e, options):
     if conversion is None:
         plt.close(figure)
         return None
+    style.logarithmic(axes.xaxis, axes.yaxis)
     axes.set_xlim(max(1e-4 * top, 0.7 * least), 3 * top)
     axes.set_xlabel(f"peak of a collision (N), {conversion}")
     axes.set_ylabel("exceeded (per hour of tow)")
@@ -439,21 +436,19 @@ def draw_returns(e, conditions, name):
     shown, first = some[::step], some[0]["loads"][name]
     values = [c["loads"][name]["design"]["value"] for c in shown]
     factor, unit = style.scale([np.median(values)], first["units"])
-    figure, axes = plt.subplots(figsize=(10.5, 6.4))
+    figure, axes = plt.subplots(figsize=(9.2, 5.4))
     figure.subplots_adjust(left=0.09, right=0.66, top=0.86, bottom=0.14)
     for k, (colour, c) in enumerate(zip(CYCLE, shown)):
         x = c["loads"][name]
         draw_return_line(axes, x, f"{c['label']}\n{x['fields']} fields, {x['hours']:.3g} h", colour, factor,
                          1.1 ** (k - (len(shown) - 1) / 2))
-    axes.set_xscale("log")
+    style.logarithmic(axes.xaxis)
     floor = min(c["loads"][name]["over_threshold"]["threshold"] for c in shown) / factor
     if wants_log(np.array(values) / factor) and floor > 0:
-        axes.set_yscale("log")
+        style.logarithmic(axes.yaxis)
         axes.set_ylim(0.8 * floor, 4 * max(values) / factor)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     else:
         axes.set_ylim(min(0.0, floor), 2.5 * max(values) / factor)
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_xlabel("return time (hours of tow)")
     what = f"collisions as {first['conversion']}" if first["conversion"] else f"mean over {first['time_scale_s']:.3g} s"
     axes.set_ylabel(f"{first['label']} ({unit}), {what}")
@@ -497,18 +492,18 @@ def draw_map(e, first, second):
                                               (axes[1], 100 * width, "half the 95 % interval of the mean (%)",
                                                lambda v: f"{v:.0f} %", style.FORCE_MAP)):
         norm = LogNorm() if log and ax is axes[0] else None
-        image = ax.imshow(values, origin="lower", aspect="auto", cmap=colours, norm=norm)
+        image = ax.pcolormesh(values, cmap=colours, norm=norm, edgecolor=style.PAPER, linewidth=0.6)
         for (i, j), v in np.ndenumerate(values):
             shade = image.norm(v) if np.isfinite(v) else 0
-            ax.text(j,
-                    i,
+            ax.text(j + 0.5,
+                    i + 0.5,
                     texts(v) if np.isfinite(v) else "–",
                     ha="center",
                     va="center",
                     fontsize=9.5,
-                    color=style.PAPER if shade > 0.5 else style.INK)
-        ax.set_xticks(range(len(xs)), [f"{v:.3g}" for v in xs])
-        ax.set_yticks(range(len(ys)), [f"{v:.3g}" for v in ys])
+                    color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
+        ax.set_xticks(np.arange(len(xs)) + 0.5, [f"{v:.3g}" for v in xs])
+        ax.set_yticks(np.arange(len(ys)) + 0.5, [f"{v:.3g}" for v in ys])
         ax.tick_params(length=0)
         for side in ax.spines.values():
             side.set_visible(False)
@@ -611,6 +606,7 @@ def main(argv=None):
                    default=[],
                    help="leave out members with this doubt; may be repeated")
     add_load_options(p)
+    command.add_force(p)
     a = p.parse_args(argv)
     a.hours, a.gap, a.threshold, a.blocks, a.resamples = [1.0, 10.0, 100.0], None, None, None, 1
     e = Ensemble(a.folder)
@@ -624,10 +620,13 @@ def main(argv=None):
     drawn = pictures(e, a, conditions_with_loads(e, a))
     if not drawn:
         raise RunError(e.file, "varies nothing that can be drawn", "read the tables of ensemble.py")
+    places = {name: (a.output or e.path) / f"{name}.{a.format}" for name, _ in drawn}
+    for path in places.values():
+        command.may_write(path, a.force)
     for name, draw in drawn:
         figure = draw()
         if figure is not None:
-            command.save(figure, (a.output or e.path) / f"{name}.{a.format}")
+            command.save(figure, places[name], a.force)
             plt.close(figure)
 
 

@@ -133,7 +133,7 @@ def main(argv=None):
         p.error("--times: not a finite number")
     path = command.output(p, a, "field.png", command.PICTURES)
     with Run(a.run) as run:
-        command.save(draw(run, a.colour, a.times, a.window), path)
+        command.save(draw(run, a.colour, a.times, a.window), path, a.force)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ def draw_ice(axes, run, factor, unit, top=None):
     mark_window(axes, run)
     many = len(time) > 2000
     axes.plot(time, ice / factor, color=style.ICE, alpha=0.22 if many else 0.45, linewidth=0.6 if many else 0.8,
-              label="each sample", rasterized=True)
+              label="each sample", rasterized=len(time) > style.MANY)
     axes.plot(time, smooth / factor, color=style.ICE, label=f"running mean over {style.short(seconds, 2)} s")
     if np.isfinite(mean) and run.window:
         start, end = run.window
@@ -222,13 +222,13 @@ def draw_diagnostics(run):
     figure.subplots_adjust(left=0.1, right=0.975, top=1 - 0.95 / height, bottom=0.62 / height, hspace=0.18)
     for axes, (name, label, colour) in zip(all_axes[:, 0], rows):
         values, unit = run[name], run.units(name)
-        axes.plot(run["time"], values, color=colour, linewidth=0.6, rasterized=True)
+        axes.plot(run["time"], values, color=colour, linewidth=0.6, rasterized=len(values) > style.MANY)
         axes.set_ylabel(label + (f" ({unit})" if unit not in ("", "1") else ""))
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
         # of residual and overlap decades are of interest
         if run.told(name, "merge") == "largest of the steps" and len(positive):
-            axes.set_yscale("log")
+            style.logarithmic(axes.yaxis)
             axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)
         elif not np.any(values < 0):
             axes.set_ylim(bottom=0)
@@ -258,10 +258,13 @@ def main(argv=None):
     if a.max is not None and not 0 < a.max < np.inf:
         p.error("--max: choose a force above 0")
     path = command.output(p, a, "force.png", command.PICTURES)
+    second = path.with_name(f"{path.stem}-diagnostics{path.suffix}")
+    if a.diagnostics:
+        command.may_write(second, a.force)
     with Run(a.run) as run:
-        command.save(draw(run, a.max), path)
+        command.save(draw(run, a.max), path, a.force)
         if a.diagnostics:
-            command.save(draw_diagnostics(run), path.with_name(f"{path.stem}-diagnostics{path.suffix}"))
+            command.save(draw_diagnostics(run), second, a.force)
 
 
 if __name__ == "__main__":

@@ -117,7 +117,8 @@ def draw_exceedance(axes, run):
                       ha="center",
                       color=style.FAINT)
         return
-    axes.loglog(peaks, rate, color=PEAK, drawstyle="steps-post", linewidth=1.2)
+    style.logarithmic(axes.xaxis, axes.yaxis)
+    axes.plot(peaks, rate, color=PEAK, drawstyle="steps-post", linewidth=1.2)
     axes.plot(peaks[:20], rate[:20], ".", color=PEAK, markersize=5)
     push = run.number("impacts.largest_push_n")
     if np.isfinite(push) and push > 0:
@@ -171,7 +172,7 @@ def main(argv=None):
     a = p.parse_args(argv)
     path = command.output(p, a, "impacts.png", command.PICTURES)
     with Run(a.run) as run:
-        command.save(draw(run), path)
+        command.save(draw(run), path, a.force)
 
 
 if __name__ == "__main__":

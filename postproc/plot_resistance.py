@@ -13,7 +13,6 @@ from bergtow_read import Run, RunError
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.ticker import FuncFormatter
 
 SAME = 0.02  # share by which the curves of runs in one picture may differ
 
@@ -242,14 +241,13 @@ def draw(points, log=True):
                   zorder=6,
                   label="measured")
     if log:
-        axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        style.logarithmic(axes.yaxis)
     axes.set_ylim(low / factor, high / factor)
     axes.set_xlim(0, 1)
     axes.set_xlabel("ice concentration")
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(which="major")
-    handles, labels = axes.get_legend_handles_labels()
+    handles, labels, lost = style.legend_of(axes)
     order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("simulated"))
     axes.legend([handles[i] for i in order], [labels[i] for i in order],
                 loc="upper left",
@@ -272,6 +270,7 @@ def draw(points, log=True):
                 va="top",
                 color=style.FAINT)
     notes = ["dotted: outside the range", "the estimate is meant for", "band: its range, where it has one"]
+    notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
     if not shown.all():
@@ -297,15 +296,17 @@ def main(argv=None):
                    help="file to write (default: resistance.png beside the first RUN)")
     p.add_argument("--linear", action="store_true", help="linear force axis (default: logarithmic)")
     p.add_argument("--table", metavar="FILE", type=Path, help="also write the numbers as a Markdown table")
+    command.add_force(p)
     a = p.parse_args(argv)
     path = a.output or Path(a.run[0]).resolve().parent / "resistance.png"
     if path.suffix.lower() not in command.PICTURES:
         p.error(f"{path}: unknown kind of file; end the name in {', '.join(command.PICTURES)}")
+    for place in filter(None, (path, a.table)):
+        command.may_write(place, a.force)
     points = [read(run) for run in a.run]
-    command.save(draw(points, not a.linear), path)
+    command.save(draw(points, not a.linear), path, a.force)
     if a.table:
-        a.table.parent.mkdir(parents=True, exist_ok=True)
-        a.table.write_text(table(points) + "\n", encoding="utf-8")
+        command.write_markdown(table(points), a.table, a.force)
         print(a.table)
 
 

@@ -11,13 +11,17 @@ from datetime import datetime, timezone
 from pathlib import Path
 
 import command
+import pdf
 import report_run
-from bergtow_read import Run, RunError
+import vector
+from bergtow_read import Run
+from report_case import TITLE_BLOCK
 from replay import LIMIT
 
 import jinja2
 
 PAGE = Path(__file__).resolve().parent / "page"
+MOST_OF_TITLE = 80  #: letters in the running head
 
 
 def templates():
@@ -42,31 +46,45 @@ def policy(code):
             "base-uri 'none'; form-action 'none'")
 
 
-def render(template, context):
-    """The page as text."""
-    code = script() if "replay" in context else ""
+def quoted(text):
+    """A string of CSS: what is no plain letter is written by its number, so that it ends neither string nor style."""
+    return '"' + "".join(c if c.isalnum() and c.isascii() or c == " " else f"\\{ord(c):x} " for c in text) + '"'
+
+
+def head_of_pages(title, revision):
+    """The running head and foot of the printed page."""
+    left = title if len(title) <= MOST_OF_TITLE else title[:MOST_OF_TITLE - 1].rstrip() + "…"
+    right = f"revision {revision}" if revision not in ("", "–") else ""
+    box = 'font: 7.6pt "DejaVu Sans", Verdana, sans-serif; color: #5a6672; vertical-align: bottom; padding-bottom: 4mm;'
+    foot = box.replace("bottom; padding-bottom", "top; padding-top")
+    return (f"@page {{ @top-left {{ content: {quoted(left)}; width: 75%; text-align: left; {box} }}\n"
+            f"@top-right {{ content: {quoted(right)}; text-align: right; {box} }}\n"
+            f'@bottom-left {{ content: "bergtow"; text-align: left; {foot} }}\n'
+            f'@bottom-right {{ content: counter(page) " of " counter(pages); text-align: right; {foot} }} }}\n')
+
+
+def css(title, revision):
+    light, dark = vector.styles()
+    return "\n".join([(PAGE / "report.css").read_text(encoding="utf-8"), f":root {{ {light} }}",
+                      f"@media (prefers-color-scheme: dark) {{ @media not print {{ :root {{ {dark} }} }} }}",
+                      (PAGE / "paper.css").read_text(encoding="utf-8"), head_of_pages(title, revision)])
+
+
+def render(template, context, paper=False):
+    """The page as text; paper: for a PDF."""
+    code = script() if "replay" in context and not paper else ""
     return templates().get_template(template).render(**context,
                                                      code=code,
+                                                     paper=paper,
+                                                     mark=command.MARK,
                                                      policy=policy(code),
-                                                     css=(PAGE / "report.css").read_text(encoding="utf-8"),
+                                                     css=css(context["title"], context["revision"]),
                                                      made=datetime.now(timezone.utc).strftime("%Y-%m-%d %H:%M UTC"))
-
-
-def write(text, path):
-    """Write the page; under another name first, so that an old page stays whole. Errors: RunError."""
-    new = path.with_name(path.name + ".new")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        new.write_text(text, encoding="utf-8")
-        new.replace(path)
-    except OSError as error:
-        raise RunError(path, f"cannot be written ({error.strerror or error})", "choose another place with -o") from None
-    print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
 def main(argv=None):
     p = command.parser(
-        "Write the report of a run, with a replay of the ice field, or of an ensemble, as one HTML page.",
+        "Write the report of a run, with a replay of the ice field, or of an ensemble, as one HTML page or as PDF.",
         "report.html")
     p.add_argument(
         "--size",
@@ -80,17 +98,40 @@ def main(argv=None):
     p.add_argument("--no-compression",
                    action="store_true",
                    help="store the replay's data as they are, for browsers that cannot unpack them")
+    for name in TITLE_BLOCK:
+        p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block, in place of report.{name} of the "
+                       "case")
+    p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
+                   help="of an ensemble: take results of converge and other commands from this folder too; may be "
+                   "repeated")
     a = p.parse_args(argv)
     if not 0.1 <= a.size <= 1000:
         p.error("--size: choose 0.1 to 1000 MB")
-    path = command.output(p, a, "report.html", (".html", ".htm"))
+    path = command.output(p, a, "report.html", (".html", ".htm", ".pdf"))
+    write_all(Path(a.run), [path], a)
+
+
+def pages(folder, paths, a):
+    """{path: text} of the report of a folder, as HTML or, for a PDF, as that which is printed. Errors: RunError."""
+    given = {name: getattr(a, name) for name in TITLE_BLOCK}
     # the second alone: it has only just begun
-    if any((Path(a.run) / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
+    if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         import report_ensemble  # and with it the statistics, which a run has no need of
-        write(render("ensemble.html", report_ensemble.context(a.run)), path)
-        return
-    with Run(a.run) as run:
-        write(render("run.html", report_run.context(run, 1e6 * a.size, not a.no_compression)), path)
+        template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, getattr(a, "also", ()))
+    else:
+        with Run(folder) as run:
+            template, context = "run.html", report_run.context(run, 1e6 * a.size, not a.no_compression, given)
+    return {path: render(template, context, path.suffix.lower() == ".pdf") for path in paths}
+
+
+def write_all(folder, paths, a):
+    """The report of a folder in one or more files. Errors: RunError."""
+    for path, text in pages(folder, paths, a).items():
+        if path.suffix.lower() == ".pdf":
+            pdf.write(text, path, a.force)
+        else:
+            command.write_text(text, path, a.force)
+        print(f"{path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
 if __name__ == "__main__":

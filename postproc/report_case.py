@@ -5,12 +5,20 @@ default.
 What the case file says beside a value, as a comment on its line, is its origin; for a default it is what the resolved
 case says. Nothing is inferred: a value without a word on it is shown as one without a stated source.
 """
+import json
 import re
 import shlex
+import subprocess
 from dataclasses import dataclass
+from datetime import datetime, timezone
+
+from bergtow_read import RunError
+from case_runs import program
 
 import numpy as np
 import yaml
+
+TITLE_BLOCK = ("client", "project", "author", "revision")
 
 #: kind: what the label says
 KINDS = {
@@ -96,9 +104,12 @@ def of_study(run):
         for name, keys in (variants if isinstance(variants, dict) else {}).items()
         if isinstance(keys, dict)
     }
-    return {"ice.seed": ""
-            } | {str(key): said.get(f"{name}.{key}", ("", ""))[1]
-                 for name, keys in groups.items() for key in keys}
+    def words(name, key, value):
+        """The comment beside a key, or the source that a range names."""
+        source = str(value.get("source", "")) if isinstance(value, dict) else ""
+        return said.get(f"{name}.{key}", ("", ""))[1] or source
+    return {"ice.seed": ""} | {str(key): words(name, key, value) for name, keys in groups.items()
+                               for key, value in keys.items()}
 
 
 def classify(words):
@@ -188,6 +199,46 @@ def values(run):
             kind, origin = of_default(meaning)
         out.append(Value(key, value, meaning, kind, origin))
     return out
+
+
+def title_block(case, attributes, given):
+    """Rows (what, value) of the title block: what is given on the command line, or in the section `report` of a case,
+    {key: text}; the date, and the program by its attributes."""
+    rows = [(name, given.get(name) or case.get(f"report.{name}", "")) for name in TITLE_BLOCK]
+    return [(name, scrubbed(" ".join(value.split())) if value not in ("", "none") else "–") for name, value in rows] + [
+        ("date", datetime.now(timezone.utc).strftime("%Y-%m-%d")),
+        ("program", f"bergtow {attributes.get('version', '')}, revision {attributes.get('revision', 'unknown')}")]
+
+
+def scrubbed(text):
+    """Without the paths of the machine that made it: of each the last part is left."""
+    return re.sub(r"(?<![\w./])(?:~|\.\.?)?/(?:[^\s/:'\"]+/)+([^\s/:'\"]*)", r"\1", text)
+
+
+def short(value):
+    """A value as the resolved case has it, with six digits in place of all."""
+    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", lambda x: x[0] if len(x[0]) < 8 else
+                  f"{float(x[0]):.6g}", value)
+
+
+def _range(key):
+    """What the program admits for a key, an entry of --list-keys --json."""
+    if key["type"] == "choice":
+        return ", ".join(key["choices"])
+    if "least" not in key:
+        return ""
+    low, high, unit = key["least"], key["most"], key.get("unit", "").replace("-", "")
+    low = f"above {low:g}" if key.get("above_least") else f"{low:g}"
+    return f"{low} to {'below ' if key.get('below_most') else ''}{high:g} {unit}".strip()
+
+
+def ranges():
+    """{key: range that the program admits}; {} where it cannot be asked."""
+    try:
+        said = subprocess.run([str(program()), "--list-keys", "--json"], capture_output=True, timeout=60, check=True)
+        return {key["name"]: _range(key) for key in json.loads(said.stdout)["keys"]}
+    except (RunError, OSError, ValueError, subprocess.SubprocessError):
+        return {}
 
 
 def preface(text):

@@ -6,6 +6,7 @@ The tables come from ensemble_text.py as Markdown, so that the page, the termina
 same.
 """
 import argparse
+import os
 import sys
 from dataclasses import replace
 from itertools import groupby
@@ -14,18 +15,25 @@ import ensemble
 import ensemble_text
 import loads
 import loads_text
+import plot_design
 import plot_ensemble
 import report_case
+import report_method
+import report_parts
 import report_run
 import stat_fit
+import statement
+import style
 from bergtow_read import Run, RunError
+from report_case import scrubbed
 from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
 
 import numpy as np
 
+#: keys that no result follows from
+PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 WARNED = "WARNING: "
-MOST_FIGURES = 8  #: conditions whose means stand at the head of the page
 #: as ensemble.py has them
 OPTIONS = {
     "error": 0.05, "exclude": [], "hours": [1.0, 10.0, 100.0], "threshold": None, "gap": None, "blocks": None,
@@ -66,22 +74,60 @@ def sections(markdown):
     return intro, [part for part in parts if part[0] != "Members"]
 
 
-def figures(s):
-    """Design tow forces of the conditions for the head of the page: (label, number, what stands below it)."""
-    out = []
-    for c in s["conditions"]:
-        d = c["design"]["tow"]
-        if d is None:
-            out.append((c["label"], "–", "no field finished" if not c["resistance"]["n"] else "no tow force"))
-            continue
-        fields = f"{d['fields']} field{'s' if d['fields'] > 1 else ''}, mean {report_run.force(d['mean'])}"
-        if "refused" in d:
-            out.append((c["label"], "–", f"no value; largest simulated {report_run.force(d['largest'])}, {fields}"))
-            continue
-        low, high = (report_run.force(x) if np.isfinite(x) else "no bound" for x in d["interval_95"])
-        out.append((c["label"], report_run.force(d["value"]),
-                    f"95 % interval {low} to {high}{', extrapolated' if d['beyond_data'] else ''}; {fields}"))
-    return out if len(out) <= MOST_FIGURES else []
+def worth(value, low, high):
+    """(value, interval) of a force in words, to the two digits that the wider side of the interval leaves; "no bound"
+    where it has no end."""
+    ends = [abs(end - value) for end in (low, high) if np.isfinite(end)]
+    wide = max(ends, default=0.0)
+    factor, unit = style.scale([value], "N")
+    if not wide > 0:
+        return style.quantity(value, "N"), "–"
+    place = int(np.floor(np.log10(wide / factor))) - 1   # of the second digit
+    first = int(np.floor(np.log10(max(abs(value) / factor, 1e-300))))
+    place = min(max(place, first - 2), first)            # one to three digits of the value
+    def text(x):
+        return f"{round(x / factor, -place):.{max(0, -place)}f}" if np.isfinite(x) else "no bound"
+    return f"{text(value)} {unit}", f"{text(low)} to {text(high)} {unit}"
+
+
+def design_row(c):
+    """Cells of a condition in the answer."""
+    tow, tension = c["design"]["tow"], c["design"]["tension"]
+    if tow is None:
+        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 6]
+    def cells(d):
+        if d is None or "value" not in d:
+            return ["–", "no value" if d else "–"]
+        value, interval = worth(d["value"], *d["interval_95"])
+        return [value + ("*" if d["beyond_data"] else ""), interval]
+    return [c["label"], *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
+            report_run.force(tow["largest"]), str(tow["fields"]), style.short(tow["hours"], 2)]
+
+
+def answer(e, s, case):
+    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for."""
+    rows = [design_row(c) for c in s["conditions"]]
+    head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
+            "largest simulated", "fields", "hours"]
+    if all(row[3] == "–" for row in rows):  # no line
+        head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
+    asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
+    figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
+        s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key)))
+    out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
+    out += [table(head, rows), lines("* beyond the hours simulated: extrapolated by the tail of the distribution. "
+                                     "Largest simulated: of the same moving mean.", faint=True)]
+    out += [figure] if figure else []
+    out += [{"kind": "pairs", "label": "line and vessel", "rows": report_method.holds(case, s)}] if case else []
+    return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
+
+
+def lines(*some, faint=False):
+    return {"kind": "text", "lines": list(some), "warnings": [], "faint": faint}
+
+
+def table(head, rows):
+    return {"kind": "table", "head": head, "rows": rows}
 
 
 def told(e, m):
@@ -104,26 +150,17 @@ def members(e, s):
             "name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "doubts": ", ".join(sorted(e.doubts(m))),
-            "told": told(e, m) if e.status[m] == FINISHED else [e.reason[m]] if e.reason[m] else []
+            "told": [scrubbed(w) for w in (told(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
         })
     return out
 
 
-def key_values(e):
-    """{heading: values} of the first member that can be read, with their origin; what differs between members is called
-    varied."""
-    for m in np.flatnonzero(e.status == FINISHED):
-        try:
-            with Run(e.folder(m)) as run:
-                found = report_run.key_values(run, report_case.values(run))
-        except RunError:
-            continue
-        varied = {key for key, values in e.parameters.items() if len(set(values.tolist())) > 1} | {"ice.seed"}
-        return {
-            heading: [replace(v, value="varied") if v.key in varied else v for v in some]
-            for heading, some in found.items()
-        }
-    return {}
+def study_text(e):
+    """The study as it was given, or as the file has it."""
+    try:
+        return (e.path / "study.yml").read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return e.study.split("# base case")[0]
 
 
 def provenance(e):
@@ -135,10 +172,10 @@ def provenance(e):
                 builds.add(tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))
                 rows = rows or [(name, value)
                                 for name, value in report_run.provenance(run)
-                                if name not in ("state hash", "wall time", "folder", "started")]
+                                if name not in ("state hash", "wall time", "folder", "started", "host")]
         except RunError:
             continue
-    return rows + [("folder", str(e.path.resolve()))], (
+    return rows, (
         f"The members come from {len(builds)} builds of the program, which need not give the same bits."
         if len(builds) > 1 else None)
 
@@ -156,25 +193,110 @@ def caption(name):
 
 
 def pictures(e, options, s):
-    """The pictures of plot_ensemble.py that the study supports."""
+    """{name: picture} of those of plot_ensemble.py that the study supports."""
     drawn = plot_ensemble.pictures(e, options, s["conditions"])
-    return [p for p in (report_run.picture(name, caption(name), draw) for name, draw in drawn) if p]
+    return {name: p for name, p in ((name, report_run.picture(name, caption(name), draw)) for name, draw in drawn) if p}
 
 
-def context(folder):
-    """Everything that page/ensemble.html sets. Errors: RunError."""
+#: chapters of the tables of ensemble_text.py: heading, tables, beginnings of the names of the pictures behind each
+CHAPTERS = (("Loads", (("Loads", ()), ("Return levels of loads", ("returns", )),
+                       ("Peaks of collisions", ("exceedance", )))),
+            ("Mean ice resistance",
+             (("Mean ice resistance", ("sweep", "map", "variants")), ("Beside the estimates", ()),
+              ("Distributions", ()), ("Sensitivity of the mean ice resistance", ("sensitivity", )))))
+
+
+def parts(found, drawn):
+    """The chapters of CHAPTERS: [(heading, blocks)]."""
+    out, by_title = [], dict(found)
+    for heading, some in CHAPTERS:
+        blocks_of = []
+        for title, begins in some:
+            if title in by_title:
+                blocks_of += [{"kind": "heading", "text": title}] if title != heading else []
+                blocks_of += by_title[title]
+                blocks_of += [p for name, p in drawn.items() if name.startswith(begins)] if begins else []
+        out.append((heading, blocks_of))
+    return out
+
+
+def of_part(name, part):
+    """(heading, blocks) of a part of report_parts.py."""
+    figure = part.get("figure")
+    drawn = report_run.picture(name, part["heading"], figure) if figure else None
+    return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
+
+
+def beside(folders):
+    """Chapters that other scripts left in one of the folders; convergence is named even where nothing was."""
+    out = [part for part in (report_parts.convergence(f) for f in folders) if part][:1]
+    found = [of_part("convergence", out[0])] if out else [("Convergence", [lines(
+        "Not studied: no converge.json stands beside this ensemble. bergtow converge CASE.yml says what of the "
+        "computation (width, length, time step, tolerance, start) the result depends on.")])]
+    seen = set()
+    for part in (part for f in folders for part in report_parts.others(f)):
+        if part["heading"] not in seen:
+            seen.add(part["heading"])
+            found.append(of_part(f"part{len(seen)}", part))
+    return found
+
+
+def first_run(e):
+    """(values with their origin, the case as key: text, attributes) of the first member that can be read; Nones."""
+    for m in np.flatnonzero(e.status == FINISHED):
+        try:
+            with Run(e.folder(m)) as run:
+                return report_case.values(run), run.case, run.attributes
+        except RunError:
+            continue
+    return [], {}, {}
+
+
+def varied(e, values):
+    """The values; of those that differ between members, their range."""
+    words = {"ice.seed": "varied"}
+    for key, some in e.parameters.items():
+        if len(set(some.tolist())) > 1:
+            unit = e.units[key] if e.units[key] != "1" else ""
+            words[key] = "varied" if some.dtype == object else \
+                f"varied, {np.nanmin(some):.4g} to {np.nanmax(some):.4g} {unit}".strip()
+    return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
+
+
+def replays(e, place):
+    """[(words, path from the page)] of the replays that are there."""
+    some = [e.path / "replay.html", *sorted(e.path.glob("members/*/report.html"))]
+    return [(p.parent.name if p.name == "report.html" else "replay of one tow",
+             os.path.relpath(p, place.parent)) for p in some if p.is_file()]
+
+
+def context(folder, place=None, given=None, also=()):
+    """Everything that page/ensemble.html sets. place: where the page is to stand; given: {client, ...} in place of
+    those of the case; also: further folders with the results of other scripts. Errors: RunError."""
     e, options = Ensemble(folder), argparse.Namespace(**OPTIONS)
     s = ensemble.statistics(e, options)
     if s["holes"]:
         print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
     rows, other_builds = provenance(e)
-    title = report_run.breakable(e.title)
+    values, texts, attributes = first_run(e)
+    values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
+              for v in varied(e, values)]
+    case = statement.case_of(e, e.used)
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
+    waiting = e.n - sum(counts.values())
+    block = report_case.title_block(texts, attributes, given or {})
+    warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
     return {
-        "title": title, "lead": intro[0], "warnings": intro[1:] + ([other_builds] if other_builds else []),
-        "figures": figures(s), "asked": loads_text.asked(s), "sections": found, "pictures": pictures(e, options, s),
-        "members": members(e, s),
-        "counts": counts, "waiting": e.n - sum(counts.values()), "doubts": DOUBTS, "key_values": key_values(e),
-        "kinds": report_case.KINDS, "study": e.study, "provenance": rows
+        "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
+        "answer": answer(e, s, case),
+        "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
+        "method": report_method.method(s, case), "limits": report_method.limits(s, case),
+        "assumed": [v for v in values if v.kind not in ("source", "default", "unused", "field")
+                    and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
+        "ranges": report_case.ranges(), "values": values, "kinds": report_case.KINDS,
+        "beside": beside([e.path, *also]), "chapters": parts(found, pictures(e, options, s)),
+        "members": members(e, s), "counts": counts, "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
+        "replays": replays(e, place or e.path / "report.html"),
+        "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
     }

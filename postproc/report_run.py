@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
 """What the report of one run says: its numbers in words, its tables, its pictures. postproc/page/run.html sets it."""
-import base64
-import io
 import re
 
 import plot_field
@@ -10,10 +8,10 @@ import plot_impacts
 import plot_resistance
 import report_case
 import style
+import vector
 from bergtow_read import RunError
 from replay import LIMIT, Replay
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 #: keys that the page shows in the open; all others are in the folded table
@@ -48,8 +46,6 @@ ONLY = {
     "tow.ramp": ("speed", "line", "thrust")
 }
 
-PICTURE_DPI = 120
-
 
 def force(value):
     """A force in words, a dash where there is none."""
@@ -76,18 +72,14 @@ def share(value):
 
 
 def picture(name, title, draw):
-    """A figure as {"name", "title", "data" (PNG, base64)}; {"name", "title", "why"} where there is nothing to draw;
+    """A figure as {"kind", "name", "title", "svg"}; {"kind", "name", "title", "why"} where there is nothing to draw;
     None where it says so itself."""
+    out = {"kind": "figure", "name": name, "title": title}
     try:
         figure = draw()
     except RunError as error:
-        return {"name": name, "title": title, "why": f"{error.reason}; {error.remedy}"}
-    if figure is None:
-        return None
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=PICTURE_DPI)
-    plt.close(figure)
-    return {"name": name, "title": title, "data": base64.b64encode(file.getvalue()).decode("ascii")}
+        return out | {"why": f"{error.reason}; {error.remedy}"}
+    return out | {"svg": vector.of_figure(figure, name, title)} if figure else None
 
 
 def pictures(run):
@@ -282,8 +274,8 @@ def provenance(run):
             ("command line", a.get("command_line")),
             ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
             ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"),
-            ("state hash", run.summary.get("state_hash")), ("folder", str(run.path.resolve()))]
-    return [(name, str(value)) for name, value in rows if value not in (None, "")]
+            ("state hash", run.summary.get("state_hash")), ("folder", run.path.resolve().name)]
+    return [(name, report_case.scrubbed(str(value))) for name, value in rows if value not in (None, "")]
 
 
 def stamp(run):
@@ -294,16 +286,21 @@ def stamp(run):
             f"state hash {run.summary.get('state_hash', 'unknown')}")
 
 
+def applies(key, case):
+    """Does a key of the tow mean anything in the mode of a case, {key: text}?"""
+    return not any(key.startswith(start) and case.get("tow.mode", "") not in modes for start, modes in ONLY.items())
+
+
 def key_values(run, values):
     """{heading: [Value]}: the values that tell one run from another."""
-    by_key, mode, out = {v.key: v for v in values}, run.case.get("tow.mode", ""), {}
+    by_key, out = {v.key: v for v in values}, {}
     for heading, keys in KEY_VALUES.items():
         if heading in ("Towed body", "Tow") and run.towed is None or heading == "Ice" and not run.n_floes:
             continue
         out[heading] = (report_case.of_field(run) if heading == "Ice" else []) + [
             by_key[k] for k in keys if k in by_key and by_key[k].kind != "unused" and by_key[k].value not in
             ("", "none",
-             UNSET.get(k)) and not any(k.startswith(start) and mode not in modes for start, modes in ONLY.items())
+             UNSET.get(k)) and applies(k, run.case)
         ]
     return out
 
@@ -313,13 +310,15 @@ def breakable(text):
     return re.sub(r"\s+", " ", str(text)).strip()
 
 
-def context(run, limit=LIMIT, compress=True):
+def context(run, limit=LIMIT, compress=True, given=None):
     """Everything that page/run.html sets. Errors: RunError."""
     values = report_case.values(run)
     warnings = run.summary.get("warnings")
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)
+    block = report_case.title_block(run.case, run.attributes, given or {})
     return {
+        "block": block if any(value != "–" for _, value in block[:4]) else [], "revision": dict(block)["revision"],
         "title": breakable(run.summary.get("title")
                            or run.path.resolve().name), "stamp": stamp(run), "conditions": style.conditions(run),
         "verdict": run.verdict[0], "reason": run.verdict[1], "window_name": run.window_name,

@@ -209,13 +209,15 @@ class Scene:
         self.rafted = False  #: does the frame that is shown have floes over each other?
         self._rafted = PolyCollection([], facecolors=style.RAFTED, linewidths=0, zorder=2.5, **kept)
         self._rafts = run.value("ice.rafting.kappa", 0) > 0
+        self._floes.set_rasterized(run.n_floes > style.MANY / 6)
         self._solid = PolyCollection([], zorder=4, linewidths=0, **kept)
         self._solid.set_facecolors([style.WALL if b.wall else style.FIXED for b in run.bodies if not b.towed]
                                    * len(self._images))
         self._track = Line2D([], [], color=style.TRACK, linewidth=1.1, dashes=(1, 2.2), dash_capstyle="round",
                              alpha=0.9, zorder=3, **kept)
         self._line = Line2D([], [], color=style.BODY_EDGE, linewidth=1.3, marker="s", markersize=4.5, markevery=[1],
-                            path_effects=[patheffects.withStroke(linewidth=3, foreground="white")], zorder=5.5, **kept)
+                            path_effects=[patheffects.withStroke(linewidth=3, foreground=style.HALO)], zorder=5.5,
+                            **kept)
         self._body = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.BODY, edgecolor=style.BODY_EDGE,
                              linewidth=1.2, zorder=6, visible=run.towed is not None, **kept)
         self._arrow = Polygon(np.zeros((3, 2)), closed=True, facecolor=style.TRACK, edgecolor=style.BODY_EDGE,

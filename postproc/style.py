@@ -12,7 +12,9 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first)
 import numpy as np  # noqa: E402
-from matplotlib.colors import LinearSegmentedColormap  # noqa: E402
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, Locator, MaxNLocator, NullFormatter
 
 RAFTED = "#5a1846"  # floes over each other
 WATER = "#0c2a43"
@@ -42,6 +44,17 @@ ESTIMATES = (TOW, DRAG, INERTIA, "#56b4e9", "#e69f00", "#cc79a7", "#1b4f9c", "#7
 WINDOW = "#f0f3f6"    # steady window
 REFERENCE = "#000000"
 
+#: what lies on ice and water, which look the same on a dark page
+HALO = "#fefefe"
+ON_DARK, ON_LIGHT = "#fefefe", "#1d2732"
+JAM = "#c1121f"
+#: {colour: what it is on a dark page}; all others are the same there
+DARK = {
+    PAPER: "#12181f", INK: "#e6ebf0", REFERENCE: "#ffffff", FAINT: "#9fabb7", GRID: "#2d3843", WINDOW: "#1c252e",
+    ICE: "#4aa8e0", TOW: "#ff8a3d", DRAG: "#2cc79a", INERTIA: "#b79ade", CORIOLIS: "#e0b040", TILT: "#b8b8b8",
+    JAM: "#ff6b6b", "#c2417c": "#f078ac", "#1b4f9c": "#6f9fe8", "#7a5b00": "#cfa63a", RAFTED: "#d45fb4"
+}
+
 #: floes by speed: resting ice is white, moving ice turns to vermilion
 SPEED_MAP = LinearSegmentedColormap.from_list("speed", ["#eaf3f8", "#f6dfae", "#f2a541", "#dd5f1b", "#a62a0c"])
 #: floes by contact force: unloaded ice is white, loaded ice turns to purple
@@ -50,6 +63,7 @@ FORCE_MAP = LinearSegmentedColormap.from_list("force", ["#eaf3f8", "#e8bfd9", "#
 THICKNESS_MAP = LinearSegmentedColormap.from_list("thickness", ["#5d8fb5", "#9cc3dc", "#d3e6f1", "#fbfdfe"])
 
 DPI = 150
+MANY = 20000  #: samples, or corners of floes, from which on a vector drawing holds them as a picture
 
 plt.rcParams.update({
     "font.family": "DejaVu Sans", "font.size": 10.5, "text.color": INK,
@@ -118,6 +132,63 @@ def plain(text):
 def title(run):
     """Title of the case, or the name of the run's folder; at most 80 characters."""
     return plain(textwrap.shorten(run.summary.get("title") or run.path.resolve().name, 80, placeholder=" ..."))
+
+
+class LogTicks(Locator):
+    """Ticks of a logarithmic axis, each of which is labelled: decades; where fewer than three are in sight, also their
+    3, or 2 and 5, or most digits; evenly spaced ones over less than that."""
+
+    CHOICES = ((1, ), (1, 3), (1, 2, 5), (1, 1.5, 2, 3, 4, 5, 7))
+    MOST = 8
+
+    def __call__(self):
+        return self.tick_values(*self.axis.get_view_interval())
+
+    def tick_values(self, vmin, vmax):
+        low, high = sorted((vmin, vmax))
+        decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+        for some in self.CHOICES:
+            ticks = np.array([k * 10.0 ** n for n in decades for k in some])
+            ticks = ticks[(ticks >= low * (1 - 1e-9)) & (ticks <= high * (1 + 1e-9))]
+            if len(ticks) >= 3:
+                return ticks[::-(-len(ticks) // self.MOST)]
+        ticks = MaxNLocator(4).tick_values(low, high)
+        return ticks[(ticks >= low) & (ticks <= high)]
+
+
+def logarithmic(*axis):
+    """Scale, ticks and labels of a logarithmic axis (axes.xaxis or axes.yaxis)."""
+    for one in axis:
+        getattr(one.axes, f"set_{one.axis_name}scale")("log")
+        one.set_major_locator(LogTicks())
+        one.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.6g}" if value < 1e6 else f"{value:.0e}"))
+        one.set_minor_formatter(NullFormatter())
+
+
+def in_sight(axes, line):
+    """Is any part of a line, whose numbers are data of the axes, within their limits?"""
+    x, y = (np.asarray(v, dtype=float) for v in line.get_data())
+    (left, right), (low, high) = sorted(axes.get_xlim()), sorted(axes.get_ylim())
+    known = np.isfinite(x) & np.isfinite(y) & ((y > 0) | (axes.get_yscale() != "log"))
+    x, y = np.where(known, x, np.nan), np.where(known, y, np.nan)
+    inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
+    if line.get_linestyle() == "None":
+        return bool(inside.any())
+    def meets(v, least, most):
+        return (np.fmin(v[:-1], v[1:]) <= most) & (np.fmax(v[:-1], v[1:]) >= least)
+    return bool(inside.any() or np.any(meets(x, left, right) & meets(y, low, high)))
+
+
+def legend_of(axes):
+    """(handles, labels) of what is in sight, and the labels of the lines that are not. Limits must be set."""
+    handles, labels, lost = [], [], []
+    for handle, label in zip(*axes.get_legend_handles_labels()):
+        if isinstance(handle, Line2D) and handle.get_transform() == axes.transData and not in_sight(axes, handle):
+            lost.append(label)
+        else:
+            handles.append(handle)
+            labels.append(label)
+    return handles, labels, lost
 
 
 def head(figure, words, below, left=0.02):

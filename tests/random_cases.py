@@ -27,6 +27,10 @@ STEPS = 50
 LEFT_OUT = {
     "run.title": "text",
     "reference.source": "text",
+    "report.client": "text",
+    "report.project": "text",
+    "report.author": "text",
+    "report.revision": "text",
     "run.threads": "said on the command line",
     "ice.field": "file",
     "ice.outlines": "file",

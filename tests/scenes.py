@@ -170,7 +170,8 @@ SCENES = {
         "outlines": "frame.geojson", "outlines_crs": "frame", "nonconvex": "hull"}, tow__speed=0.4),
     "outlines_metres": changed(SHORT, ice={"outlines": "frame.geojson", "outlines_crs": "metres", "nonconvex": "hull"}),
     "field_file": changed(SHORT, ice={"friction": 0.3, "restitution": 0.1, "field": "field.h5"}, tow__speed=0.4),
-    "output_settings": changed(SHORT, run__title="samples of three steps", output={
+    "output_settings": changed(SHORT, run__title="samples of three steps", report={
+        "client": "a", "project": "b", "author": "c", "revision": "d"}, output={
         "sample_every": 3, "window_start": 1, "frame_interval": 0.7, "checkpoint_steps": 7, "checkpoint_wall": 1}),
     "estimates": changed(SHORT, tow__speed=0.4, reference={"mean_force": 30, "source": "assumed"}, estimate={
         "p_star": 3e4, "p_s": 1e4, "c_si": 0.8, "kappa": 9, "kappa_low": 4, "kappa_high": 15, "phi_j": 0.85,

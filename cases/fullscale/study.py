@@ -32,7 +32,7 @@ def concentration(a):
     points = [plot_resistance.read(folder) for folder in folders]
     text = plot_resistance.table(points)
     (a.out / "resistance.md").write_text(text + "\n", encoding="utf-8")
-    command.save(plot_resistance.draw(points), a.out / "resistance.png")
+    command.save(plot_resistance.draw(points), a.out / "resistance.png", force=True)
     print(
         f"\nMean ice resistance; in brackets simulated / estimate; * an estimate outside the range it is meant "
         f"for\n\n{text}\n\n{a.out / 'resistance.md'}"

@@ -285,7 +285,7 @@ def report(out):
     (out / "arching.md").write_text(text + "\n", encoding="utf-8")
     print(f"\n{text}")
     if {"map", "concentration"} <= parts.keys():
-        command.save(draw(out, parts), out / "arching.png")
+        command.save(draw(out, parts), out / "arching.png", force=True)
 
 
 @ended

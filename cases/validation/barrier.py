@@ -202,7 +202,7 @@ def main(argv=None):
     found = fits(rows)
     text = table(rows, found)
     (a.out / "barrier.md").write_text(text + "\n", encoding="utf-8")
-    command.save(draw(rows, found), a.out / "barrier.png")
+    command.save(draw(rows, found), a.out / "barrier.png", force=True)
     print(f"\n{text}\n\nsteps not converged: {sum(r['unconverged_steps'] for r in rows)} of "
           f"{sum(r['n_steps'] for r in rows)}; load in the second half of the window against the first: "
           f"{min(r['drift'] for r in rows):+.2%} to {max(r['drift'] for r in rows):+.2%}")

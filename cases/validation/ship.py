@@ -122,7 +122,7 @@ def main(argv=None):
     (a.out / "ship.json").write_text(json.dumps(groups), encoding="utf-8")
     text = table(points)
     (a.out / "ship.md").write_text(text + "\n", encoding="utf-8")
-    command.save(draw(points, groups), a.out / "ship.png")
+    command.save(draw(points, groups), a.out / "ship.png", force=True)
     print(f"\n{text}\n\nsteps not converged: {sum(p['unconverged'] for p in points.values())}")
     print("estimates that hold:", groups["friction 0.15"][0]["estimates"])
 

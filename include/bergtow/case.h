@@ -250,6 +250,9 @@ typedef struct bt_case {
         double mean_force;       ///< measured mean ice resistance, N; NaN = none
         char *source;            ///< where it was published
     } reference;
+    struct {
+        char *client, *project, *author, *revision; ///< for the title block of reports
+    } report;
     double extra[BT_EXTRA_KEYS]; ///< values of keys that are added to the table, those of force laws (forces.h), SI
 } bt_case;
 

@@ -2,6 +2,7 @@
 // A study: one base case, what is varied, and how many fields of each condition. Read from a YAML file.
 //
 //     title: resistance against concentration
+//     report: {client: ..., project: ..., author: ..., revision: A}   # title block of the report
 //     base: ../basin/basin-80.yml          # relative to the study file
 //     set: {run.duration: 600 s}           # keys of the base that are replaced in every member
 //     parameters:

@@ -29,6 +29,8 @@ static const struct {
     {"budget", "find out how much of the scatter is of the fields, of each assumed value, of the computation",
      bt_cmd_script, false},
     {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false},
+    {"design", "from a case or a study to the report of the design tow force, as a page and as PDF", bt_cmd_script,
+     false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},

@@ -27,7 +27,8 @@ static const struct {
 };
 
 // Texts without numbers of a dimension behind them. Any other may name a file, which would have to be scaled as well.
-static const char *const plain_texts[] = {"run.title", "reference.source"};
+static const char *const plain_texts[] = {"run.title",     "reference.source", "report.client",
+                                         "report.project", "report.author",    "report.revision"};
 
 // L^e. Square roots are taken exactly rounded: with L a power of 4 the twin is the original to the last bit, only with
 // other exponents.

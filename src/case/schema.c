@@ -444,6 +444,11 @@ bt_key bt_case_keys[] = {
          "measured mean ice resistance, shown beside the computed one"),
     TEXT("reference.source", reference.source, "none", "where the measured force was published"),
 
+    TEXT("report.client", report.client, "none", "for whom the report is, for its title block"),
+    TEXT("report.project", report.project, "none", "name or number of the project, for the title block"),
+    TEXT("report.author", report.author, "none", "who answers for the report, for the title block"),
+    TEXT("report.revision", report.revision, "none", "revision of the report, for the title block and every page"),
+
     EIGHT_SPARE,
     EIGHT_SPARE,
     EIGHT_SPARE,

@@ -14,6 +14,8 @@ static const char *const fields[] = {"own", "common", NULL};
 
 const bt_key bt_study_keys[] = {
     ROW("title", TEXT, "none", "one line for the reports"),
+    ROW("report", MAP, "none",
+        "client, project, author and revision for the title block of the report: {client: ..., revision: B}"),
     ROW("base", TEXT, NULL, "the case that is varied; relative to the folder of the study file"),
     ROW("set", MAP, "none", "keys of the case that are replaced in every member: {run.duration: 600 s}"),
     ROW("parameters", MAP, "none",

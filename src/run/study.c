@@ -116,6 +116,49 @@ static void read_set(const reader *r, const bt_node *map, int line, const char *
     }
 }
 
+/// The place of `key` in the list of `set`; −1 where it is not there.
+static int find_set(const bt_study *s, const char *key)
+{
+    const size_t n = strlen(key);
+    for (int i = 0; i < s->n_set; i++)
+        if (!strncmp(s->set[i], key, n) && s->set[i][n] == '=') return i;
+    return -1;
+}
+
+/// Put "key=value" at the end of `set`, or at its beginning, where all that the study says comes later.
+static void add_set(bt_study *s, const char *text, const char *at, bool first)
+{
+    s->set = bt_realloc(s->set, (size_t)s->n_set + 1, sizeof *s->set);
+    s->set_at = bt_realloc(s->set_at, (size_t)s->n_set + 1, sizeof *s->set_at);
+    const int k = first ? 0 : s->n_set;
+    memmove(s->set + k + 1, s->set + k, (size_t)(s->n_set - k) * sizeof *s->set);
+    memmove(s->set_at + k + 1, s->set_at + k, (size_t)(s->n_set - k) * sizeof *s->set_at);
+    s->set[k] = bt_text_copy(text);
+    s->set_at[k] = at ? bt_text_copy(at) : NULL;
+    s->n_set++;
+}
+
+/// The section `report` of the case, as a map of its keys; part of `set`.
+static void read_report(const reader *r, const bt_node *map, int line)
+{
+    if (map->kind != BT_NODE_MAP) {
+        COMPLAIN(r, line, "report: needs keys with values; write report: {client: name, revision: A}");
+        return;
+    }
+    for (int i = 0; i < map->n; i++) {
+        const int at = map->key_line[i];
+        char name[80];
+        snprintf(name, sizeof name, "report.%.70s", map->key[i]);
+        const int key = find_key(r, at, "", name);
+        if (key < 0 || !check_value(r, at, name, key, map->item[i])) continue;
+        if (find_set(r->s, name) >= 0) COMPLAIN(r, at, "%s: stands in `set` too; remove it there", name);
+        char *given = bt_text_of("%s=%s", name, map->item[i]->text), *place = place_of(r->s, at);
+        add_set(r->s, given, place, false);
+        free(given);
+        free(place);
+    }
+}
+
 static void read_list(const reader *r, const bt_node *list, int line, bt_study_parameter *p)
 {
     if (list->n == 0) COMPLAIN(r, line, "%s: the list is empty; give at least one value", p->name);
@@ -266,15 +309,6 @@ static void read_range(const reader *r, const bt_node *map, int line, bt_study_p
         p->value = bt_alloc((size_t)n, sizeof *p->value);
         for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
     }
-}
-
-/// The place of `key` in the list of `set`; −1 where it is not there.
-static int find_set(const bt_study *s, const char *key)
-{
-    const size_t n = strlen(key);
-    for (int i = 0; i < s->n_set; i++)
-        if (!strncmp(s->set[i], key, n) && s->set[i][n] == '=') return i;
-    return -1;
 }
 
 static bt_study_parameter *add_parameter(const reader *r, int line, const char *name, int key)
@@ -458,19 +492,6 @@ static void check_words(const reader *r, const bt_node *root)
     }
 }
 
-/// Put "key=value" at the end of `set`, or at its beginning, where all that the study says comes later.
-static void add_set(bt_study *s, const char *text, const char *at, bool first)
-{
-    s->set = bt_realloc(s->set, (size_t)s->n_set + 1, sizeof *s->set);
-    s->set_at = bt_realloc(s->set_at, (size_t)s->n_set + 1, sizeof *s->set_at);
-    const int k = first ? 0 : s->n_set;
-    memmove(s->set + k + 1, s->set + k, (size_t)(s->n_set - k) * sizeof *s->set);
-    memmove(s->set_at + k + 1, s->set_at + k, (size_t)(s->n_set - k) * sizeof *s->set_at);
-    s->set[k] = bt_text_copy(text);
-    s->set_at[k] = at ? bt_text_copy(at) : NULL;
-    s->n_set++;
-}
-
 static void read_entries(const reader *r, const bt_node *root)
 {
     bt_study *s = r->s;
@@ -488,6 +509,7 @@ static void read_entries(const reader *r, const bt_node *root)
                       s->path);
     }
     if ((node = entry(root, "set", &line))) read_set(r, node, line, "set", &s->set, &s->set_at, &s->n_set);
+    if ((node = entry(root, "report", &line))) read_report(r, node, line);
     if ((node = entry(root, "parameters", &line))) read_parameters(r, node, line);
     if ((node = entry(root, "variants", &line))) read_variants(r, node, line);
     if ((node = entry(root, "with", &line))) read_with(r, node, line);

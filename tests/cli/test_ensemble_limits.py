@@ -117,8 +117,8 @@ def test_values_in_place_of_those_of_the_study(tmp_path):
 
 def test_the_keys_of_a_study_are_listed():
     text, listed = call("--list-keys").stdout, json.loads(call("--list-keys", "--json").stdout)["study_keys"]
-    assert [k["name"] for k in listed] == ["title", "base", "set", "parameters", "variants", "with", "sampling",
-                                           "samples", "repeats", "seed", "fields", "ranks"]
+    assert [k["name"] for k in listed] == ["title", "report", "base", "set", "parameters", "variants", "with",
+                                           "sampling", "samples", "repeats", "seed", "fields", "ranks"]
     assert {k["name"]: k["type"] for k in listed}["with"] == "map" and [k["name"] for k in listed if k["required"]
                                                                         ] == ["base"]
     part = text.split("A study file")[1]

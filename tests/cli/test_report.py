@@ -21,6 +21,7 @@ from harness import TOW, call, changed, run, write_case
 POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
 sys.path.insert(0, str(POSTPROC))
 
+import command  # noqa: E402
 import replay as replay_data  # noqa: E402
 import report  # noqa: E402
 import report_case  # noqa: E402
@@ -29,6 +30,7 @@ import style  # noqa: E402
 from bergtow_read import Run  # noqa: E402
 
 HOSTILE = "</script><script>window.hacked = 1</script>\"'><img src=x onerror='window.hacked = 2'> {{ 7 * 6 }} & berg"
+OLD = f"an old page, {command.MARK}"
 CASE = changed(TOW,
                run__title=HOSTILE,
                ice__concentration=0.7,
@@ -121,8 +123,8 @@ def text(driver, selector):
 
 def test_needs_nothing_but_itself(page, alone):
     assert [r for r in page.requests if not r.startswith("data:")] == [alone.resolve().as_uri()]
-    assert all(js(page, "return [...document.images].map((i) => i.complete && i.naturalWidth > 300)"))
-    assert len(page.find_elements("tag name", "img")) == 6
+    assert all(js(page, "return [...document.querySelectorAll('figure svg')].map((s) => s.getBBox().width > 300)"))
+    assert len(page.find_elements("css selector", "figure svg")) == 6
     # What it cannot do: ask the network.
     blocked = page.execute_async_script(
         "const done = arguments[0]; fetch('http://127.0.0.1:9/').then(() => done('reached'), (e) => done(e.name))")
@@ -411,12 +413,12 @@ def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
     assert [e["kind"] for e in adrift.summary["events"]] == ["line_broken", "adrift"]
     assert script(adrift.dir).returncode == 0
     page = (adrift.dir / "report.html").read_text()
-    assert "<td>line broken</td>" in page and page.count('src="data:image/png') == 6
+    assert "<td>line broken</td>" in page and page.count("<svg ") == 6
     drift = run(tmp_path / "drift", changed(TOW, run__duration=2, body={"shape": "none"}, tow=None, air={"wind_x": 5}))
     assert script(drift.dir).returncode == 0
     page = (drift.dir / "report.html").read_text()
     assert "No body was towed" in page and "<nav" in page and "Estimates" not in page and page.count(
-        'src="data:image/png') == 2
+        "<svg ") == 2
 
 
 @pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"),
@@ -427,7 +429,7 @@ def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, w
         folder.mkdir()
         shutil.copy(tow.dir / "result.h5", folder)
         (folder / "summary.json").write_text(json.dumps(tow.summary))
-        (folder / "report.html").write_text("old")
+        (folder / "report.html").write_text(OLD)
     if harm == "summary":
         (folder / "summary.json").unlink()
     elif harm == "truncated":
@@ -439,7 +441,7 @@ def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, w
     result = script(folder)
     assert result.returncode == 4 and words in result.stderr and str(
         folder) in result.stderr and "Traceback" not in result.stderr
-    assert harm == "folder" or (folder / "report.html").read_text() == "old"
+    assert harm == "folder" or (folder / "report.html").read_text() == OLD
     assert sorted(p.name for p in folder.glob("report*")) == ([] if harm == "folder" else ["report.html"])
 
 

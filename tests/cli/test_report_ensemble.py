@@ -2,6 +2,7 @@
 """The report of an ensemble: the numbers of ensemble.py, every member with its doubts, nothing that a browser would
 complain of."""
 import argparse
+import re
 import sys
 from pathlib import Path
 
@@ -18,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import ensemble  # noqa: E402
 import report  # noqa: E402
 import report_ensemble  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
@@ -58,13 +60,21 @@ def page(study, tmp_path_factory):
 
 
 def tables(page):
-    """{heading: rows of texts} of the sections."""
+    """{heading: rows of texts} of the first table behind each heading."""
     return page.execute_script(
         """const rows = (s) => [...s.querySelectorAll('tr')].map((r) => [...r.cells].map((c) => c.textContent.trim()));
-           const with_table = (s) => s.querySelector('h2') && s.querySelector('table');
-           return Object.fromEntries([...document.querySelectorAll('section')].filter(with_table)
-                                     .map((s) => [s.querySelector('h2').textContent, rows(s)]))"""
+           const found = {}; let heading = null;
+           for (const e of document.querySelectorAll('h2, h3, table')) {
+             if (e.tagName !== 'TABLE') heading = e.textContent;
+             else if (heading && !(heading in found)) found[heading] = rows(e);
+           }
+           return found"""
     )
+
+
+def newtons(text):
+    value, unit = re.match(r"([\d.]+)\*? (k?N)", text).groups()
+    return float(value) * {"N": 1, "kN": 1000}[unit]
 
 
 def test_numbers_are_those_of_the_statistics(page, study):
@@ -81,8 +91,26 @@ def test_numbers_are_those_of_the_statistics(page, study):
     estimates = dict(zip(*found["Beside the estimates"][:2]))
     assert estimates["Lichey-Hellmer"].startswith("80") and "*" in estimates["compaction"]
     assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
-    cards = [e.text for e in page.find_elements("css selector", ".figures div")]
-    assert len(cards) == 2 and "4 fields" in cards[0] and "concentration 0.2" in cards[0]
+    answer = found["Answer"]
+    assert [row[0] for row in answer[1:]] == ["concentration 0.2", "concentration 0.5"] and answer[1][-2] == "4"
+
+
+def test_the_answer_is_the_design_statement(tmp_path):
+    """Rounded to what the interval leaves; of fields that are long enough for a tail."""
+    rng = np.random.default_rng(8)
+    e = Ensemble(made_up.write(tmp_path / "out", [
+        member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
+    s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
+    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None)
+    row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
+    wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
+    assert abs(newtons(row[1]) - d["value"]) <= max(0.06 * wide, 0.006 * d["value"])
+    assert row[1].endswith("*") == d["beyond_data"] and newtons(row[3]) == pytest.approx(d["mean"], rel=0.006)
+    ends = row[2].removesuffix(" N").split(" to ")
+    assert [float(v) for v in ends if v != "no bound"] == pytest.approx(
+        [v for v in d["interval_95"] if np.isfinite(v)], abs=max(0.06 * wide, 0.006 * d["value"]))
+    figure = next(b for b in blocks if b["kind"] == "figure")
+    assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
 
 
 def test_every_member_stands_there_with_its_doubts(page, study):
@@ -99,15 +127,15 @@ def test_every_member_stands_there_with_its_doubts(page, study):
     } and JAM in details["c002-r002: 1 warning"] and "not <finite>" in details["c001-r004: failed"]
     warning = page.find_element("css selector", ".warning").text
     assert "1 member failed" in warning and "not complete: 1 member to come" in warning and "carry warnings" in warning
-    assert "8 finished, 1 failed, 1 waiting" in page.find_element("css selector", "header").text
+    assert "8 finished, 1 failed, 1 waiting" in page.find_element("id", "answer").text
 
 
 def test_page_stands_alone_and_text_stays_text(page):
     assert page.requests == [page.path.resolve().as_uri()] and complaints(page) == []
     assert page.execute_script("return window.hacked") is None and page.find_element("tag name", "h1").text == TITLE
-    assert page.find_elements("css selector", "script, #members i") == []
-    assert page.execute_script("return [...document.images].every((i) => i.complete && i.naturalWidth > 300)") and len(
-        page.find_elements("tag name", "img")) >= 2
+    assert page.find_elements("css selector", "script, #members i, img") == []
+    assert page.execute_script("return [...document.querySelectorAll('figure svg')].every((s) => s.getBBox().width > "
+                               "300)") and len(page.find_elements("css selector", "figure svg")) >= 2
     page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
                          {"width": 380, "height": 800, "deviceScaleFactor": 1, "mobile": True})
     assert page.execute_script("return document.documentElement.scrollWidth") <= 380
@@ -163,17 +191,17 @@ def test_nothing_has_finished(tmp_path, status, behind, told):
     (folder / "members/c001-r001").mkdir(parents=True)
     if behind:
         (folder / "members/c001-r001/finished").write_text("")
-    with pytest.raises(report.RunError) as error:
+    with pytest.raises(RunError) as error:
         report.main([str(folder)])
     assert told in str(error.value)
     (folder / "ensemble.h5").unlink()
     (folder / "study.resolved.yml").write_text("seed: 1\n")
-    with pytest.raises(report.RunError, match="holds no ensemble.h5; .*run it again"):
+    with pytest.raises(RunError, match="holds no ensemble.h5; .*run it again"):
         report.main([str(folder)])
 
 
 def test_an_unusable_ensemble_is_told(tmp_path, capsys, monkeypatch):
     (tmp_path / "ensemble.h5").write_bytes(b"no")
-    with pytest.raises(report.RunError, match="is no ensemble"):
+    with pytest.raises(RunError, match="is no ensemble"):
         report.main([str(tmp_path)])
     assert not (tmp_path / "report.html").exists()

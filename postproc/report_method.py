@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: MIT
+"""How the numbers of a report came about, and what they cannot know: method, model and limits in words, each sentence
+from what was simulated."""
+import numpy as np
+
+import loads_text
+import stat_extreme
+import stat_profile
+import style
+from statement import RIGID
+
+
+def _one(texts, key, what):
+    """"what: value" of a key where it has one."""
+    value = texts.get(key, "")
+    return f"{what} {value}" if value not in ("", "none") else ""
+
+
+def _span(values, text=lambda v: f"{v:.3g}"):
+    low, high = min(values), max(values)
+    return text(low) if low == high else f"{text(low)} to {text(high)}"
+
+
+def _amount(s):
+    """What was simulated, in a sentence."""
+    tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
+    n = sum(c["members"]["used"] for c in s["conditions"])
+    said = f"{n} tows in {len(s['conditions'])} conditions, each through an ice field of its own"
+    if tows:
+        said += (f"; {_span([d['fields'] for d in tows])} fields and {_span([d['hours'] for d in tows])} hours of tow "
+                 "a condition, the start-up left out")
+    return said + "."
+
+
+def method(s, case):
+    """Paragraphs. case: statement.Case or None."""
+    out = [
+        "Every floe is a rigid polygon that moves in the plane of the sea surface. Floes, the towed body and walls "
+        "push each other by non-negative impulses with Coulomb friction, solved together in every time step (planar "
+        "non-smooth discrete element method, after Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138). Drag of water "
+        "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
+        "sum of these impulses over the time step.",
+        _amount(s)
+    ]
+    tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
+    if not tows:
+        return out
+    out.append(
+        f"{loads_text.asked(s)}. This is the level of the return time −T / ln(1 − p), "
+        f"{_span([d['return_hours'] for d in tows])} h. The load is first averaged by a moving mean over that time "
+        "scale, so that pushes and collisions count by their impulse; what stands out above a threshold is gathered "
+        "into clusters, to whose maxima a generalised Pareto distribution is fitted (block maxima and a generalised "
+        "extreme value distribution where there are too few clusters). Intervals hold 95 % and come from the profile "
+        f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on. At least "
+        f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are asked for; otherwise there "
+        "is no value.")
+    out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is stated.")
+    return out
+
+
+def limits(s, case):
+    """Sentences on what the model leaves out, the gravest first."""
+    out = ["No force of this model has been held against a measured tow: behaviour seen in basins was reproduced, "
+           "forces were not validated."]
+    if case is None:
+        return out
+    texts, dense = case.texts, any(c["values"].get("ice.concentration", 0) >= RIGID for c in s["conditions"]
+                                   if not isinstance(c["values"].get("ice.concentration", 0), str))
+    if case.rigid:
+        out.append("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
+                   + (f", and from {100 * RIGID:.0f} % of ice on floes jam." if dense else "."))
+    else:
+        ways = [word for word in (_one(texts, "ice.rafting.kappa", "they raft, κ =")
+                                  if texts.get("ice.rafting.kappa", "0") != "0" else "",
+                                  _one(texts, "ice.crushing.pressure", "their edges crush at")
+                                  if not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ") else "") if word]
+        out.append(f"Floes are otherwise rigid, {' and '.join(ways)}; they neither break nor bend.")
+    out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
+               "there are no waves.")
+    out.append({
+        "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
+                 "the tow force holds no dynamics of the line.",
+        "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
+        "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
+    }.get(case.mode, "Nothing is towed."))
+    if not np.isfinite(case.breaking_load):
+        out.append("No line parts: the case sets no breaking load.")
+    if not np.isfinite(case.bollard_pull):
+        out.append("No vessel is judged: the case names no bollard pull.")
+    out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
+               "design tow force do not depend on it.")
+    out.append("The intervals hold the scatter of the fields and the error of the fit. They hold neither the values "
+               "that are assumed nor the choice of the model.")
+    return out
+
+
+def holds(case, s):
+    """Rows (what, value) on the line and the vessel, for the answer."""
+    if case is None:
+        return []
+    speeds = sorted({str(c["values"]["tow.speed"]) for c in s["conditions"] if "tow.speed" in c["values"]})
+    rows = [("tow speed asked for", f"{', '.join(speeds)} m/s" if speeds else case.texts.get("tow.speed", "–"))]
+    rows.append(("breaking load of the line", style.quantity(case.breaking_load, "N")
+                 if np.isfinite(case.breaking_load) else "none in the case: the line must bear the tension above"
+                 if case.mode != "speed" else "no line in the case: it must bear the tow force above"))
+    rows.append(("bollard pull of the vessel", style.quantity(case.bollard_pull, "N")
+                 if np.isfinite(case.bollard_pull) else "no vessel in the case: it must hold the tow force above"))
+    return rows

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""The design statement of an ensemble: for each condition the tow force that is exceeded with a stated probability in a
+tow of stated length, its interval over fields, what it holds for, and what speaks against it.
+
+    p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
+Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
+domain that is too narrow, windows that are not steady, a tail that is extrapolated far.
+"""
+from dataclasses import dataclass
+
+import numpy as np
+
+import stat_load
+import stat_profile
+import style
+from bergtow_read import Run, RunError
+
+RIGID = 0.75        # concentration from which on rigid floes jam and nothing limits the force
+FAR = 10.0          # times the hours simulated: an extrapolation beyond is told
+WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
+SHORT_FIELDS = stat_profile.LEAST_FIELDS
+#: doubts about members (ensemble_read.DOUBTS) that concern the value
+DOUBTFUL = {
+    "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
+    "unsteady": "members that are not steady", "short": "members with a short window",
+    "stopped": "members that stopped early"
+}
+TENSIONS = ("line_tension_1", "line_tension_2")
+#: what stands in the line of what the values hold for: case key, words in front and behind
+HOLDS_FOR = (("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
+             ("body.length", "body of", ""), ("tow.mode", "tow mode", ""), ("tow.speed", "", ""),
+             ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a statement has to know of a condition's case."""
+
+    rigid: bool            #: nothing limits the force of a floe
+    mode: str
+    breaking_load: float   #: N, NaN without one
+    bollard_pull: float    #: N, NaN without a vessel
+    texts: dict            #: {key: value as written}
+
+
+def case_of(e, rows):
+    """Case of the first member of a condition that can be read, None where none can."""
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                limits = (run.value("ice.crushing.pressure", 0.0), run.value("ice.rafting.kappa", 0.0))
+                load, pull = run.value("tow.line.breaking_load", 0.0), run.value("tow.vessel.bollard_pull", 0.0)
+                mode = run.case.get("tow.mode", "")
+                return Case(not any(x > 0 for x in limits), mode, load if load > 0 and mode != "speed" else np.nan,
+                            pull if mode == "thrust" and pull > 0 else np.nan, run.case)
+        except RunError:
+            continue
+    return None
+
+
+def _of_the_case(e, rows, case, tow):
+    """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
+    out = []
+    concentration = e.summary.get("concentration", np.full(e.n, np.nan))[rows]
+    dense = np.nanmax(concentration, initial=0.0)
+    if case is None:
+        out.append(("the members' cases cannot be read: whether anything limits the force is not known", ""))
+    elif case.rigid and dense >= RIGID:
+        out.append((f"rigid floes at {100 * RIGID:.0f} % and more: nothing in the model limits the force of a jam, so "
+                    "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
+                    f"{100 * dense:.0f} %"))
+    if case is not None and case.mode == "speed":
+        out.append(("the tow holds its speed whatever it takes: no vessel slows down, no line stretches", ""))
+    narrow = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows)
+    if narrow:
+        out.append(("the domain is narrow for this ice: the value belongs to its width, and bergtow converge says "
+                    "how much", f"{narrow} of {len(rows)} members"))
+    if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
+        out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
+                    style.quantity(case.bollard_pull, "N")))
+    return out
+
+
+def _of_the_sample(e, rows, c, load):
+    """The same of how much was simulated, and of the tail."""
+    out, d = [], load["design"]
+    for kind, words in DOUBTFUL.items():
+        n = c["members"]["doubts"][kind]
+        if n:
+            out.append((words, f"{n} of {len(rows)} members"))
+    if c["drift"]["verdict"] == "not steady":
+        out.append(("not steady over all fields", "the mean ice resistance " + c["drift"]["words"]))
+    if load["fields"] < SHORT_FIELDS:
+        out.append((f"fewer than {SHORT_FIELDS} fields: the scatter between fields is not in the interval",
+                    f"{load['fields']}"))
+    if load["step_mean"]:
+        out.append(("the time scale is not above the time step: a step mean is no peak", f"{load['time_scale_s']:g} s"))
+    if "refused" in d:
+        return out + [("no value", d["refused"])]
+    if d["times_the_hours_simulated"] > FAR:
+        more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
+        out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
+                    f"{style.short(d['times_the_hours_simulated'], 2)} times; {more} fields would leave {FAR:g}"))
+    if d["irregular"]:
+        out.append(("the fitted tail ends at little more than the largest value simulated", ""))
+    if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
+        out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
+    return out + _of_the_models(load)
+
+
+def _of_the_models(load):
+    """Do the two models of the tail agree?"""
+    over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
+    if not over or not blocks or not np.isfinite([over["level"], blocks["level"]]).all():
+        return []
+    low, high = over["level_95"]
+    if low <= blocks["level"] <= high:
+        return []
+    return [("peaks over a threshold and block maxima disagree on the tail",
+             f"{style.quantity(over['level'], load['units'])} and {style.quantity(blocks['level'], load['units'])}")]
+
+
+def statement(e, rows, c):
+    """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "warnings",
+    "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
+    case, loads = case_of(e, rows), c["loads"]
+    tow = loads.get("tow_force")
+    tensions = [(loads[name]["design"], loads[name]["label"]) for name in TENSIONS
+                if name in loads and "value" in loads[name]["design"]]
+    worst = max(tensions, key=lambda found: found[0]["value"], default=None)
+    warned = _of_the_case(e, rows, case, tow and tow["design"])
+    if tow is None:
+        warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
+                       "something is towed", ""))
+    else:
+        warned += _of_the_sample(e, rows, c, tow)
+    breaking = case.breaking_load if case else np.nan
+    if worst and worst[0]["value"] > breaking:
+        warned.append(("the tension is above the breaking load of the line", style.quantity(breaking, "N")))
+    return {
+        "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
+                        "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
+                        "mean_95": tow["mean"]["interval_95"],
+                        "largest": tow["largest"]},
+        "tension": worst and {**worst[0], "label": worst[1]},
+        "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
+        "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
+    }
+
+
+def _holds_for(e, case):
+    """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
+    if case is None:
+        return ""
+    said = [(case.texts[key], before, behind) for key, before, behind in HOLDS_FOR
+            if key in case.texts and key not in e.parameters]
+    return ", ".join(" ".join(part for part in (before, value, behind) if part) for value, before, behind in said)

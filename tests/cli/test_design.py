@@ -1,0 +1,301 @@
+# SPDX-License-Identifier: MIT
+"""From a case to the report to sign: the command, its page in a browser, and the PDF as it would be printed."""
+import re
+import shutil
+import subprocess
+import sys
+import zlib
+
+import numpy as np
+import pytest
+import yaml
+
+from browser import browser, complaints, opened
+from harness import BERGTOW, ROOT, TOW, call, changed, environment, write_case
+
+sys.path.insert(0, str(ROOT / "postproc"))
+
+import design  # noqa: E402
+import pdf  # noqa: E402
+import report  # noqa: E402
+import report_case  # noqa: E402
+import report_ensemble  # noqa: E402
+import report_run  # noqa: E402
+import style  # noqa: E402
+from bergtow_read import Run, RunError  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
+
+TITLE = 'Tiny "berg" <i>A</i> & 50 %'
+CASE = changed(TOW, run={"dt": 0.1, "duration": 40, "title": TITLE}, output__window_start=8, domain__length=14,
+               ice__concentration=0.3, ice__size=0.9, estimate__length_scale=400,
+               report={"client": "Owners & Sons <x>", "project": "/home/secret/P-1", "author": "A. Author",
+                       "revision": "B3"})
+OPTIONS = report_ensemble.OPTIONS | {"resamples": 10}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The folder that the command leaves."""
+    folder = tmp_path_factory.mktemp("design")
+    write_case(folder, CASE)
+    patch = pytest.MonkeyPatch()
+    patch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    patch.setenv("BERGTOW", str(BERGTOW))
+    design.main([str(folder / "case.yml"), "-o", str(folder / "out"), "--concentrations", "0.2,0.4", "--fields", "5",
+                 "--quiet", "--seed", "3"])
+    patch.undo()
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def page(made, tmp_path_factory):
+    with browser(tmp_path_factory.mktemp("profile")) as driver:
+        driver.requests = [r for r in opened(driver, made / "report.html") if not r.startswith("data:")]
+        yield driver
+
+
+def told(program, *arguments):
+    result = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=60)
+    assert result.returncode == 0, result.stderr
+    return result.stdout
+
+
+def pages_of(path):
+    return told("pdftotext", "-layout", path, "-").split("\f")[:-1]
+
+
+# ---- the command
+
+def test_the_study_that_it_makes(made):
+    study = yaml.safe_load((made / "design.yml").read_text())
+    assert study["parameters"] == {"ice.concentration": [0.2, 0.4]} and study["repeats"] == 5 and study["seed"] == 3
+    assert study["base"] == "../case.yml" and study["title"] == f"{TITLE}: ice of 20 to 40 %"
+    e = Ensemble(made)
+    assert e.complete and e.n == 10 and not list(made.glob("replay-*"))
+    assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
+
+
+@pytest.mark.parametrize("value, low, high, words", [
+    (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")), (123456.0, 20000.0, 1.5e6, ("100 kN", "0 to 1500 kN")),
+    (5.2e6, 4.13e6, np.inf, ("5.2 MN", "4.1 to no bound MN")), (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
+    (12.0, np.nan, np.nan, ("12.0 N", "–")), (0.0, 0.0, 0.0, ("0 N", "–")),
+    (17.0, 0.0, 3e6, ("20 N", "0 to 3000000 N"))
+])
+def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
+    assert report_ensemble.worth(value, low, high) == words
+
+
+def test_what_is_refused(made, tmp_path, monkeypatch):
+    def said(*arguments, **more):
+        return subprocess.run([BERGTOW, "design", *map(str, arguments)], cwd=tmp_path, capture_output=True, text=True,
+                              env=environment(BERGTOW_HOME=ROOT, **more), timeout=120)
+    write_case(tmp_path, CASE)
+    assert said("none.yml").returncode == 4 and said("case.yml", "--concentrations", "0.99").returncode == 2
+    wrong = said("case.yml", "--set", "ice.sise=1")
+    assert wrong.returncode == 4 and "did you mean ice.size" in wrong.stderr and "Traceback" not in wrong.stderr
+    # another study than that of the folder: nothing of the old one is taken for it
+    old = shutil.copytree(made, tmp_path / "old")
+    before = (old / "report.html").read_bytes()
+    other = said("case.yml", "-o", "old", "--concentrations", "0.2,0.4", "--seed", "3", "--set", "ice.friction=0.1")
+    assert other.returncode == 4 and "another study" in other.stderr and (old / "report.html").read_bytes() == before
+    monkeypatch.setattr(pdf, "NAMES", ("no-such-browser",))
+    with pytest.raises(RunError, match="not installed.*apt-get install chromium"):
+        design.main([str(tmp_path / "case.yml"), "-o", str(tmp_path / "new")])
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_budget_that_does_not_reach(tmp_path, monkeypatch):
+    long = changed(CASE, run__duration=2000, domain__length=280)
+    write_case(tmp_path, long)
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    with pytest.raises(RunError, match="do not reach for one field.*raise --budget"):
+        design.main([str(tmp_path / "case.yml"), "-o", str(tmp_path / "out"), "--budget", "0.05", "--concentrations",
+                     "0.5", "--quiet"])
+
+
+def test_the_title_block_of_a_study(tmp_path):
+    write_case(tmp_path, changed(CASE, run__duration=1, output__window_start=0.2), "case.yml")
+    study = {"base": "case.yml", "report": {"client": "Another", "revision": "Z"}}
+    (tmp_path / "study.yml").write_text(yaml.safe_dump(study))
+    assert call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=tmp_path).returncode == 0
+    with Run(tmp_path / "out/members/c001-r001") as run:
+        block = dict(report_case.title_block(run.case, run.attributes, {"author": "Somebody"}))
+    assert block["client"] == "Another" and block["revision"] == "Z" and block["author"] == "Somebody"
+    assert block["project"] == "P-1"
+    for wrong, words in (({"clent": "x"}, "study.yml:.*report.clent: unknown key; did you mean report.client"),
+                         ("x", "report: needs keys with values"), ({"client": ["x"]}, "single values")):
+        (tmp_path / "study.yml").write_text(yaml.safe_dump(study | {"report": wrong}))
+        result = call("ensemble", "study.yml", "-o", "bad", "--quiet", cwd=tmp_path)
+        assert result.returncode == 3 and re.search(words, result.stderr), result.stderr
+    both = study | {"set": {"report.client": "Third"}}
+    (tmp_path / "study.yml").write_text(yaml.safe_dump(both))
+    assert "stands in `set` too" in call("ensemble", "study.yml", "-o", "bad", cwd=tmp_path).stderr
+
+
+# ---- the page
+
+HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Loads", "Mean ice resistance",
+            "Members", "Replay", "Every key", "Study", "Provenance"]
+
+
+def test_the_answer_comes_first_and_all_else_in_order(page, made):
+    assert [h.text for h in page.find_elements("tag name", "h2")] == HEADINGS
+    assert page.requests == [(made / "report.html").resolve().as_uri()] and complaints(page) == []
+    assert page.find_element("tag name", "h1").text == f"{TITLE}: ice of 20 to 40 %"
+    block = page.find_element("css selector", "table.block").text
+    assert "Owners & Sons <x>" in block and "revision B3" in block and "secret" not in block
+    assert page.find_element("link text", "replay of one tow").get_attribute("href") == (
+        made / "replay.html").resolve().as_uri()
+
+
+def test_it_holds_every_key_and_labels_what_is_assumed(page, made):
+    with Run(made / "members/c001-r001") as run:
+        keys, case = list(run.case), run.case
+        kinds = {v.key: v.kind for v in report_case.values(run)}
+    def column(selector):
+        return page.execute_script("return [...document.querySelectorAll(arguments[0])].map((e) => e.textContent)",
+                                   f"{selector} tbody th")
+    assert column("#keys") == keys
+    assumed = column("#assumed")
+    assert {k for k, kind in kinds.items() if kind in ("assumed", "memory", "reported") and not k.startswith(
+        report_ensemble.PERSONAL) and report_run.applies(k, case)} <= set(assumed)
+    row = page.find_element("xpath", "//section[@id='assumed']//tr[th='ice.friction']").text
+    assert "0 to 10" in row and "0.3" in row
+
+
+def test_figures_follow_the_dark(page):
+    """Every text and line of a figure stands off its ground in either mode, and no figure is a picture."""
+    assert page.find_elements("css selector", "img, figure image") == []
+    look = """
+        const rgb = (c) => (c.match(/[\\d.]+/g) || []).map(Number);
+        const light = ([r, g, b]) => [r, g, b].map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 :
+            ((v + 0.055) / 1.055) ** 2.4).reduce((s, v, k) => s + v * [0.2126, 0.7152, 0.0722][k], 0);
+        const paper = light(rgb(getComputedStyle(document.body).backgroundColor)), out = [];
+        for (const e of document.querySelectorAll('figure text')) {
+            const ink = light(rgb(getComputedStyle(e).fill));
+            out.push((Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05));
+        }
+        return [paper, Math.min(...out), out.length]"""
+    papers = []
+    for mode in ("light", "dark"):
+        page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme",
+                                                                          "value": mode}]})
+        paper, least, count = page.execute_script(look)
+        assert least > 4 and count > 50, (mode, least)
+        papers.append(paper)
+    assert papers[0] > 0.9 and papers[1] < 0.05
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_it_fits_a_phone(page):
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride",
+                         {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": True})
+    assert page.execute_script("return document.documentElement.scrollWidth") <= 390
+    page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+# ---- the PDF
+
+def streams(path):
+    """All that stands in a PDF, unpacked."""
+    raw = path.read_bytes()
+    out = [raw]
+    for found in re.finditer(rb"stream\r?\n(.*?)\r?\nendstream", raw, re.S):
+        try:
+            out.append(zlib.decompress(found[1]))
+        except zlib.error:
+            pass
+    return b"\n".join(out)
+
+
+def test_pages_of_the_pdf(made):
+    """Numbered "n of N", headed by title and revision; none is half empty but the last."""
+    pages = pages_of(made / "report.pdf")
+    n = len(pages)
+    assert 8 <= n <= 25
+    for k, text in enumerate(pages):
+        lines = [line for line in text.splitlines() if line.strip()]
+        assert lines[-1].split() == ["bergtow", str(k + 1), "of", str(n)]
+        assert lines[0].strip().startswith(f"{TITLE}: ice of 20 to 40 %") and lines[0].endswith("revision B3")
+
+
+def test_the_ink_on_the_pages(made, tmp_path):
+    from PIL import Image
+    told("pdftoppm", "-r", "20", "-gray", made / "report.pdf", tmp_path / "p")
+    filled = []
+    for path in sorted(tmp_path.glob("p-*.pgm")):
+        ink = np.asarray(Image.open(path)) < 200
+        body = ink[int(0.08 * len(ink)):int(0.92 * len(ink))]
+        filled.append(np.flatnonzero(body.any(axis=1)).max() / len(body))
+    assert min(filled[:-1]) > 0.55, filled
+
+
+def test_the_pdf_reads_in_order_and_is_searchable(made):
+    text = " ".join("\n".join(pages_of(made / "report.pdf")).split())
+    marks = [f" {k + 1} {h} " for k, h in enumerate(HEADINGS[:-3])] + [
+        f" Appendix {letter} {h} " for letter, h in zip("ABC", HEADINGS[-3:])]
+    places = [text.index(mark) for mark in marks]
+    assert places == sorted(places) and text.index("Owners & Sons <x>") < places[0]
+    raw = re.sub(r"\s+", "", told("pdftotext", "-raw", made / "report.pdf", "-"))
+    with Run(made / "members/c001-r001") as run:
+        assert [k for k in run.case if k not in raw] == []
+    assert "signature" in text and "prepared" in text
+
+
+def test_fonts_are_embedded_and_figures_are_vectors(made):
+    fonts = told("pdffonts", made / "report.pdf").splitlines()[2:]
+    assert fonts and all(re.search(r" yes (yes|no ) yes ", line) for line in fonts), fonts
+    assert told("pdfimages", "-list", made / "report.pdf").splitlines()[2:] == []
+
+
+def test_no_path_of_the_machine_is_told(made):
+    """Neither in the page nor anywhere in the PDF; the replay is a run's report."""
+    for name in ("report.html", "report.pdf"):
+        content = streams(made / name)
+        for word in (b"/tmp", b"/work", b"/home", b"secret", str(made.parent).encode(), b"file:"):
+            assert word not in content, (name, word)
+
+
+@pytest.mark.parametrize("text, left", [
+    ("bergtow run /tmp/a/b.yml -o ../x/y/out", "bergtow run b.yml -o out"),
+    ("1/2 rho_i kg/m3 N/m", "1/2 rho_i kg/m3 N/m"),
+    ("base: /home/me/cases/berg.yml # x", "base: berg.yml # x"), ("~/work/a.h5: no", "a.h5: no"),
+    ("m/s or km/h", "m/s or km/h"), ("/events of result.h5", "/events of result.h5")
+])
+def test_paths_are_cut(text, left):
+    assert report_case.scrubbed(text) == left
+
+
+def test_the_report_of_a_run_as_pdf(made, tmp_path):
+    path = tmp_path / "run.pdf"
+    report.main([str(made / "members/c001-r001"), "-o", str(path), "--revision", "Q"])
+    pages = pages_of(path)
+    assert "Published and derived estimates" in "".join(pages) and "revision Q" in pages[0] and "Replay" not in pages[0]
+
+
+# ---- figures
+
+def test_logarithmic_axes_are_labelled():
+    locator = style.LogTicks()
+    for low in (1e-3, 0.7, 40.0):
+        for span in (1.2, 1.7, 3, 8, 40, 1e4, 1e9):
+            ticks = locator.tick_values(low, low * span)
+            assert 2 <= len(ticks) <= 9, (low, span)
+            assert ticks.min() >= low * 0.999 and ticks.max() <= low * span * 1.001, (low, span)
+
+
+def test_only_what_is_in_sight_is_in_the_legend():
+    import matplotlib.pyplot as plt
+    figure, axes = plt.subplots()
+    x = np.linspace(0, 1, 11)
+    axes.plot(x, x, label="through it")
+    axes.plot(x, x + 20, label="above")
+    axes.plot([-5, 6], [0.4, 0.6], label="across")
+    axes.plot([3], [0.5], "o", label="beside")
+    axes.plot([0.5, np.nan, 0.6], [-9, np.nan, 9], label="never joined")
+    axes.axhline(0.5, label="level")
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, 1)
+    _, labels, lost = style.legend_of(axes)
+    assert labels == ["through it", "across", "level"] and lost == ["above", "beside", "never joined"]
+    plt.close(figure)

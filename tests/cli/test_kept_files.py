@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: MIT
+"""No script of postproc/ replaces a file that none of them made, unless it is told to: every script, every kind of
+file."""
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import made_up_ensemble as made_up
+from harness import BERGTOW, TOW, call, changed, write_case
+from test_postproc import script
+
+POSTPROC = Path(__file__).resolve().parents[2] / "postproc"
+sys.path.insert(0, str(POSTPROC))
+
+import animate  # noqa: E402
+import budget  # noqa: E402
+import capability  # noqa: E402
+import command  # noqa: E402
+import converge  # noqa: E402
+import design  # noqa: E402
+import ensemble  # noqa: E402
+import plot_chains  # noqa: E402
+import plot_ensemble  # noqa: E402
+import plot_field  # noqa: E402
+import plot_force  # noqa: E402
+import plot_impacts  # noqa: E402
+import plot_resistance  # noqa: E402
+import report  # noqa: E402
+import report_ensemble  # noqa: E402
+import report_run  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
+
+DEAR = b"dear to somebody"
+REFUSED = ": is there already, and was not made by these scripts; .*--force"
+#: script: (module, arguments; RUN and ALL stand for the folders of a run and of an ensemble, and files it writes into
+#: the working folder), in each line another kind of file
+CALLS = [
+    (plot_force, ["RUN", "-o", "a.png", "--diagnostics"], ["a.png", "a-diagnostics.png"]),
+    (plot_field, ["RUN", "-o", "a.svg"], ["a.svg"]),
+    (plot_impacts, ["RUN", "-o", "a.pdf"], ["a.pdf"]),
+    (animate, ["RUN", "-o", "a.mp4", "--frames", "2", "--width", "320"], ["a.mp4"]),
+    (animate, ["RUN", "-o", "a.gif", "--frames", "2", "--width", "320"], ["a.gif"]),
+    (plot_chains, ["RUN", "contacts.h5", "-o", "a.png"], ["a.png"]),
+    (plot_resistance, ["RUN", "-o", "a.png", "--table", "a.md"], ["a.png", "a.md"]),
+    (plot_ensemble, ["ALL", "-o", "."], ["sweep-ice-concentration.png", "exceedance.png"]),
+    (ensemble, ["ALL", "-o", ".", "--resamples", "1"], ["statistics.json", "statistics.csv"]),
+    (report, ["RUN", "-o", "a.html"], ["a.html"]),
+    (report, ["ALL", "-o", "a.pdf"], ["a.pdf"]),
+    (converge, ["case.yml", "-o", "."], ["converge.json"]),
+    (budget, ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
+    (capability, ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
+    (design, ["case.yml", "-o", "."], ["design.yml", "report.html", "report.pdf", "replay.html"]),
+]
+WRITE_NOTHING = {"contents"}
+SLOW = (budget, capability, design)  # refused before any work; that they replace their own their tests show
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory):
+    """A run with the contacts of a step, and an ensemble."""
+    folder, rng = tmp_path_factory.mktemp("places"), np.random.default_rng(3)
+    case = changed(TOW, ice__concentration=0.7, run__duration=12, output__window_start=3)
+    made = call("run", write_case(folder, case), "-o", folder / "run", "--quiet", "--dump-contacts",
+                f"100:{folder / 'contacts.h5'}")
+    assert made.returncode == 0, made.stderr
+    times = np.sort(rng.uniform(1, 599, 60))
+    made_up.write(folder / "all", [
+        made_up.member(made_up.ar1(0.6, 600, rng, 100.0 * c, 10.0), {"ice.concentration": c / 10}, c - 1,
+                       peaks=(times, rng.exponential(50.0, 60))) for c in (1, 2) for _ in range(3)])
+    return folder
+
+
+@pytest.fixture
+def quick(places, tmp_path, monkeypatch):
+    """In a folder with the files that the calls read; what takes long and writes nothing is left out."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(places / "case.yml", tmp_path)
+    shutil.copy(places / "contacts.h5", tmp_path)
+    (tmp_path / "study.yml").write_text("base: case.yml\n")
+    write_case(tmp_path, changed(TOW, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4,
+                                 tow__line__breaking_load=1e5), "line.yml")
+    monkeypatch.setenv("BERGTOW", str(BERGTOW))
+    monkeypatch.setattr(converge, "converge", work_of(tmp_path / "converge.json"))
+    monkeypatch.setattr(converge.converge_text, "verdicts", lambda _: "")
+    monkeypatch.setattr(report_run, "pictures", lambda _: [])
+    monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
+    return {"RUN": str(places / "run"), "ALL": str(places / "all")}
+
+
+def work_of(file):
+    """In place of hours of work, which must not begin where its result cannot be written."""
+    def work(*_):
+        assert not file.exists() or file.read_bytes() != DEAR
+        return []
+    return work
+
+
+def test_every_script_that_writes_is_here():
+    scripts = {p.stem for p in POSTPROC.glob("*.py") if "command.guarded(main)" in p.read_text()}
+    assert scripts == {module.__name__ for module, _, _ in CALLS} | WRITE_NOTHING
+
+
+@pytest.mark.parametrize("module, words, files", CALLS, ids=lambda x: getattr(x, "__name__", None))
+def test_files_of_others_are_kept(quick, tmp_path, module, words, files, monkeypatch):
+    words = [quick.get(word, word) for word in words]
+    if module in SLOW:
+        for name in files:
+            (tmp_path / name).write_bytes(DEAR)
+            with pytest.raises(RunError, match=name + REFUSED):
+                module.main(words)
+            assert (tmp_path / name).read_bytes() == DEAR
+            (tmp_path / name).unlink()
+        return
+    for name in files:
+        (tmp_path / name).write_bytes(DEAR)
+        with pytest.raises(RunError, match=name + REFUSED):
+            module.main(words)
+        assert (tmp_path / name).read_bytes() == DEAR
+        assert not [other for other in files if other != name and (tmp_path / other).exists()]
+        if name != files[-1]:
+            (tmp_path / name).unlink()
+    monkeypatch.setattr(converge, "converge", lambda *_: [])
+    module.main([*words, "--force"])
+    made = {name: (tmp_path / name).read_bytes() for name in files}
+    assert all(content != DEAR for content in made.values())
+    stamps = {name: (tmp_path / name).stat().st_mtime_ns for name in files}
+    module.main(words)  # its own are replaced
+    assert all((tmp_path / name).stat().st_mtime_ns > stamps[name] for name in files)
+    assert not [p for p in tmp_path.iterdir() if ".new" in p.name]
+
+
+def test_pictures_carry_the_mark_where_it_can_be_read(tmp_path):
+    figure = report_run.plot_force.plt.figure()
+    for name in ("a.png", "a.pdf", "a.svg"):
+        command.save(figure, tmp_path / name)
+    assert Image.open(tmp_path / "a.png").text["Software"] == command.MARK
+    assert re.search(rb"/Producer \(" + command.MARK.encode(), (tmp_path / "a.pdf").read_bytes())
+    assert command.MARK in (tmp_path / "a.svg").read_text().split("</metadata>")[0]
+
+
+def test_what_is_no_file(tmp_path):
+    """A folder in its place, a place that cannot be, an empty file; the exit code of the program."""
+    with pytest.raises(RunError, match="is there already, and is no file"):
+        command.may_write(tmp_path, True)
+    (tmp_path / "empty.md").write_bytes(b"")
+    with pytest.raises(RunError, match="was not made"):
+        command.write_markdown("x", tmp_path / "empty.md", False)
+    with pytest.raises(RunError, match="cannot be written"):
+        command.write_markdown("x", tmp_path / "empty.md" / "below.md", False)
+    (tmp_path / "case.html").write_bytes(DEAR)
+    result = script("report.py", tmp_path, "-o", tmp_path / "case.html")
+    assert result.returncode == 4 and "Traceback" not in result.stderr and "--force" in result.stderr
+    assert (tmp_path / "case.html").read_bytes() == DEAR
+
+
+def test_a_page_that_fails_leaves_the_old_one(tmp_path):
+    path = tmp_path / "a.md"
+    command.write_markdown("old", path, False)
+    before = path.read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        with command.written(path, False) as new:
+            new.write_text("half")
+            raise KeyboardInterrupt
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["a.md"]
