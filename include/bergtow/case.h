@@ -310,7 +310,7 @@ double bt_case_body_mass(const bt_case *c);
 static inline bool bt_bound_wraps(bt_bound b) { return b == BT_BOUND_PERIODIC || b == BT_BOUND_MOVING; }
 
 /// +1 when the tow goes towards +x, −1 towards −x: where the moving window goes.
-static inline double bt_case_tow_sign(const bt_case *c) { return cos(c->tow.direction) < 0 ? -1 : 1; }
+double bt_case_tow_sign(const bt_case *c);
 
 /// A velocity at time zero of a case as a number: 0 where it is left to free drift.
 static inline double bt_case_start(double v) { return isnan(v) ? 0 : v; }

@@ -25,6 +25,7 @@
 #include "bergtow/base.h"
 #include "partition/cut.h"
 #include "partition/cut_method.h"
+#include "base/elementary.h"
 
 static const double DIAMETER = 30, CONCENTRATION = 0.8, JITTER = 0.3, REACH = 1.05, BERG = 100, TOLERANCE = 0.03;
 static const double POINTS = 2, WAKE = 4;
@@ -65,7 +66,7 @@ static void count(field *f, int row, double spacing, bool berg)
         for (int i = 0; i < row; i++, v++) {
             x[v][0] = (i + 0.5 + JITTER * (2 * uniform(2 * (uint64_t)v) - 1)) * spacing;
             x[v][1] = (j + 0.5 + JITTER * (2 * uniform(2 * (uint64_t)v + 1) - 1)) * spacing;
-            if (berg && hypot(x[v][0] - middle, x[v][1] - middle) < BERG / 2) x[v][0] = -1e9;
+            if (berg && bt_hypot(x[v][0] - middle, x[v][1] - middle) < BERG / 2) x[v][0] = -1e9;
             else f->floes[cell_of(f, x[v])]++;
         }
     static const int next[4][2] = {{1, 0}, {-1, 1}, {0, 1}, {1, 1}};
@@ -75,7 +76,7 @@ static void count(field *f, int row, double spacing, bool berg)
                 int a = i + next[k][0], b = j + next[k][1];
                 if (a < 0 || a >= row || b >= row) continue;
                 int u = b * row + a;
-                if (!(hypot(x[v][0] - x[u][0], x[v][1] - x[u][1]) < REACH * DIAMETER)) continue;
+                if (!(bt_hypot(x[v][0] - x[u][0], x[v][1] - x[u][1]) < REACH * DIAMETER)) continue;
                 int s = cell_of(f, x[v]), t = cell_of(f, x[u]); // the contact belongs to (min i, min j)
                 int ti = s % f->n < t % f->n ? s % f->n : t % f->n, tj = s / f->n < t / f->n ? s / f->n : t / f->n;
                 f->contacts[tj * f->n + ti]++;

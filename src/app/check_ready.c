@@ -11,6 +11,7 @@
 #include "case/case_check.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
+#include "base/elementary.h"
 
 static bt_check_ice ice_of_case(const bt_case *c)
 {
@@ -20,8 +21,8 @@ static bt_check_ice ice_of_case(const bt_case *c)
                       .concentration = c->ice.concentration};
     if (c->ice.size_law == BT_SIZE_POWER) {
         double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max; // <d> of N(>d) ~ d^-a on [lo, hi]
-        n.size = (fabs(a - 1) < 1e-9 ? log(hi / lo) : (pow(hi, 1 - a) - pow(lo, 1 - a)) / (1 - a)) /
-                 ((pow(lo, -a) - pow(hi, -a)) / a);
+        n.size = (fabs(a - 1) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 1 - a) - bt_pow(lo, 1 - a)) / (1 - a)) /
+                 ((bt_pow(lo, -a) - bt_pow(hi, -a)) / a);
     }
     return n;
 }

@@ -15,6 +15,7 @@
 #include "app/cmd_check.h"
 #include "case/cost.h"
 #include "estimate/packing.h"
+#include "base/elementary.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -141,8 +142,8 @@ static void print_body(const bt_case *c)
         return;
     }
     bt_moments m = bt_shape_moments(n, v);
-    double ahead = c->tow.direction - c->body.yaw, across = bt_shape_width(n, v, cos(ahead), sin(ahead)),
-           along = bt_shape_width(n, v, -sin(ahead), cos(ahead));
+    double ahead = c->tow.direction - c->body.yaw, across = bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)),
+           along = bt_shape_width(n, v, -bt_sin(ahead), bt_cos(ahead));
     double mass = bt_case_body_mass(c), displaced = c->water.density * m.area * c->body.draft;
     printf("body                 %.4g m along the tow, %.4g m across, waterline %.4g m2, draft %.4g m, sail %.4g m\n",
            along, across, m.area, c->body.draft, c->body.sail);
@@ -228,7 +229,7 @@ static void print_drift(const bt_case *c, const bt_check_ice *n)
     bt_setup_drift(c, n->size, n->thickness, v[0], v[1]);
     static const char *const names[] = {"free drift, mean floe", "free drift, body"};
     for (int k = n->count < 1; k < 2; k++)
-        if (hypot(v[k][0], v[k][1]) > 0) printf("%-20s (%.4g, %.4g) m/s at the start\n", names[k], v[k][0], v[k][1]);
+        if (bt_hypot(v[k][0], v[k][1]) > 0) printf("%-20s (%.4g, %.4g) m/s at the start\n", names[k], v[k][0], v[k][1]);
 }
 
 static void print_step(const bt_case *c, const bt_check_ice *n)

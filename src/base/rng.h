@@ -9,6 +9,7 @@
 #include <math.h>
 
 #include "bergtow/base.h"
+#include "base/elementary.h"
 
 /// What a stream is for. Numbers are part of the result: append, never reorder.
 typedef enum {
@@ -54,7 +55,7 @@ static inline double bt_rng_uniform(bt_rng *r) { return (double)(bt_rng_bits(r) 
 static inline double bt_rng_normal(bt_rng *r)
 {
     double u = 1 - bt_rng_uniform(r), v = bt_rng_uniform(r); // u in (0, 1]
-    return sqrt(-2 * log(u)) * cos(2 * BT_PI * v);
+    return sqrt(-2 * bt_log(u)) * bt_cos(2 * BT_PI * v);
 }
 
 /// Gamma of shape k > 0 and scale 1: Marsaglia and Tsang 2000, ACM TOMS 26.
@@ -62,14 +63,14 @@ static inline double bt_rng_gamma(bt_rng *r, double k)
 {
     if (k < 1) {
         double g = bt_rng_gamma(r, k + 1);
-        return g * pow(1 - bt_rng_uniform(r), 1 / k);
+        return g * bt_pow(1 - bt_rng_uniform(r), 1 / k);
     }
     double d = k - 1.0 / 3, c = 1 / sqrt(9 * d);
     for (;;) {
         double x = bt_rng_normal(r), v = 1 + c * x;
         if (v <= 0) continue;
         v = v * v * v;
-        if (log(1 - bt_rng_uniform(r)) < 0.5 * x * x + d - d * v + d * log(v)) return d * v;
+        if (bt_log(1 - bt_rng_uniform(r)) < 0.5 * x * x + d - d * v + d * bt_log(v)) return d * v;
     }
 }
 

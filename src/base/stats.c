@@ -29,6 +29,7 @@
 // parts the means of the two halves by three standard errors of their difference is seen in 89 to 92 %, 90 % in the
 // mean (tests/unit/test_stats.c).
 #include "bergtow/stats.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -83,7 +84,7 @@ static double slow_variance(const double *z, int count, int64_t n, int from, int
         double wave = 0;
         for (int k = 0; k < count; k++) {
             const int64_t first = n * k / count, end = n * (k + 1) / count;
-            wave += (double)(end - first) * z[k] * cos(BT_PI * j * (double)(first + end) / (double)(2 * n));
+            wave += (double)(end - first) * z[k] * bt_cos(BT_PI * j * (double)(first + end) / (double)(2 * n));
         }
         sum += wave * wave * 2 / (double)n;
     }

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/elementary.h"
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "base/units.h"
@@ -148,6 +149,6 @@ void bt_table_at(const bt_table *t, double time, double v[2])
 double bt_table_fastest(const bt_table *t)
 {
     double most = 0;
-    for (int64_t i = 0; i < t->n; i++) most = bt_max(most, hypot(t->row[3 * i + 1], t->row[3 * i + 2]));
+    for (int64_t i = 0; i < t->n; i++) most = bt_max(most, bt_hypot(t->row[3 * i + 1], t->row[3 * i + 2]));
     return most;
 }

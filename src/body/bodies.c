@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Storage of the bodies: growth, outlines and parts of a new one.
 #include "body/bodies.h"
+#include "base/elementary.h"
 
 #include <assert.h>
 #include <math.h>
@@ -59,7 +60,7 @@ static void close_polygon(bt_bodies *b, int64_t first, int n)
 {
     for (int k = 0; k < n; k++) {
         const double *p = b->vertices + 2 * (first + k), *q = b->vertices + 2 * (first + (k + 1) % n);
-        b->per_length[first + k] = 1 / hypot(q[0] - p[0], q[1] - p[1]);
+        b->per_length[first + k] = 1 / bt_hypot(q[0] - p[0], q[1] - p[1]);
         b->mark[first + k].count = 0;
     }
     b->mark[first].count = (uint8_t)n;
@@ -149,8 +150,7 @@ bt_gid bt_bodies_add(bt_bodies *b, const bt_body_def *d)
 void bt_bodies_turn(bt_bodies *b, bt_idx i)
 {
     bt_pose *p = &b->pose[i];
-    p->c = cos(p->yaw);
-    p->s = sin(p->yaw);
+    bt_sincos(p->yaw, &p->s, &p->c);
     for (int64_t k = b->offset[i]; k < b->offset[i + 1]; k++) {
         const double *v = b->vertices + 2 * k;
         b->outline[2 * k] = p->c * v[0] - p->s * v[1];

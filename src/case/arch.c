@@ -5,6 +5,7 @@
 #include <math.h>
 
 #include "bergtow/shape.h"
+#include "base/elementary.h"
 
 /// Body widths that ice from this concentration on needs.
 static const struct { double concentration, widths; } needed[] = {{0.45, 10}, {0.7, 30}, {0.85, 60}};
@@ -15,7 +16,7 @@ bt_arch bt_arch_of(const bt_case *c, double concentration, double floe_size)
     const int n = bt_case_waterline(c, v);
     // The tow goes along the domain, more or less: what stands at the sides is across it.
     const double ahead = c->tow.direction - c->body.yaw,
-                 across = n ? bt_shape_width(n, v, cos(ahead), sin(ahead)) : NAN;
+                 across = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : NAN;
     const bool open = c->domain.sides == BT_BOUND_OPEN;
     bt_arch a = {.concentration = concentration,
                  .bodies = c->domain.width / across,

@@ -8,6 +8,7 @@
 #include "bergtow/shape.h"
 #include "base/fileio.h"
 #include "case/ice_bounds.h"
+#include "base/elementary.h"
 #include "base/largest.h"
 #include "case/schema.h"
 
@@ -32,7 +33,7 @@ typedef struct {
 static box bounds_of(int n, const double *v, double x, double y, double yaw)
 {
     box b = {INFINITY, -INFINITY, INFINITY, -INFINITY};
-    double cosine = cos(yaw), sine = sin(yaw);
+    double cosine = bt_cos(yaw), sine = bt_sin(yaw);
     for (int i = 0; i < n; i++) {
         double px = x + cosine * v[2 * i] - sine * v[2 * i + 1], py = y + sine * v[2 * i] + cosine * v[2 * i + 1];
         b.x_min = bt_min(b.x_min, px), b.x_max = bt_max(b.x_max, px);
@@ -403,7 +404,7 @@ static void check_path(const check *k, int n, const double *v)
     if (!straight || !(c->run.duration > 0) ||
         !bt_check_sound(k, "run.duration tow.mode tow.speed tow.direction tow.ramp tow.programme"))
         return;
-    double way = bt_case_tow_distance(c, c->run.duration), ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    double way = bt_case_tow_distance(c, c->run.duration), ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     double x = c->body.x + way * ux, y = c->body.y + way * uy;
     box b = bounds_of(n, v, x, y, c->body.yaw), start = bounds_of(n, v, c->body.x, c->body.y, c->body.yaw);
     double reach = way, slack = 1e-9 * (c->domain.length + c->domain.width);

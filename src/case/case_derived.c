@@ -5,9 +5,12 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/elementary.h"
 #include "base/table.h"
 #include "case/body_shapes.h"
 #include "bergtow/shape.h"
+
+double bt_case_tow_sign(const bt_case *c) { return bt_cos(c->tow.direction) < 0 ? -1 : 1; }
 
 int bt_case_outline(bt_body_shape shape, double length, double width, int n, const double *vertices, double *v,
                     const char **why)
@@ -41,8 +44,8 @@ static double mean_square_size(const bt_case *c)
     double a = c->ice.size_exponent, lo = c->ice.size_min, hi = c->ice.size_max;
     if (c->ice.size_law != BT_SIZE_POWER)
         return c->ice.size * c->ice.size * (1 + c->ice.size_spread * c->ice.size_spread);
-    double top = fabs(a - 2) < 1e-9 ? log(hi / lo) : (pow(hi, 2 - a) - pow(lo, 2 - a)) / (2 - a);
-    return top / ((pow(lo, -a) - pow(hi, -a)) / a);
+    double top = fabs(a - 2) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 2 - a) - bt_pow(lo, 2 - a)) / (2 - a);
+    return top / ((bt_pow(lo, -a) - bt_pow(hi, -a)) / a);
 }
 
 double bt_case_expected_floes(const bt_case *c)
@@ -85,9 +88,9 @@ double bt_case_reference_speed(const bt_case *c)
     double u = bt_max(c->domain.ends_closing, c->domain.sides_closing);
     u = bt_max(u, bt_case_fastest_flow(c, true));
     // A velocity that is not given is that of free drift.
-    if (!isnan(c->body.vx)) u = bt_max(u, hypot(c->body.vx, c->body.vy));
+    if (!isnan(c->body.vx)) u = bt_max(u, bt_hypot(c->body.vx, c->body.vy));
     for (bt_idx i = 0; i < c->n_floes; i++)
-        if (!isnan(c->floes[i].vx)) u = bt_max(u, hypot(c->floes[i].vx, c->floes[i].vy));
+        if (!isnan(c->floes[i].vx)) u = bt_max(u, bt_hypot(c->floes[i].vx, c->floes[i].vy));
     // Free drift of ice is about 2 % of the wind (Nansen's rule).
     u = bt_max(u, 0.02 * bt_case_fastest_flow(c, false));
     return u > 0 ? u : 0.1;
@@ -97,6 +100,6 @@ double bt_case_fastest_flow(const bt_case *c, bool water)
 {
     const bt_table *t = water ? &c->water.table : &c->air.table;
     if (t->n > 0) return bt_table_fastest(t);
-    if (!water) return hypot(c->air.wind_x, c->air.wind_y);
-    return hypot(c->water.current_x, c->water.current_y) + bt_max(c->water.tide.major, fabs(c->water.tide.minor));
+    if (!water) return bt_hypot(c->air.wind_x, c->air.wind_y);
+    return bt_hypot(c->water.current_x, c->water.current_y) + bt_max(c->water.tide.major, fabs(c->water.tide.minor));
 }

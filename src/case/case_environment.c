@@ -8,6 +8,7 @@
 
 #include "bergtow/shape.h"
 #include "case/schema.h"
+#include "base/elementary.h"
 #include "base/table.h"
 
 bt_status bt_case_load_tables(bt_case *c, bt_errors *err)
@@ -63,7 +64,7 @@ void bt_case_check_lead(const bt_check *k, int n, const double *v)
 {
     bt_case *c = k->c;
     const double ahead = c->tow.direction - c->body.yaw;
-    if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, cos(ahead), sin(ahead)) : 0;
+    if (isnan(c->lead.width)) c->lead.width = n ? bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)) : 0;
     if (isnan(c->lead.length))
         c->lead.length =
             c->tow.mode == BT_TOW_NONE || !n ? 0 : bt_case_tow_distance(c, c->run.duration) + c->body.length;

@@ -9,6 +9,7 @@
 #include "bergtow/shape.h"
 #include "case/case_check.h"
 #include "case/speed_law.h"
+#include "base/elementary.h"
 
 static bool has_line(const bt_case *c) { return c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST; }
 
@@ -51,14 +52,14 @@ double bt_case_tow_time(const bt_case *c, double way)
 /// A point of the hull in the world at time zero.
 static void hull_at(const bt_case *c, double hx, double hy, double at[2])
 {
-    const double cy = cos(c->body.yaw), sy = sin(c->body.yaw);
+    const double cy = bt_cos(c->body.yaw), sy = bt_sin(c->body.yaw);
     at[0] = c->body.x + cy * hx - sy * hy;
     at[1] = c->body.y + sy * hx + cy * hy;
 }
 
 bool bt_case_tow_start(const bt_case *c, double at[2])
 {
-    const double ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     // A line's length ahead of the fastening point: taut, without tension.
     double p[2], q[2];
     hull_at(c, c->tow.hull_x, c->tow.hull_y, p);
@@ -94,7 +95,7 @@ bool bt_case_tow_path(const bt_case *c, bt_path *path, char why[200])
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
     if (c->tow.n_waypoints > 0)
         return bt_path_make(path, start[0], start[1], c->tow.n_waypoints, c->tow.waypoints, c->tow.turn_radius, why);
-    const double ahead[2] = {start[0] + cos(c->tow.direction), start[1] + sin(c->tow.direction)};
+    const double ahead[2] = {start[0] + bt_cos(c->tow.direction), start[1] + bt_sin(c->tow.direction)};
     const bool made = bt_path_make(path, start[0], start[1], 1, ahead, 0, why);
     if (made) path->n_marks = 0; // the point ahead is no way-point
     return made;
@@ -107,7 +108,7 @@ void bt_case_tow_course(const bt_check *k)
     bt_case *c = k->c;
     if (c->domain.frame == BT_FRAME_GEOGRAPHIC) fill(&c->body.x, 0);
     if (c->tow.n_waypoints > 0 && !bt_check_given(k, "tow.direction") && !isnan(c->body.x))
-        c->tow.direction = atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
+        c->tow.direction = bt_atan2(c->tow.waypoints[1] - c->body.y, c->tow.waypoints[0] - c->body.x);
 }
 
 void bt_case_tow_follow(const bt_check *k)
@@ -179,7 +180,7 @@ static void farthest_point(int n, const double *v, double ux, double uy, double 
     int count = 0;
     for (int i = 0; i < n; i++) {
         most = bt_max(most, v[2 * i] * ux + v[2 * i + 1] * uy);
-        size = bt_max(size, hypot(v[2 * i], v[2 * i + 1]));
+        size = bt_max(size, bt_hypot(v[2 * i], v[2 * i + 1]));
     }
     for (int i = 0; i < n; i++)
         if (v[2 * i] * ux + v[2 * i + 1] * uy >= most - 1e-9 * size) x += v[2 * i], y += v[2 * i + 1], count++;
@@ -189,7 +190,7 @@ static void farthest_point(int n, const double *v, double ux, double uy, double 
 
 void bt_case_tow_hull(bt_case *c, int n, const double *v)
 {
-    const double ahead = c->tow.direction - c->body.yaw, ux = cos(ahead), uy = sin(ahead);
+    const double ahead = c->tow.direction - c->body.yaw, ux = bt_cos(ahead), uy = bt_sin(ahead);
     const bool two = c->tow.line.branches > 1;
     double p[2], q[2];
     farthest_point(n, v, two ? -uy : ux, two ? ux : uy, p);
@@ -272,7 +273,7 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
     enum { TIMES = 2000 };
     double v[2 * BT_MAX_VERTICES], start[2], at[2], tangent[2];
     const int n = bt_case_waterline(c, v);
-    const double cy = cos(c->body.yaw), sy = sin(c->body.yaw), slack = 1e-9 * (c->domain.length + c->domain.width);
+    const double cy = bt_cos(c->body.yaw), sy = bt_sin(c->body.yaw), slack = 1e-9 * (c->domain.length + c->domain.width);
     bt_path_at(path, 0, start, tangent);
     for (int i = 1; i <= TIMES; i++) {
         const double time = c->run.duration * i / TIMES;
@@ -302,7 +303,7 @@ static void check_waypoints(const bt_check *k)
         bt_check_fault(k, "tow.waypoints", "have no effect with tow.mode: none; remove them or set another mode");
         return;
     }
-    const double dx = c->tow.waypoints[0] - c->body.x, dy = c->tow.waypoints[1] - c->body.y, course = atan2(dy, dx);
+    const double dx = c->tow.waypoints[0] - c->body.x, dy = c->tow.waypoints[1] - c->body.y, course = bt_atan2(dy, dx);
     if (fabs(remainder(c->tow.direction - course, 2 * BT_PI)) > 1e-9) {
         bt_check_fault(k, "tow.direction",
                        "%g deg is not the direction from the body to the first way-point, %g deg; remove one of them",
@@ -312,7 +313,7 @@ static void check_waypoints(const bt_check *k)
     double start[2];
     if (!bt_case_tow_start(c, start)) return; // told by bt_case_tow_check
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
-    if (!((c->tow.waypoints[0] - start[0]) * cos(course) + (c->tow.waypoints[1] - start[1]) * sin(course) > 0)) {
+    if (!((c->tow.waypoints[0] - start[0]) * bt_cos(course) + (c->tow.waypoints[1] - start[1]) * bt_sin(course) > 0)) {
         bt_check_fault(k, "tow.waypoints",
                        "the first, (%g, %g) m, is not ahead of where the towing end starts, (%g, %g) m; move it ahead "
                        "or shorten the line",
@@ -330,11 +331,11 @@ static void check_waypoints(const bt_check *k)
          i++) {
         const double lx = c->tow.waypoints[2 * i + 2] - c->tow.waypoints[2 * i],
                      ly = c->tow.waypoints[2 * i + 3] - c->tow.waypoints[2 * i + 1];
-        if (lx * bt_case_tow_sign(c) >= 0.5 * hypot(lx, ly)) continue;
+        if (lx * bt_case_tow_sign(c) >= 0.5 * bt_hypot(lx, ly)) continue;
         bt_check_fault(k, "tow.waypoints",
                        "the leg from way-point %d leads %g deg from x, and a moving window goes along x; keep within "
                        "60 deg of that, or set domain.ends: periodic or open",
-                       i + 1, atan2(ly, lx) * 180 / BT_PI);
+                       i + 1, bt_atan2(ly, lx) * 180 / BT_PI);
         break;
     }
     // A vessel may be slower than its programme, and is not held to it.

@@ -5,6 +5,7 @@
 #include <stdio.h>
 
 #include "case/case_check.h"
+#include "base/elementary.h"
 
 static const double share_ahead = 0.6; // of the window, assumed
 static const double room = 4;          // floe sizes of ice ahead and behind, at least
@@ -41,14 +42,14 @@ static const char *find_fault(const bt_case *c, bool ahead_given, double x_min, 
                            "set domain.ends: periodic or open, or tow a body");
         return "domain.ends";
     }
-    if (fabs(cos(c->tow.direction)) < 0.5) {
+    if (fabs(bt_cos(c->tow.direction)) < 0.5) {
         snprintf(
             why, 256,
             "%g deg: a moving window goes along x; tow within 60 deg of that, or set domain.ends: periodic or open",
             c->tow.direction * 180 / BT_PI);
         return "tow.direction";
     }
-    if (sign * c->water.current_x > 0 && sign * c->water.current_x >= c->tow.speed * fabs(cos(c->tow.direction))) {
+    if (sign * c->water.current_x > 0 && sign * c->water.current_x >= c->tow.speed * fabs(bt_cos(c->tow.direction))) {
         snprintf(why, 256,
                  "%g m/s carries the ice along as fast as the tow, and a moving window takes in ice ahead only; "
                  "set domain.ends: periodic or open",
@@ -90,7 +91,7 @@ void bt_case_check_window(const bt_check *k, int n, const double *v)
     if (c->body.shape != BT_BODY_ABSENT && n == 0) return; // its outline was refused
     double x_min = 0, x_max = 0;
     for (int i = 0; i < n; i++) {
-        const double x = cos(c->body.yaw) * v[2 * i] - sin(c->body.yaw) * v[2 * i + 1];
+        const double x = bt_cos(c->body.yaw) * v[2 * i] - bt_sin(c->body.yaw) * v[2 * i + 1];
         x_min = bt_min(x_min, x);
         x_max = bt_max(x_max, x);
     }

@@ -10,6 +10,7 @@
 #include "bergtow/shape.h"
 #include "bergtow/stats.h"
 #include "case/case_check.h"
+#include "base/elementary.h"
 #include "base/largest.h"
 
 static const double BYTES_PER_FLOE = 2048, FIELD_BYTES_PER_FLOE = 200, BYTES_PER_STEP = 8 * BT_COST_COLUMNS,
@@ -33,7 +34,7 @@ static const double VORONOI_CORNERS = 5.6;
 double bt_cost_floe_step(double concentration)
 {
     const double x = bt_min(0.95, bt_max(0, concentration));
-    return x < 0.5 ? 0.5e-6 * pow(4, (x - 0.2) / 0.3) : 2e-6 * pow(7.5, (x - 0.5) / 0.3);
+    return x < 0.5 ? 0.5e-6 * bt_pow(4, (x - 0.2) / 0.3) : 2e-6 * bt_pow(7.5, (x - 0.5) / 0.3);
 }
 
 double bt_cost_seconds(const bt_case *c)

@@ -10,6 +10,7 @@
 #include <stdio.h>
 
 #include "bergtow/shape.h"
+#include "base/elementary.h"
 #include "base/largest.h"
 #include "case/schema.h"
 #include "case/value.h"
@@ -71,7 +72,7 @@ const char *bt_ice_floe_fault(const bt_ice_floe *f, char why[BT_ICE_WHY], bt_ice
                  m.area, l->length.hi);
         return why;
     }
-    if (!(hypot(m.cx, m.cy) <= 1e-6 * m.radius)) {
+    if (!(bt_hypot(m.cx, m.cy) <= 1e-6 * m.radius)) {
         snprintf(why, BT_ICE_WHY,
                  "the centroid of its vertices is at (%g, %g) m, not at the origin; subtract it from the vertices and "
                  "add it to the pose",

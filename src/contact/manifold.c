@@ -14,6 +14,7 @@
 #include <string.h>
 
 #include "contact/contacts.h"
+#include "base/elementary.h"
 
 typedef struct {
     const double *v;     ///< outline, relative to the centroid
@@ -278,7 +279,7 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
             double x[2], y[2];
             world_vertex(&pa, ca, x);
             world_vertex(&pb, cb, y);
-            double gap = hypot(y[0] - x[0], y[1] - x[1]);
+            double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
             if (gap > margin || gap == 0) return false;
             m->nx = (y[0] - x[0]) / gap;
             m->ny = (y[1] - x[1]) / gap;
@@ -346,7 +347,7 @@ static bool corner_counts(const part_of_body *q, int i, double nx, double ny)
     const double ax = o[2 * here] - o[2 * before], ay = o[2 * here + 1] - o[2 * before + 1];
     const double bx = o[2 * after] - o[2 * here], by = o[2 * after + 1] - o[2 * here + 1];
     if (ax * by - ay * bx <= 0) return false;
-    return nx * ax + ny * ay >= -CONE * hypot(ax, ay) && nx * bx + ny * by <= CONE * hypot(bx, by);
+    return nx * ax + ny * ay >= -CONE * bt_hypot(ax, ay) && nx * bx + ny * by <= CONE * bt_hypot(bx, by);
 }
 
 /// Vertex of q that reaches farthest against (nx, ny).
@@ -405,7 +406,7 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
         double x[2], y[2];
         world_vertex(&a->p, ca, x);
         world_vertex(&b->p, cb, y);
-        const double gap = hypot(y[0] - x[0], y[1] - x[1]);
+        const double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
         if (gap > margin || gap == 0) return false;
         m->nx = (y[0] - x[0]) / gap;
         m->ny = (y[1] - x[1]) / gap;

@@ -6,6 +6,7 @@
 
 #include "contact/overlap.h"
 #include "contact/work.h"
+#include "base/elementary.h"
 
 // Of the thickness: with less boundary inside each other the floes have no edge to speak of, one is under the other.
 #define LEAST_LENGTH 1e-3
@@ -84,7 +85,7 @@ bool bt_raft_contact(const bt_world *w, const bt_pair *p, const bt_memory *r, bt
     *edge = (bt_manifold){.a = p->a, .b = p->b};
     *sheets = (bt_manifold){.a = p->a, .b = p->b, .nx = 1};
     sheets->p[0] = (bt_point){.ra = {centroid[0], centroid[1]}, .rb = {centroid[0] - off[0], centroid[1] - off[1]}};
-    const double length = hypot(grad[0], grad[1]);
+    const double length = bt_hypot(grad[0], grad[1]);
     if (!(length > LEAST_LENGTH * thinner(&w->bodies, p->a, p->b))) return false;
     edge_of(grad, turn, length, (r->value[0] - r->value[1]) / length, centroid, off, edge);
     return true;
@@ -125,7 +126,7 @@ void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     }
     const double h = thinner(&w->bodies, m->a, m->b), q0 = line_load(w, m->a, m->b);
     double length[2];
-    if (at >= 0) length[0] = length[1] = hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]); // L/2
+    if (at >= 0) length[0] = length[1] = bt_hypot(m->p[1].ra[0] - m->p[0].ra[0], m->p[1].ra[1] - m->p[0].ra[1]); // L/2
     else lengths_of(m, w->par.slop, length);
     for (int i = 0; i < m->n_points; i++)
         bt_law_narrow(l, i, q0 * w->par.dt * bt_max(length[i], h / m->n_points), BT_LAW_RAFTING);

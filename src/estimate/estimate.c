@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/elementary.h"
 #include "base/name.h"
 #include "force/environment.h"
 #include "bergtow/shape.h"
@@ -13,7 +14,7 @@
 
 double bt_estimate_strength(const bt_estimate_input *in)
 {
-    return in->p_star * in->thickness * exp(-BT_EST_STRENGTH * (1 - in->concentration));
+    return in->p_star * in->thickness * bt_exp(-BT_EST_STRENGTH * (1 - in->concentration));
 }
 
 static bt_estimate just(double force, bool valid, const char *note)
@@ -74,8 +75,8 @@ static bt_estimate dilute(const bt_estimate_input *in)
 static double ships_of(const bt_estimate_input *in, double k, double b, double n)
 {
     const double froude = in->along / sqrt(GRAVITY * in->thickness * in->concentration);
-    return 0.5 * k * pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along *
-           pow(in->concentration, n);
+    return 0.5 * k * bt_pow(froude, b) * in->ice_density * in->width * in->thickness * in->along * in->along *
+           bt_pow(in->concentration, n);
 }
 
 static bt_estimate ships(const bt_estimate_input *in)
@@ -192,8 +193,8 @@ static double weighted_size(const bt_case *c)
                  s2 = c->ice.size_spread * c->ice.size_spread;
     if (c->ice.size_law == BT_SIZE_LOGNORMAL) return c->ice.size * (1 + s2) * (1 + s2);
     if (c->ice.size_law == BT_SIZE_SINGLE) return c->ice.size * (1 + 3 * s2) / (1 + s2);
-    const double top = fabs(a - 3) < 1e-9 ? log(hi / lo) : (pow(hi, 3 - a) - pow(lo, 3 - a)) / (3 - a);
-    const double bottom = fabs(a - 2) < 1e-9 ? log(hi / lo) : (pow(hi, 2 - a) - pow(lo, 2 - a)) / (2 - a);
+    const double top = fabs(a - 3) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 3 - a) - bt_pow(lo, 3 - a)) / (3 - a);
+    const double bottom = fabs(a - 2) < 1e-9 ? bt_log(hi / lo) : (bt_pow(hi, 2 - a) - bt_pow(lo, 2 - a)) / (2 - a);
     return top / bottom;
 }
 
@@ -222,18 +223,18 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
     if (!n) return;
-    const double ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     const double ahead = c->tow.direction - c->body.yaw;
-    in->width = bt_shape_width(n, v, cos(ahead), sin(ahead));
+    in->width = bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead));
     if (c->tow.mode == BT_TOW_NONE) return;
     double current[2]; // of a current that changes the mean over the run
     bt_environment_mean(c, true, current);
     const double rx = c->tow.speed * ux - current[0], ry = c->tow.speed * uy - current[1];
-    in->speed = hypot(rx, ry);
+    in->speed = bt_hypot(rx, ry);
     in->along = rx * ux + ry * uy;
-    const double flow = in->speed > 0 ? atan2(ry, rx) - c->body.yaw : ahead;
+    const double flow = in->speed > 0 ? bt_atan2(ry, rx) - c->body.yaw : ahead;
     in->drag =
-        0.5 * c->water.density * c->body.drag.water_form * c->body.draft * bt_shape_width(n, v, cos(flow), sin(flow)) +
+        0.5 * c->water.density * c->body.drag.water_form * c->body.draft * bt_shape_width(n, v, bt_cos(flow), bt_sin(flow)) +
         c->water.density * c->body.drag.water_skin * bt_shape_moments(n, v).area;
 }
 

@@ -6,6 +6,7 @@
 
 #include "bergtow/shape.h"
 #include "case/case_check.h"
+#include "base/elementary.h"
 
 static const double ALONG = 0.9; // least cosine between the tow and the axis of the domain it is taken to follow
 
@@ -23,7 +24,7 @@ bt_packing bt_packing_of(const bt_case *c, double concentration)
     bt_packing p = {.time = NAN, .way = NAN, .packed = c->estimate.phi_j};
     double v[2 * BT_MAX_VERTICES];
     const int n = bt_case_waterline(c, v);
-    const double ux = cos(c->tow.direction), uy = sin(c->tow.direction), yaw = c->body.yaw;
+    const double ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction), yaw = c->body.yaw;
     const bool x = fabs(ux) >= fabs(uy);
     const bool wall = (x ? c->domain.ends : c->domain.sides) == BT_BOUND_WALL;
     if (!n || !wall || !(concentration > 0) || c->tow.mode == BT_TOW_NONE || c->tow.n_waypoints > 0 ||
@@ -34,8 +35,8 @@ bt_packing bt_packing_of(const bt_case *c, double concentration)
     const double sign = (x ? ux : uy) > 0 ? 1 : -1, at = x ? c->body.x : c->body.y;
     double bow = -INFINITY;
     for (int i = 0; i < n; i++) {
-        const double wx = cos(yaw) * v[2 * i] - sin(yaw) * v[2 * i + 1],
-                     wy = sin(yaw) * v[2 * i] + cos(yaw) * v[2 * i + 1];
+        const double wx = bt_cos(yaw) * v[2 * i] - bt_sin(yaw) * v[2 * i + 1],
+                     wy = bt_sin(yaw) * v[2 * i] + bt_cos(yaw) * v[2 * i + 1];
         bow = bt_max(bow, sign * (at + (x ? wx : wy)));
     }
     const double low = x ? c->domain.x0 : c->domain.y0, length = x ? c->domain.length : c->domain.width,
@@ -43,7 +44,7 @@ bt_packing bt_packing_of(const bt_case *c, double concentration)
     const double ice_low = x ? c->ice.x_min : c->ice.y_min, ice_high = x ? c->ice.x_max : c->ice.y_max;
     const double L = (sign > 0 ? low + length : -low) - bow,
                  ice = bt_min(L, bt_max(0, (sign > 0 ? ice_high : -ice_low) - bow));
-    const double ahead = c->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, cos(ahead), sin(ahead)));
+    const double ahead = c->tow.direction - yaw, b = bt_min(W, bt_shape_width(n, v, bt_cos(ahead), bt_sin(ahead)));
     const double room = W * (p.packed * L - concentration * ice), taken = p.packed * W - concentration * (W - b);
     p.way = room <= 0 ? 0 : room / taken;
     if (!(p.way <= L)) return (bt_packing){NAN, NAN, p.packed}; // the body is there first

@@ -8,6 +8,7 @@
 
 #include "bergtow/shape.h"
 #include "field/field_make.h"
+#include "base/elementary.h"
 
 void bt_field_init(bt_field *f)
 {
@@ -50,7 +51,7 @@ void bt_field_add(bt_field *f, int nv, const double *v, double x, double y, doub
     double *own = f->vertices + 2 * at;
     memcpy(own, v, 2 * (size_t)nv * sizeof *own);
     bt_moments m = bt_shape_centre(nv, own);
-    double c = cos(yaw), s = sin(yaw);
+    double c = bt_cos(yaw), s = bt_sin(yaw);
     f->pose[3 * i] = x + c * m.cx - s * m.cy;
     f->pose[3 * i + 1] = y + s * m.cx + c * m.cy;
     f->pose[3 * i + 2] = yaw;

@@ -11,6 +11,7 @@
 #include "field/field_make.h"
 #include "case/ice_bounds.h"
 #include "field/map_crs.h"
+#include "base/elementary.h"
 
 void bt_refuse(bt_refusals *r, const char *fmt, ...)
 {
@@ -41,8 +42,8 @@ static bool smooth(int *n, double *v, bt_outline_counts *counts)
         double depth = INFINITY; // distance to the nearest edge of the hull
         for (int k = 0; k < m; k++) {
             const double *p = hull + 2 * k, *q = hull + 2 * ((k + 1) % m), ex = q[0] - p[0], ey = q[1] - p[1];
-            depth = bt_min(depth, (ex * (v[2 * i + 1] - p[1]) - ey * (v[2 * i] - p[0])) / hypot(ex, ey));
-            extent = bt_max(extent, hypot(hull[2 * k] - v[2 * i], hull[2 * k + 1] - v[2 * i + 1]));
+            depth = bt_min(depth, (ex * (v[2 * i + 1] - p[1]) - ey * (v[2 * i] - p[0])) / bt_hypot(ex, ey));
+            extent = bt_max(extent, bt_hypot(hull[2 * k] - v[2 * i], hull[2 * k + 1] - v[2 * i + 1]));
         }
         deepest = bt_max(deepest, depth);
     }
@@ -214,11 +215,11 @@ static void check_obstacles(const place *p, const bt_region *y)
     for (bt_idx i = 0; i < f->n; i++) {
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
         for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++)
-            radius = bt_max(radius, hypot(p->outline[2 * k], p->outline[2 * k + 1]));
+            radius = bt_max(radius, bt_hypot(p->outline[2 * k], p->outline[2 * k + 1]));
         bt_region_wrap(y, &x, &z);
         for (int o = 0; o < y->n_obstacles; o++) {
             const bt_obstacle *b = &y->obstacles[o];
-            if (hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
+            if (bt_hypot(b->x - x, b->y - z) >= radius + b->radius) continue;
             piece rel = {.n = b->n};
             for (int k = 0; k < b->n; k++) rel.v[2 * k] = b->v[2 * k] - b->x, rel.v[2 * k + 1] = b->v[2 * k + 1] - b->y;
             const double depth = depth_in(p, i, rel.n, rel.v, b->x - x, b->y - z);

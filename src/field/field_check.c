@@ -4,6 +4,7 @@
 #include <stdlib.h>
 
 #include "field/field_make.h"
+#include "base/elementary.h"
 
 typedef struct depth_search {
     const bt_field *f;
@@ -39,7 +40,7 @@ double bt_field_overlap(const bt_case *c, const bt_field *f)
         int n = (int)(f->offsets[i + 1] - f->offsets[i]);
         double x = f->pose[3 * i], z = f->pose[3 * i + 1], radius = 0;
         for (int k = 0; k < n; k++) {
-            radius = bt_max(radius, hypot(v[2 * k], v[2 * k + 1]));
+            radius = bt_max(radius, bt_hypot(v[2 * k], v[2 * k + 1]));
             if (c->domain.ends == BT_BOUND_WALL)
                 s.deepest = bt_max(s.deepest, bt_max(y.x0 - (x + v[2 * k]), x + v[2 * k] - y.x1));
             if (c->domain.sides == BT_BOUND_WALL)

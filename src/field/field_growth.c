@@ -12,12 +12,13 @@
 #include <string.h>
 
 #include "field/field_make.h"
+#include "base/elementary.h"
 
 double *bt_field_outlines(const bt_field *f)
 {
     double *out = bt_alloc(2 * (size_t)f->offsets[f->n], sizeof *out);
     for (bt_idx i = 0; i < f->n; i++) {
-        double c = cos(f->pose[3 * i + 2]), s = sin(f->pose[3 * i + 2]);
+        double c = bt_cos(f->pose[3 * i + 2]), s = bt_sin(f->pose[3 * i + 2]);
         for (int64_t k = f->offsets[i]; k < f->offsets[i + 1]; k++) {
             out[2 * k] = c * f->vertices[2 * k] - s * f->vertices[2 * k + 1];
             out[2 * k + 1] = s * f->vertices[2 * k] + c * f->vertices[2 * k + 1];
@@ -159,7 +160,7 @@ void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double
     for (bt_idx i = 0; i < f->n; i++) {
         const double *v = outline + 2 * f->offsets[i];
         int n = (int)(f->offsets[i + 1] - f->offsets[i]);
-        for (int k = 0; k < n; k++) radius[i] = bt_max(radius[i], hypot(v[2 * k], v[2 * k + 1]));
+        for (int k = 0; k < n; k++) radius[i] = bt_max(radius[i], bt_hypot(v[2 * k], v[2 * k + 1]));
         double x = f->pose[3 * i], z = f->pose[3 * i + 1];
         room[i] = room_within(y, x, z, n, v, limit);
         for (int o = 0; o < y->n_obstacles; o++) {

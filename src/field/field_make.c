@@ -12,6 +12,7 @@
 
 #include "field/field_make.h"
 #include "case/ice_bounds.h"
+#include "base/elementary.h"
 #include "base/largest.h"
 #include "base/rng.h"
 
@@ -161,7 +162,7 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
         bt_idx k = f->n;
         goal[k] = cells->target[i] * wanted / sum;
         bt_shape_regular(sides, goal[k], v);
-        double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, cos(yaw), sin(yaw));
+        double t = fit_into(cells->nv[i], cells->v[i], m.cx, m.cy, sides, v, bt_cos(yaw), bt_sin(yaw));
         bt_field_add(f, sides, v, m.cx, m.cy, yaw, 0);
         bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         bt_field_scale(f, k, bt_min(1, 0.999 * t));
@@ -229,12 +230,12 @@ static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, doubl
 double bt_field_thickness(const bt_case *c, bt_idx i)
 {
     // ln h ~ N(μ, σ) with the mean and standard deviation asked for
-    double h = c->ice.thickness, s2 = log1p(c->ice.thickness_spread * c->ice.thickness_spread);
+    double h = c->ice.thickness, s2 = bt_log1p(c->ice.thickness_spread * c->ice.thickness_spread);
     if (c->ice.thickness_law != BT_THICK_LOGNORMAL || s2 == 0) return h;
     bt_rng r = bt_rng_start(c->ice.seed, BT_RNG_THICKNESS, i);
     double least, most;
     bt_ice_thickness_range(&least, &most);
-    return bt_min(most, bt_max(least, h * exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2)));
+    return bt_min(most, bt_max(least, h * bt_exp(sqrt(s2) * bt_rng_normal(&r) - s2 / 2)));
 }
 
 static void set_thickness(const bt_case *c, bt_field *f)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where ice may lie: the ice region, its periodic directions, and the bodies that stand in it.
 #include "field/field_make.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@ static const double MOST_GROWTH = 20; // of a body by the clearance: beyond that
 
 static void place(int n, double *v, double x, double y, double yaw)
 {
-    double c = cos(yaw), s = sin(yaw);
+    double c = bt_cos(yaw), s = bt_sin(yaw);
     for (int i = 0; i < n; i++) {
         double px = v[2 * i], py = v[2 * i + 1];
         v[2 * i] = x + c * px - s * py;
@@ -150,7 +151,7 @@ void bt_region_wrap(const bt_region *y, double *px, double *py)
 static int cut_outside(int n, const double *v, int m, const double *o, int e, double *out)
 {
     const double *p = o + 2 * e, *q = o + 2 * ((e + 1) % m);
-    double nx = q[1] - p[1], ny = p[0] - q[0], l = hypot(nx, ny); // outward normal of an anticlockwise edge
+    double nx = q[1] - p[1], ny = p[0] - q[0], l = bt_hypot(nx, ny); // outward normal of an anticlockwise edge
     if (l == 0) return 0;
     return bt_shape_clip(n, v, -nx / l, -ny / l, -(nx * p[0] + ny * p[1]) / l, out);
 }
@@ -222,7 +223,7 @@ int bt_tessellation_clean(int n, double *v, double shortest)
         double least = INFINITY;
         for (int i = 0; i < n; i++) {
             int j = (i + 1) % n;
-            double l = hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
+            double l = bt_hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]);
             if (l < least) least = l, at = i;
         }
         if (least >= shortest && n <= BT_TESSELLATION_VERTICES) break;

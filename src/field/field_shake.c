@@ -16,6 +16,7 @@
 
 #include "bergtow/world.h"
 #include "field/field_make.h"
+#include "base/elementary.h"
 #include "base/rng.h"
 
 enum { FLIGHT_SWEEPS = 6, REST_SWEEPS = 60, REST_STEPS = 40, FEW = 4000 };
@@ -107,8 +108,8 @@ bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, doub
                             .x = f->pose[3 * i],
                             .y = f->pose[3 * i + 1],
                             .yaw = f->pose[3 * i + 2],
-                            .vx = speed * cos(heading),
-                            .vy = speed * sin(heading),
+                            .vx = speed * bt_cos(heading),
+                            .vy = speed * bt_sin(heading),
                             .yaw_rate = spin * speed * sqrt(m.area / m.polar / 2),
                             .mass = m.area,
                             .inertia = m.polar,

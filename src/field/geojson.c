@@ -29,6 +29,7 @@
 #include "bergtow/outline.h"
 #include "field/field_admit.h"
 #include "field/field_make.h"
+#include "base/elementary.h"
 #include "base/fileio.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
@@ -265,8 +266,8 @@ static const char *place(const reader *s, int n, double *v)
         double north, east, swapped_north, swapped_east;
         bt_outline_project(v[2 * i] * DEGREE, v[2 * i + 1] * DEGREE, s->lon0, s->lat0, &north, &east);
         bt_outline_project(v[2 * i + 1] * DEGREE, v[2 * i] * DEGREE, s->lon0, s->lat0, &swapped_north, &swapped_east);
-        if (!(hypot(north, east) <= FARTHEST)) {
-            if (fabs(v[2 * i]) <= 90 && hypot(swapped_north, swapped_east) <= FARTHEST)
+        if (!(bt_hypot(north, east) <= FARTHEST)) {
+            if (fabs(v[2 * i]) <= 90 && bt_hypot(swapped_north, swapped_east) <= FARTHEST)
                 return "it is more than 100 km from the origin, and near it with latitude and longitude swapped; write "
                        "[longitude, latitude]";
             return s->assumed ? "it is more than 100 km from the origin, where the projection of a small area no "
@@ -550,7 +551,7 @@ static void write_position(FILE *out, const map *m, double x, double y)
 static void write_floe(FILE *out, const map *m, bt_idx i)
 {
     const bt_field *f = m->f;
-    const double *p = f->pose + 3 * (size_t)i, c = cos(p[2]), s = sin(p[2]);
+    const double *p = f->pose + 3 * (size_t)i, c = bt_cos(p[2]), s = bt_sin(p[2]);
     const int64_t first = f->offsets[i], n = f->offsets[i + 1] - first;
     const bool mirrored = m->c->domain.frame == BT_FRAME_GEOGRAPHIC; // anticlockwise on the map [RFC 7946, 3.1.6]
     fprintf(out,

@@ -9,6 +9,7 @@
 
 #include "bergtow/shape.h"
 #include "field/field_make.h"
+#include "base/elementary.h"
 #include "base/largest.h"
 
 static const double SLIT = 1e-4;        // width of a cut / diameter of the largest piece, assumed
@@ -33,20 +34,20 @@ static strip make_strip(const bt_lead *l)
     strip s = {.l = l, .parts = bt_alloc(2 * (size_t)l->n, sizeof *s.parts)};
     const double half = 0.5 * l->width;
     for (int i = 0; i + 1 < l->n; i++) {
-        const double *p = l->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = hypot(dx, dy);
+        const double *p = l->path + 2 * i, *q = p + 2, dx = q[0] - p[0], dy = q[1] - p[1], length = bt_hypot(dx, dy);
         if (length > 0) {
             const double ax = 0.5 * dx, ay = 0.5 * dy, bx = -half * dy / length, by = half * dx / length;
             s.parts[s.n++] = (part){.n = 4,
                                     .v = {-ax - bx, -ay - by, ax - bx, ay - by, ax + bx, ay + by, bx - ax, by - ay},
                                     .x = p[0] + ax,
                                     .y = p[1] + ay,
-                                    .radius = hypot(0.5 * length, half)};
+                                    .radius = bt_hypot(0.5 * length, half)};
         }
         if (i == 0) continue;
         part *joint = &s.parts[s.n++];
         *joint = (part){.n = JOINT, .x = p[0], .y = p[1]};
         bt_shape_regular(JOINT, BT_PI * half * half, joint->v);
-        joint->radius = hypot(joint->v[0], joint->v[1]);
+        joint->radius = bt_hypot(joint->v[0], joint->v[1]);
     }
     return s;
 }
@@ -73,7 +74,7 @@ static bool overlaps(const strip *s, int n, const double *v, double radius, doub
         for (int i = i0; i <= i1; i++)
             for (int j = j0; j <= j1; j++) {
                 const double ox = dx - i * s->l->period_x, oy = dy - j * s->l->period_y;
-                if (hypot(ox, oy) < reach && bt_apart_of(n, v, p->n, p->v, ox, oy).gap < -touch) return true;
+                if (bt_hypot(ox, oy) < reach && bt_apart_of(n, v, p->n, p->v, ox, oy).gap < -touch) return true;
             }
     }
     return false;
@@ -91,8 +92,8 @@ static void long_axis(int n, const double *v, double axis[2])
         yy += a * (p[1] * p[1] + q[1] * q[1] + sy * sy);
         xy += a * (p[0] * p[1] + q[0] * q[1] + sx * sy);
     }
-    const double angle = 0.5 * atan2(2 * xy, xx - yy);
-    axis[0] = cos(angle), axis[1] = sin(angle);
+    const double angle = 0.5 * bt_atan2(2 * xy, xx - yy);
+    axis[0] = bt_cos(angle), axis[1] = bt_sin(angle);
 }
 
 /// Drop vertices at short edges: what stays is convex and lies within.
@@ -101,7 +102,7 @@ static int drop_short_edges(int n, double *v)
     const double shortest = SHORT_EDGE * sqrt(bt_shape_moments(n, v).area);
     for (int i = 0; i < n && n > 3;) {
         const int j = i + 1 < n ? i + 1 : 0;
-        if (hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]) >= shortest) {
+        if (bt_hypot(v[2 * j] - v[2 * i], v[2 * j + 1] - v[2 * i + 1]) >= shortest) {
             i++;
             continue;
         }
@@ -152,8 +153,8 @@ static void cut_floe(const strip *s, const bt_field *f, bt_idx i, bt_field *out)
                    .largest = BT_PI / 4 * size * size,
                    .x = pose[0],
                    .y = pose[1],
-                   .c = cos(pose[2]),
-                   .sine = sin(pose[2]),
+                   .c = bt_cos(pose[2]),
+                   .sine = bt_sin(pose[2]),
                    .yaw = pose[2],
                    .thickness = f->thickness[i],
                    .out = out};
@@ -205,7 +206,7 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
                           .concentration_before = f->concentration,
                           .concentration_after = f->concentration};
     for (int i = 0; i + 1 < l->n; i++)
-        st->length += hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
+        st->length += bt_hypot(l->path[2 * i + 2] - l->path[2 * i], l->path[2 * i + 3] - l->path[2 * i + 1]);
     if (l->mode == BT_LEAD_NONE || f->n == 0) return BT_OK;
     strip s = make_strip(l);
     uint8_t *taken = bt_alloc((size_t)f->n, sizeof *taken);
@@ -250,13 +251,13 @@ bt_status bt_lead_cut(const bt_lead *l, bt_field *f, bt_lead_stats *st, bt_error
 /// Returns the number of points.
 static int planned_path(const bt_case *c, double *path)
 {
-    double left = c->lead.length, ux = cos(c->tow.direction), uy = sin(c->tow.direction);
+    double left = c->lead.length, ux = bt_cos(c->tow.direction), uy = bt_sin(c->tow.direction);
     int n = 1;
     path[0] = c->body.x;
     path[1] = c->body.y;
     for (int k = 0; k < c->tow.n_waypoints && left > 0; k++) {
         const double dx = c->tow.waypoints[2 * k] - path[2 * n - 2], dy = c->tow.waypoints[2 * k + 1] - path[2 * n - 1],
-                     far = hypot(dx, dy);
+                     far = bt_hypot(dx, dy);
         if (far == 0) continue;
         ux = dx / far, uy = dy / far;
         const double leg = bt_min(far, left);

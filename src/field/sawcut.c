@@ -12,6 +12,7 @@
 #include <string.h>
 
 #include "field/field_make.h"
+#include "base/elementary.h"
 #include "base/rng.h"
 
 static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order of dealing
@@ -113,7 +114,7 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     piece *p = bt_alloc((size_t)n, sizeof *p), *strip = bt_alloc((size_t)n, sizeof *strip);
     for (bt_idx i = 0; i < n; i++) {
         bt_rng r = bt_rng_start(seed, BT_RNG_CUT, i);
-        p[i] = (piece){log(target[i]) / 2 + DEAL_NOISE * bt_rng_normal(&r), target[i], i};
+        p[i] = (piece){bt_log(target[i]) / 2 + DEAL_NOISE * bt_rng_normal(&r), target[i], i};
         wanted += target[i];
     }
     qsort(p, (size_t)n, sizeof *p, by_key);
@@ -123,9 +124,9 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
     bt_idx *first = bt_alloc((size_t)n + 1, sizeof *first);
     double best = INFINITY, chosen = aspect;
     for (int k = -20; k <= 20; k++) {
-        double trial = aspect * exp(0.01 * k), last;
+        double trial = aspect * bt_exp(0.01 * k), last;
         assign(n, p, share / lx, trial, lx, first, &last);
-        double cost = fabs(0.01 * k) + fabs(log(last));
+        double cost = fabs(0.01 * k) + fabs(bt_log(last));
         if (cost < best) best = cost, chosen = trial;
     }
     double last;

@@ -11,26 +11,27 @@
 
 #include <math.h>
 
+#include "base/elementary.h"
 #include "base/rng.h"
 
-static double normal_cdf(double x) { return 0.5 * erfc(-x / sqrt(2)); }
+static double normal_cdf(double x) { return 0.5 * bt_erfc(-x / sqrt(2)); }
 
 // E[d^k; low < d < high] / P(low < d < high) of the lognormal law: completing the square shifts the limits by kσ.
 static double lognormal_moment(const bt_sizes *s, double mu, int k)
 {
-    double a = s->min > 0 ? (log(s->min) - mu) / s->sigma : -INFINITY;
-    double b = s->max > 0 ? (log(s->max) - mu) / s->sigma : INFINITY;
+    double a = s->min > 0 ? (bt_log(s->min) - mu) / s->sigma : -INFINITY;
+    double b = s->max > 0 ? (bt_log(s->max) - mu) / s->sigma : INFINITY;
     double whole = normal_cdf(b) - normal_cdf(a);
     double part = normal_cdf(b - k * s->sigma) - normal_cdf(a - k * s->sigma);
-    return exp(k * mu + 0.5 * k * k * s->sigma * s->sigma) * part / whole;
+    return bt_exp(k * mu + 0.5 * k * k * s->sigma * s->sigma) * part / whole;
 }
 
 // E[d^k] of the truncated power law: ∫ d^k a d^(−a−1) dd / (m^−a − M^−a).
 static double power_moment(const bt_sizes *s, int k)
 {
     double m = s->min, q = s->max / s->min, a = s->exponent, e = k - a;
-    double top = fabs(e) < 1e-9 ? log(q) : (pow(q, e) - 1) / e;
-    return pow(m, k) * a * top / (1 - pow(q, -a));
+    double top = fabs(e) < 1e-9 ? bt_log(q) : (bt_pow(q, e) - 1) / e;
+    return bt_pow(m, k) * a * top / (1 - bt_pow(q, -a));
 }
 
 bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
@@ -54,8 +55,8 @@ bt_status bt_sizes_init(bt_sizes *s, const bt_case *c, bt_errors *err)
         return BT_ERR_CASE;
     }
     if (s->law != BT_SIZE_LOGNORMAL || s->spread == 0) return BT_OK;
-    s->sigma = sqrt(log1p(s->spread * s->spread));
-    s->mu = log(s->mean) - s->sigma * s->sigma / 2;
+    s->sigma = sqrt(bt_log1p(s->spread * s->spread));
+    s->mu = bt_log(s->mean) - s->sigma * s->sigma / 2;
     if (s->min <= 0 && s->max <= 0) return BT_OK;
     if ((s->min > 0 && s->mean <= s->min) || (s->max > 0 && s->mean >= s->max)) {
         bt_errors_add(
@@ -84,14 +85,14 @@ double bt_sizes_draw(const bt_sizes *s, int64_t seed, int64_t id)
     bt_rng r = bt_rng_start(seed, BT_RNG_SIZE, id);
     if (s->law == BT_SIZE_POWER) {
         // inverse of P(>d) = u
-        double q = pow(s->max / s->min, -s->exponent), u = 1 - bt_rng_uniform(&r);
-        return s->min * pow(q + u * (1 - q), -1 / s->exponent);
+        double q = bt_pow(s->max / s->min, -s->exponent), u = 1 - bt_rng_uniform(&r);
+        return s->min * bt_pow(q + u * (1 - q), -1 / s->exponent);
     }
     if (s->spread == 0) return s->mean;
     for (;;) {
         double d;
         if (s->law == BT_SIZE_LOGNORMAL) {
-            d = exp(s->mu + s->sigma * bt_rng_normal(&r));
+            d = bt_exp(s->mu + s->sigma * bt_rng_normal(&r));
             if (d >= s->min && (s->max <= 0 || d <= s->max)) return d;
         } else {
             double k = 1 / (s->spread * s->spread);

@@ -19,6 +19,7 @@
 #include <string.h>
 
 #include "field/field_make.h"
+#include "base/elementary.h"
 #include "base/rng.h"
 
 enum {
@@ -222,19 +223,19 @@ static double crowding(const bt_region *yard, const discs *dd, const double *p, 
     if (!yard->periodic_y) worst = bt_max(worst, 1 - bt_min(y - yard->y0, yard->y1 - y) / (SPACING * r));
     for (int k = 0; k < yard->n_obstacles; k++) {
         const bt_obstacle *o = &yard->obstacles[k];
-        if (hypot(x - o->x, y - o->y) > o->radius + r) continue;
+        if (bt_hypot(x - o->x, y - o->y) > o->radius + r) continue;
         double out = -INFINITY; // distance to the obstacle, from below
         for (int e = 0; e < o->n; e++) {
             const double *a = o->v + 2 * e, *b = o->v + 2 * ((e + 1) % o->n);
             double ex = b[0] - a[0], ey = b[1] - a[1];
-            out = bt_max(out, (ey * (x - a[0]) - ex * (y - a[1])) / hypot(ex, ey));
+            out = bt_max(out, (ey * (x - a[0]) - ex * (y - a[1])) / bt_hypot(ex, ey));
         }
         worst = bt_max(worst, 1 - out / (SPACING * r));
     }
     for (bin_walk w = walk_bins(yard, dd, x, y, SPACING * r); next_bin(&w);)
         for (int32_t k = dd->head[w.bin]; k >= 0; k = dd->node[k].next) {
             bt_idx j = dd->node[k].i;
-            double d = hypot(p[2 * j] + w.sx - x, p[2 * j + 1] + w.sy - y);
+            double d = bt_hypot(p[2 * j] + w.sx - x, p[2 * j + 1] + w.sy - y);
             worst = bt_max(worst, 1 - d / (SPACING * (r + radius[j])));
         }
     return worst;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "force/load.h"
+#include "base/elementary.h"
 
 /// Force on a body at velocity u, N; its derivative; the sum of the magnitudes of its parts.
 typedef struct {
@@ -29,7 +30,7 @@ static void extent_across(const bt_bodies *b, bt_idx i, const double v[2], doubl
 /// skin |v| v + form |v × D| v, v = ref − u.
 static void add_stream(const bt_bodies *b, bt_idx i, const bt_stream *in, const double u[2], balance *a)
 {
-    const double skin = in->skin, form = in->form, v[2] = {in->u - u[0], in->v - u[1]}, s = hypot(v[0], v[1]);
+    const double skin = in->skin, form = in->form, v[2] = {in->u - u[0], in->v - u[1]}, s = bt_hypot(v[0], v[1]);
     if (s == 0) return;
     double d[2];
     extent_across(b, i, v, d);
@@ -52,7 +53,7 @@ static void add_rest(const bt_load *l, const double u[2], balance *a)
         a->f[r] += f[r];
         a->df[r][r] -= l->g;
     }
-    a->scale += hypot(l->fx, l->fy) + hypot(l->jx, l->jy) + l->g * hypot(u[0], u[1]);
+    a->scale += bt_hypot(l->fx, l->fy) + bt_hypot(l->jx, l->jy) + l->g * bt_hypot(u[0], u[1]);
 }
 
 static balance balance_at(const bt_world *w, bt_idx i, const double u[2])
@@ -69,7 +70,7 @@ static balance balance_at(const bt_world *w, bt_idx i, const double u[2])
         .f = {rate * ((r.c - 1) * x - r.s * y + l.gain_x), rate * (r.s * x + (r.c - 1) * y + l.gain_y)},
         .df = {{rate * (r.c - 1), -rate * r.s}, {rate * r.s, rate * (r.c - 1)}},
     };
-    a.scale = rate * (fabs(r.s) * hypot(x, y) + hypot(l.gain_x, l.gain_y));
+    a.scale = rate * (fabs(r.s) * bt_hypot(x, y) + bt_hypot(l.gain_x, l.gain_y));
     for (int k = 0; k < l.n_streams; k++) add_stream(b, i, &l.stream[k], u, &a);
     add_rest(&l, u, &a);
     return a;
@@ -100,12 +101,12 @@ bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u
     u[1] = hold[1] || !drifts ? 0 : w->par.water_v;
     if (!drifts) return true;
     balance a = held_balance(w, i, hold, u);
-    double force = hypot(a.f[0], a.f[1]);
+    double force = bt_hypot(a.f[0], a.f[1]);
     if (force == 0) return true;
     const double first = drag > 0 ? sqrt(force / drag) / force : 1 / l.g;
     for (int k = 0; k < 2; k++) u[k] += first * a.f[k];
     a = held_balance(w, i, hold, u);
-    force = hypot(a.f[0], a.f[1]);
+    force = bt_hypot(a.f[0], a.f[1]);
     for (int step = 0; step < MAX_STEPS && force > 0; step++) {
         const double det = a.df[0][0] * a.df[1][1] - a.df[0][1] * a.df[1][0];
         const double by[2] = {-(a.df[1][1] * a.f[0] - a.df[0][1] * a.f[1]) / det,
@@ -116,7 +117,7 @@ bool bt_drift_velocity(const bt_world *w, bt_idx i, const bool hold[2], double u
         for (int k = 0; k < MAX_HALVINGS && !(next < force); k++, share *= 0.5) {
             to[0] = u[0] + share * by[0], to[1] = u[1] + share * by[1];
             there = held_balance(w, i, hold, to);
-            next = hypot(there.f[0], there.f[1]);
+            next = bt_hypot(there.f[0], there.f[1]);
         }
         if (!(next < force)) break; // rounding, or no descent
         memcpy(u, to, sizeof to);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "space/cells.h"
+#include "base/elementary.h"
 #include "base/table.h"
 
 /// One of the two fluids.
@@ -25,7 +26,7 @@ struct bt_environment {
 static flow flow_of(const bt_case *c, bool water)
 {
     if (!water) return (flow){.u = c->air.wind_x, .v = c->air.wind_y, .table = c->air.table};
-    const double x = cos(c->water.tide.inclination), y = sin(c->water.tide.inclination);
+    const double x = bt_cos(c->water.tide.inclination), y = bt_sin(c->water.tide.inclination);
     return (flow){
         .u = c->water.current_x,
         .v = c->water.current_y,
@@ -48,7 +49,7 @@ static void velocity(const flow *f, double t, double v[2])
         bt_table_at(&f->table, t, v);
         return;
     }
-    const double angle = f->turn * t - f->lag, c = cos(angle), s = sin(angle);
+    const double angle = f->turn * t - f->lag, c = bt_cos(angle), s = bt_sin(angle);
     v[0] = f->u + f->e1[0] * c + f->e2[0] * s;
     v[1] = f->v + f->e1[1] * c + f->e2[1] * s;
 }

@@ -7,6 +7,7 @@
 #include "force/laws.h"
 #include "force/load.h"
 #include "space/cells.h"
+#include "base/elementary.h"
 
 /// All laws of a body: those of the list inline, those that a program has added through the table.
 static inline void load_of(const bt_forces *f, bool added, bt_force_body *b, bt_load *l)
@@ -95,7 +96,7 @@ bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b)
     bt_load_fill(w->forces, 0, b, &l);
     bt_linear a = bt_load_linear(&l, u.w);
     for (int k = 0; k < l.n_streams; k++)
-        bt_linear_add_skin(&a, &l.stream[k], hypot(l.stream[k].u - u.x, l.stream[k].v - u.y));
+        bt_linear_add_skin(&a, &l.stream[k], bt_hypot(l.stream[k].u - u.x, l.stream[k].v - u.y));
     bt_turning r = BT_TURNING_NONE;
     bt_turning_set(&r, b->share * l.turn * dt);
     bt_load_turn(&l, &r, dt, m, b->inertia, &u);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "bergtow/forces.h"
+#include "base/elementary.h"
 
 /// Middle of the step at hand, s.
 static inline double bt_load_time(const bt_world *w) { return ((double)w->step + 0.5) * w->par.dt; }
@@ -63,7 +64,9 @@ typedef struct bt_turning {
 
 static inline void bt_turning_set(bt_turning *r, double angle)
 {
-    if (r->angle != angle) *r = (bt_turning){angle, cos(angle), sin(angle)};
+    if (r->angle == angle) return;
+    r->angle = angle;
+    bt_sincos(angle, &r->s, &r->c);
 }
 
 /// U' = U_b + R (U − U_b) + gain + Δt F/M.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Simple polygons: cleaning, faults, convex parts, projection.
 #include "bergtow/outline.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -21,7 +22,7 @@ static double extent_of(int n, const double *v)
         x0 = bt_min(x0, v[2 * i]), x1 = bt_max(x1, v[2 * i]);
         y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
     }
-    return n > 0 ? hypot(x1 - x0, y1 - y0) : 0;
+    return n > 0 ? bt_hypot(x1 - x0, y1 - y0) : 0;
 }
 
 /// Is q between p and r on a straight line, or on one of them? A spike, where the line turns back, is not: it is a
@@ -29,8 +30,8 @@ static double extent_of(int n, const double *v)
 static bool idle(const double *p, const double *q, const double *r, double tiny)
 {
     const double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
-    if (hypot(ax, ay) <= tiny) return true;
-    const double cx = r[0] - p[0], cy = r[1] - p[1], l = hypot(cx, cy);
+    if (bt_hypot(ax, ay) <= tiny) return true;
+    const double cx = r[0] - p[0], cy = r[1] - p[1], l = bt_hypot(cx, cy);
     return l > 0 && ax * bx + ay * by > 0 && fabs(ax * cy - ay * cx) <= tiny * l;
 }
 
@@ -88,7 +89,7 @@ bool bt_outline_crosses(int n, const double *v)
                 const double *p = j == i + 1 ? a : b, *q = j == i + 1 ? b : a, *r = j == i + 1 ? d : c;
                 const bool back = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]) > 0;
                 if (back &&
-                    fabs(cross(q, p, r)) <= NEAR * hypot(p[0] - q[0], p[1] - q[1]) * hypot(r[0] - q[0], r[1] - q[1]))
+                    fabs(cross(q, p, r)) <= NEAR * bt_hypot(p[0] - q[0], p[1] - q[1]) * bt_hypot(r[0] - q[0], r[1] - q[1]))
                     return true;
                 continue;
             }
@@ -108,7 +109,7 @@ const char *bt_outline_fault(int n, const double *v)
     if (!(extent > 0) || !isfinite(extent * extent)) return "its vertices coincide or are out of range";
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        if (hypot(q[0] - p[0], q[1] - p[1]) <= NEAR * extent) return "two neighbouring vertices coincide";
+        if (bt_hypot(q[0] - p[0], q[1] - p[1]) <= NEAR * extent) return "two neighbouring vertices coincide";
     }
     if (bt_outline_crosses(n, v)) return "its edges cross or touch each other";
     if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
@@ -123,7 +124,7 @@ bool bt_outline_convex(int n, const double *v) { return bt_shape_fault(n, v) == 
 /// Is the corner a → b → c convex, by more than rounding?
 static bool left_turn(const double *a, const double *b, const double *c)
 {
-    return cross(a, b, c) > NEAR * hypot(b[0] - a[0], b[1] - a[1]) * hypot(c[0] - b[0], c[1] - b[1]);
+    return cross(a, b, c) > NEAR * bt_hypot(b[0] - a[0], b[1] - a[1]) * bt_hypot(c[0] - b[0], c[1] - b[1]);
 }
 
 /// Shape of an ear a, b, c: twice the area over the square of the longest side; −1 when it is none.
@@ -138,8 +139,8 @@ static double ear_quality(int m, const int *loop, int i, const double *v)
         const double *p = v + 2 * loop[k];
         if (cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0) return -1;
     }
-    const double ab = hypot(b[0] - a[0], b[1] - a[1]), bc = hypot(c[0] - b[0], c[1] - b[1]),
-                 ca = hypot(a[0] - c[0], a[1] - c[1]);
+    const double ab = bt_hypot(b[0] - a[0], b[1] - a[1]), bc = bt_hypot(c[0] - b[0], c[1] - b[1]),
+                 ca = bt_hypot(a[0] - c[0], a[1] - c[1]);
     const double longest = bt_max(ab, bt_max(bc, ca));
     return area2 / (longest * longest);
 }
@@ -223,9 +224,9 @@ bool bt_outline_split(int n, const double *v, bt_parts *p)
 /// Place on the ellipsoid, from the centre of the earth, m.
 static void on_ellipsoid(double lon, double lat, double p[3])
 {
-    const double s = sin(lat), normal = WGS84_A / sqrt(1 - WGS84_E2 * s * s);
-    p[0] = normal * cos(lat) * cos(lon);
-    p[1] = normal * cos(lat) * sin(lon);
+    const double s = bt_sin(lat), normal = WGS84_A / sqrt(1 - WGS84_E2 * s * s);
+    p[0] = normal * bt_cos(lat) * bt_cos(lon);
+    p[1] = normal * bt_cos(lat) * bt_sin(lon);
     p[2] = normal * (1 - WGS84_E2) * s;
 }
 
@@ -235,11 +236,11 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
     on_ellipsoid(lon, lat, p);
     on_ellipsoid(lon0, lat0, o);
     const double dx = p[0] - o[0], dy = p[1] - o[1], dz = p[2] - o[2];
-    const double e = cos(lon0) * dy - sin(lon0) * dx,
-                 n = cos(lat0) * dz - sin(lat0) * (cos(lon0) * dx + sin(lon0) * dy);
+    const double e = bt_cos(lon0) * dy - bt_sin(lon0) * dx,
+                 n = bt_cos(lat0) * dz - bt_sin(lat0) * (bt_cos(lon0) * dx + bt_sin(lon0) * dy);
     // √(M N), mean curvature there
-    const double s = sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s);
-    const double level = hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
+    const double s = bt_sin(lat0), radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * s * s);
+    const double level = bt_hypot(e, n), chord = sqrt(dx * dx + dy * dy + dz * dz);
     const double stretch = level > 0 ? chord * (1 + chord * chord / (24 * radius * radius)) / level : 0;
     *east = e * stretch;
     *north = n * stretch;
@@ -252,8 +253,8 @@ void bt_outline_unproject(double north, double east, double lon0, double lat0, d
 {
     double o[3];
     on_ellipsoid(lon0, lat0, o);
-    const double sl = sin(lon0), cl = cos(lon0), sp = sin(lat0), cp = cos(lat0);
-    const double radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * sp * sp), distance = hypot(north, east);
+    const double sl = bt_sin(lon0), cl = bt_cos(lon0), sp = bt_sin(lat0), cp = bt_cos(lat0);
+    const double radius = WGS84_A * sqrt(1 - WGS84_E2) / (1 - WGS84_E2 * sp * sp), distance = bt_hypot(north, east);
     double chord = distance;
     for (int k = 0; k < 8; k++) {
         const double q = chord * chord / (24 * radius * radius);
@@ -275,6 +276,6 @@ void bt_outline_unproject(double north, double east, double lon0, double lat0, d
         }
         up -= f / slope;
     }
-    *lon = atan2(p[1], p[0]);
-    *lat = atan2(p[2], (1 - WGS84_E2) * hypot(p[0], p[1]));
+    *lon = bt_atan2(p[1], p[0]);
+    *lat = bt_atan2(p[2], (1 - WGS84_E2) * bt_hypot(p[0], p[1]));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Legs and arcs of a path; see geometry/path.h.
 #include "geometry/path.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -19,7 +20,7 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
                    .n_marks = n};
     double tx = 1, ty = 0, used = 0; // of the leg at hand: tangent, and what the corner behind has taken of it
     for (int k = 0; k < n; k++) {
-        const double px = points[2 * k], py = points[2 * k + 1], far = hypot(px - x, py - y);
+        const double px = points[2 * k], py = points[2 * k + 1], far = bt_hypot(px - x, py - y);
         if (!(far > 0)) {
             snprintf(why, 200, "way-point %d is where the one before it (or the start) is; remove one of them", k + 1);
             bt_path_free(p);
@@ -28,11 +29,11 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
         tx = (px - x) / far, ty = (py - y) / far;
         double cut = 0, angle = 0, ox = tx, oy = ty;
         if (k + 1 < n) {
-            const double nx = points[2 * k + 2] - px, ny = points[2 * k + 3] - py, next = hypot(nx, ny);
+            const double nx = points[2 * k + 2] - px, ny = points[2 * k + 3] - py, next = bt_hypot(nx, ny);
             if (next > 0) ox = nx / next, oy = ny / next;
-            angle = atan2(tx * oy - ty * ox, tx * ox + ty * oy);
+            angle = bt_atan2(tx * oy - ty * ox, tx * ox + ty * oy);
             // Not tan of half an angle of 180°, which is large but finite.
-            if (radius > 0 && angle != 0) cut = fabs(angle) < BT_PI - 1e-6 ? radius * tan(0.5 * fabs(angle)) : INFINITY;
+            if (radius > 0 && angle != 0) cut = fabs(angle) < BT_PI - 1e-6 ? radius * bt_tan(0.5 * fabs(angle)) : INFINITY;
         }
         if (used + cut > far) {
             snprintf(why, 200,
@@ -69,7 +70,7 @@ void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2])
     const double s = way - l->way;
     double along = s, aside = 0, c = 1, d = 0;
     if (l->turn != 0) {
-        c = cos(s * l->turn), d = sin(s * l->turn);
+        c = bt_cos(s * l->turn), d = bt_sin(s * l->turn);
         along = d / l->turn, aside = (1 - c) / l->turn;
     }
     at[0] = l->x + along * l->tx - aside * l->ty;

@@ -14,6 +14,7 @@
 //     ∫ r³ dA = (h/5) ∫ (h² + s²)^{3/2} ds = (h/5) [ s (2 s² + 5 h²) R / 8 + (3/8) h⁴ asinh(s/|h|) ]   from s_p to s_q.
 // The antiderivative is checked by differentiation. As h → 0 the bracket stays bounded (h⁴ asinh(s/h) → 0).
 #include "bergtow/shape.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -25,8 +26,8 @@ static double cross(double ax, double ay, double bx, double by) { return ax * by
 static double cubic_antiderivative(double h, double s)
 {
     if (h == 0) return 0;
-    double r = hypot(h, s), h2 = h * h;
-    return h / 5 * (s * (2 * s * s + 5 * h2) * r / 8 + 0.375 * h2 * h2 * asinh(s / fabs(h)));
+    double r = bt_hypot(h, s), h2 = h * h;
+    return h / 5 * (s * (2 * s * s + 5 * h2) * r / 8 + 0.375 * h2 * h2 * bt_asinh(s / fabs(h)));
 }
 
 static bt_moments moments(int n, const double *v, bool cubic)
@@ -53,8 +54,8 @@ static bt_moments moments(int n, const double *v, bool cubic)
     for (int i = 0; i < n; i++) {
         int j = i + 1 < n ? i + 1 : 0;
         double px = v[2 * i] - m.cx, py = v[2 * i + 1] - m.cy, qx = v[2 * j] - m.cx, qy = v[2 * j + 1] - m.cy;
-        m.radius = bt_max(m.radius, hypot(px, py));
-        double ex = qx - px, ey = qy - py, l = hypot(ex, ey);
+        m.radius = bt_max(m.radius, bt_hypot(px, py));
+        double ex = qx - px, ey = qy - py, l = bt_hypot(ex, ey);
         if (l == 0) continue;
         double c = cross(px, py, qx, qy), h = c / l;
         m.polar += c * (px * px + py * py + px * qx + py * qy + qx * qx + qy * qy) / 12;
@@ -82,12 +83,12 @@ static const char *fault_of(int n, const double *v, double near, double angle)
         y0 = bt_min(y0, v[2 * i + 1]), y1 = bt_max(y1, v[2 * i + 1]);
     }
     // Lengths relative to the extent: 1e-9 of it is a tenth of a micron on a 100 m floe.
-    double extent = hypot(x1 - x0, y1 - y0);
+    double extent = bt_hypot(x1 - x0, y1 - y0);
     if (!(extent > 0) || !isfinite(extent * extent)) return "its vertices coincide or are out of range";
     double area2 = 0, turned = 0;
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n);
-        if (hypot(q[0] - p[0], q[1] - p[1]) <= near * extent) return "two neighbouring vertices coincide";
+        if (bt_hypot(q[0] - p[0], q[1] - p[1]) <= near * extent) return "two neighbouring vertices coincide";
         area2 += cross(p[0] - v[0], p[1] - v[1], q[0] - v[0], q[1] - v[1]);
     }
     if (fabs(area2) <= 1e-12 * extent * extent) return "its area is zero";
@@ -96,7 +97,7 @@ static const char *fault_of(int n, const double *v, double near, double angle)
     for (int i = 0; i < n; i++) {
         const double *p = v + 2 * i, *q = v + 2 * ((i + 1) % n), *r = v + 2 * ((i + 2) % n);
         double ax = q[0] - p[0], ay = q[1] - p[1], bx = r[0] - q[0], by = r[1] - q[1];
-        double turn = atan2(cross(ax, ay, bx, by), ax * bx + ay * by);
+        double turn = bt_atan2(cross(ax, ay, bx, by), ax * bx + ay * by);
         // Collinear vertices are allowed, to round-off; a half turn is a spike.
         if (turn < -angle || turn > BT_PI - 1e-9) reflex = true;
         turned += turn;
@@ -135,10 +136,10 @@ double bt_shape_width(int n, const double *v, double ux, double uy)
 
 void bt_shape_regular(int n, double area, double *v)
 {
-    double r = sqrt(2 * area / (n * sin(2 * BT_PI / n)));
+    double r = sqrt(2 * area / (n * bt_sin(2 * BT_PI / n)));
     for (int i = 0; i < n; i++) {
-        v[2 * i] = r * cos(2 * BT_PI * i / n);
-        v[2 * i + 1] = r * sin(2 * BT_PI * i / n);
+        v[2 * i] = r * bt_cos(2 * BT_PI * i / n);
+        v[2 * i + 1] = r * bt_sin(2 * BT_PI * i / n);
     }
 }
 

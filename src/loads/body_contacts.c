@@ -9,6 +9,7 @@
 #include "partition/domain.h"
 #include "solve/kernel.h"
 #include "space/phases.h"
+#include "base/elementary.h"
 
 enum { TOUCH_WIDTH = sizeof(bt_body_contact) / sizeof(double) };
 _Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a touch is a row of doubles");
@@ -27,7 +28,7 @@ static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
     if (v > n) return NAN;
     const double *at = o + 2 * v, *before = o + 2 * (v ? v - 1 : n - 1), *after = o + 2 * (v + 1 < n ? v + 1 : 0);
     const double px = at[0] - before[0], py = at[1] - before[1], qx = after[0] - at[0], qy = after[1] - at[1];
-    return BT_PI - atan2(px * qy - py * qx, px * qx + py * qy);
+    return BT_PI - bt_atan2(px * qy - py * qx, px * qx + py * qy);
 }
 
 /// Interior angle of the corner that makes a contact point: features as manifold.c numbers them. Of two corners that

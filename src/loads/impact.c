@@ -9,6 +9,7 @@
 
 #include "partition/domain.h"
 #include "loads/body_contacts.h"
+#include "base/elementary.h"
 
 #define TURNED                                                                                                         \
     1.25 // a floe that turns may close the rest of its gap somewhat faster than the last step left it, assumed
@@ -49,7 +50,7 @@ void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
 {
     if (!r->real_corner || !(e->corner > 0 && e->corner < BT_PI)) e->corner = r->corner_angle;
     if (r->conversion == BT_IMPACT_CRUSHING) {
-        const double k = 2 * r->pressure * e->thickness * tan(0.5 * e->corner);
+        const double k = 2 * r->pressure * e->thickness * bt_tan(0.5 * e->corner);
         e->peak = bt_min(e->approach, e->impulse / e->mass) * sqrt(k * e->mass);
         e->mean = 2 / BT_PI * e->peak;
         e->duration = 0.5 * BT_PI * sqrt(e->mass / k);

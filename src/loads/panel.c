@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Where a point lies on the waterline, and sums of load by panel; see loads/panel.h.
 #include "loads/panel.h"
+#include "base/elementary.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -49,7 +50,7 @@ void bt_panels_init(bt_panels *p, int n, int n_vertices, const double *outline)
     p->arc = bt_alloc((size_t)n_vertices + 1, sizeof *p->arc);
     for (int i = 0; i < n_vertices; i++) {
         const double *a = vertex(p, i), *b = vertex(p, i + 1);
-        p->arc[i + 1] = p->arc[i] + hypot(b[0] - a[0], b[1] - a[1]);
+        p->arc[i + 1] = p->arc[i] + bt_hypot(b[0] - a[0], b[1] - a[1]);
     }
     p->bow = bow_of(p);
     p->panel = bt_alloc((size_t)n, sizeof *p->panel);

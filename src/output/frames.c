@@ -11,6 +11,7 @@
 
 #include "bergtow/shape.h"
 #include "output/xdmf.h"
+#include "base/elementary.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 
@@ -178,7 +179,7 @@ static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt
     bt_rows r = bt_rows_from(s, first, buffer);
     const float *p = f->vertices + 2 * local;
     for (int64_t i = from; i < from + n; i++) {
-        const double c = cos(row[i].yaw), sine = sin(row[i].yaw);
+        const double c = bt_cos(row[i].yaw), sine = bt_sin(row[i].yaw);
         for (int v = 0; v < f->n_vertices[i]; v++, p += 2) {
             float *to = bt_rows_next(&r);
             to[0] = (float)(row[i].x + c * (double)p[0] - sine * (double)p[1]);

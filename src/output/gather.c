@@ -11,6 +11,7 @@
 
 #include "output/observe.h"
 #include "partition/domain.h"
+#include "base/elementary.h"
 
 typedef struct list {
     bt_idx n;       ///< bodies this rank speaks for
@@ -138,7 +139,7 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     for (bt_idx i = 0; i < l.n; i++) {
         const bt_idx k = l.body[i];
         rows[i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
-                                 .speed = hypot(b->vel[k].x, b->vel[k].y)};
+                                 .speed = bt_hypot(b->vel[k].x, b->vel[k].y)};
     }
     free(force);
     _Static_assert(sizeof *rows == 5 * sizeof(double), "a row is a line of doubles");

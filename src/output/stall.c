@@ -6,6 +6,7 @@
 
 #include "tow/tow.h"
 #include "bergtow/world.h"
+#include "base/elementary.h"
 
 void bt_stall_add(bt_stall *s, double asked, double dt, double x, double y, double path)
 {
@@ -18,7 +19,7 @@ void bt_stall_add(bt_stall *s, double asked, double dt, double x, double y, doub
     s->asked += asked;
     s->spent += dt;
     if (s->asked < path) return;
-    if (hypot(x - s->from_x, y - s->from_y) < BT_STALL_SHARE * s->asked) {
+    if (bt_hypot(x - s->from_x, y - s->from_y) < BT_STALL_SHARE * s->asked) {
         s->windows++;
         s->time += s->spent;
     }

@@ -14,6 +14,7 @@
 #include "space/cells.h"
 #include "partition/domain.h"
 #include "output/state.h"
+#include "base/elementary.h"
 
 #define GRAVITY 9.81     // m/s²
 #define WALL_SIZES 5.0   // a wall is at least as thick, in mean floe sizes (setup.c)
@@ -38,7 +39,7 @@ static drivers drivers_of(const bt_case *c)
         .prescribed = prescribed,
         .water = circles ? 2 * water : water,
         .wind = air + water,
-        .slope = c->water.tilt == BT_TILT_SLOPE ? GRAVITY * hypot(c->water.slope_x, c->water.slope_y) : 0,
+        .slope = c->water.tilt == BT_TILT_SLOPE ? GRAVITY * bt_hypot(c->water.slope_x, c->water.slope_y) : 0,
         .dt = c->run.dt,
         .duration = c->run.duration,
     };
@@ -54,8 +55,8 @@ static double driven_speed(const drivers *d, const bt_world *w, bt_idx i)
     const bt_drag *k = &b->drag[i];
     bt_load load;
     bt_forces_load(w, i, &b->vel[i], &load);
-    const double pushed = d->slope + hypot(load.fx, load.fy) / b->mass[i],
-                 drawn = ratio(hypot(load.jx, load.jy), load.g);
+    const double pushed = d->slope + bt_hypot(load.fx, load.fy) / b->mass[i],
+                 drawn = ratio(bt_hypot(load.jx, load.jy), load.g);
     const double mass = b->mass[i], width = 2 * b->radius[i];
     const double alpha = sqrt(bt_max(ratio(k->air_skin, k->water_skin), ratio(k->air_form, k->water_form)));
     const double share = bt_max(alpha, d->dt * (k->air_skin + k->air_form * width) * d->wind / mass);

@@ -17,6 +17,7 @@
 #include "contact/added.h"
 #include "case/case_check.h"
 #include "run/setup_tow.h"
+#include "base/elementary.h"
 
 #define GRAVITY 9.81            // m/s²
 #define EARTH_RATE 7.292115e-5  // Ω, rad/s
@@ -25,7 +26,7 @@
 
 bt_params bt_setup_params(const bt_case *c, double size)
 {
-    const double f = 2 * EARTH_RATE * sin(c->water.latitude);
+    const double f = 2 * EARTH_RATE * bt_sin(c->water.latitude);
     // Seen from above the geographic frame (x north, y east) is left-handed: dVx/dt = −f Vy, dVy/dt = +f Vx; the
     // basin's frame is right-handed and the signs swap. In both a body turns right in the north.
     const double turn = c->domain.frame == BT_FRAME_GEOGRAPHIC ? f : -f;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "case/case_check.h"
+#include "base/elementary.h"
 
 bt_tow *bt_setup_tow(const bt_case *c)
 {
@@ -15,8 +16,8 @@ bt_tow *bt_setup_tow(const bt_case *c)
     bt_case_tow_start(c, start);
     *t = (bt_tow){
         .mode = c->tow.mode,
-        .ux = cos(c->tow.direction),
-        .uy = sin(c->tow.direction),
+        .ux = bt_cos(c->tow.direction),
+        .uy = bt_sin(c->tow.direction),
         .speed = c->tow.speed,
         .ramp = c->tow.ramp,
         .n_branches = line ? (int)c->tow.line.branches : 0,
@@ -64,8 +65,8 @@ bt_tow *bt_setup_tow(const bt_case *c)
 void bt_setup_tow_displacement(const bt_case *c, const bt_tow *t, double time, double d[2])
 {
     const double way = bt_case_tow_distance(c, time);
-    d[0] = way * cos(c->tow.direction);
-    d[1] = way * sin(c->tow.direction);
+    d[0] = way * bt_cos(c->tow.direction);
+    d[1] = way * bt_sin(c->tow.direction);
     if (t->path.n == 0) return;
     double start[2], tangent[2];
     bt_path_at(&t->path, 0, start, tangent);

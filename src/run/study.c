@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/elementary.h"
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "base/rng.h"
@@ -183,7 +184,7 @@ static const char *const distributions[] = {"uniform", "triangular", "normal", N
 /// and those to where it is cut off.
 static const double ends_at = 1.959963984540054, cut_at = 3;
 
-static double normal_below(double z) { return 0.5 * erfc(-z / sqrt(2)); }
+static double normal_below(double z) { return 0.5 * bt_erfc(-z / sqrt(2)); }
 
 /// Place within a range, 0 at its beginning and 1 at its end, below which lies the share u of a distribution.
 static double quantile(bt_distribution d, double u)
@@ -204,7 +205,7 @@ static double quantile(bt_distribution d, double u)
 /// Value at a place of a range, 0 ... 1 between its ends, in SI with all its digits.
 static char *range_value(const bt_study_parameter *p, double at)
 {
-    double x = p->logarithmic ? p->from * pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
+    double x = p->logarithmic ? p->from * bt_pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
     if (at == 0) x = p->from;
     if (at == 1) x = p->to;
     if (bt_case_keys[p->key].type == BT_KEY_INT) return bt_text_of("%.0f", nearbyint(x));

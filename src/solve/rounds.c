@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
+#include "base/elementary.h"
 #include "solve/solver.h"
 #include "partition/domain.h"
 
@@ -24,8 +25,8 @@ enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
 void bt_rounds_scale(bt_problem *p, double heaviest)
 {
     const double energy = heaviest * p->tolerance * p->tolerance;
-    p->per_square = p->tolerance > 0 ? exp2(20 - ceil(2 * log2(p->tolerance))) : 0x1p60;
-    p->per_energy = energy > 0 && isfinite(energy) ? exp2(bt_max(-500, bt_min(500, -30 - ceil(log2(energy))))) : 1;
+    p->per_square = p->tolerance > 0 ? ldexp(1, 20 - bt_ceil_2log2(p->tolerance)) : 0x1p60;
+    p->per_energy = energy > 0 && isfinite(energy) ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
 }
 
 // --- residual passes -------------------------------------------------------------------------------------------------

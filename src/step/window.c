@@ -17,6 +17,7 @@
 #include "tow/tow.h"
 #include "partition/domain.h"
 #include "geometry/apart.h"
+#include "base/elementary.h"
 
 #define STRIDE_SIZES 2.0  // mean floe diameters: renewing costs new labels, so it is done for many floes at once
 #define ZONE_SHARE 0.5    // of `ahead`, and of the way behind the body, assumed
@@ -125,7 +126,7 @@ static bt_pose place_of(const bt_world *w, bt_idx i, int32_t *turns)
     const bt_window *v = w->window;
     const bt_home *h = &w->bodies.home[i];
     int32_t across;
-    bt_pose p = {.yaw = h->yaw, .c = cos(h->yaw), .s = sin(h->yaw)};
+    bt_pose p = {.yaw = h->yaw, .c = bt_cos(h->yaw), .s = bt_sin(h->yaw)};
     p.x = into(h->x + v->drift_x, w->par.x0, v->length, turns);
     p.y = into(h->y + v->drift_y, w->par.y0, w->par.period_y, &across);
     return p;

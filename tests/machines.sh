@@ -1,0 +1,69 @@
+#!/bin/bash
+# SPDX-License-Identifier: MIT
+# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, hash by hash.
+#
+#     tests/machines.sh [FOLDER]      FOLDER takes 600 MB: Debian's libraries for arm64, and what is built with them
+#
+# Needs gcc-aarch64-linux-gnu, qemu-user-static, clang-14, and the network for Debian's packages of another architecture,
+# which are unpacked into FOLDER and never installed. Ends with `N passed, N failed`.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+folder=$(mkdir -p "${1:-/tmp/bergtow-machines}" && cd "${1:-/tmp/bergtow-machines}" && pwd)
+root=$folder/root lib=$folder/root/usr/lib/aarch64-linux-gnu
+
+for tool in aarch64-linux-gnu-gcc qemu-aarch64-static clang-14; do
+  command -v $tool >/dev/null || { echo "$tool is missing: apt-get install gcc-aarch64-linux-gnu qemu-user-static clang-14"; exit 1; }
+done
+make -s all
+make -s CC=clang-14 BUILD="$folder/clang" all >"$folder/clang.log"
+
+if [ ! -e "$lib/libmetis.so" ]; then
+  mkdir -p "$folder"/apt/{lists,cache/archives,state} "$root"
+  : >"$folder/apt/state/status"
+  # shellcheck disable=SC1091
+  codename=$(. /etc/os-release && echo "$VERSION_CODENAME")
+  echo "deb [signed-by=/usr/share/keyrings/debian-archive-keyring.gpg] http://deb.debian.org/debian $codename main" \
+    >"$folder/sources.list"
+  cat >"$folder/apt.conf" <<END
+APT::Architecture "arm64"; APT::Architectures {"arm64";}; APT::Install-Recommends "false"; APT::Sandbox::User "root";
+Dir::State "$folder/apt/state"; Dir::State::status "$folder/apt/state/status"; Dir::State::Lists "$folder/apt/lists";
+Dir::Cache "$folder/apt/cache"; Dir::Etc::sourcelist "$folder/sources.list"; Dir::Etc::sourceparts "/dev/null";
+END
+  apt-get -qq -c "$folder/apt.conf" update
+  apt-get -qq -c "$folder/apt.conf" install -y --download-only libhdf5-openmpi-dev libopenmpi-dev libmetis-dev \
+    libyaml-dev libjansson-dev libxxhash-dev librandom123-dev libgomp1 libc6-dev >"$folder/apt.log"
+  for package in "$folder"/apt/cache/archives/*.deb; do dpkg -x "$package" "$root"; done
+fi
+make -s CC="aarch64-linux-gnu-gcc --sysroot=$root" BUILD="$folder/arm" \
+  MPI_CFLAGS="-I$lib/openmpi/include" HDF5_CFLAGS="-I$root/usr/include/hdf5/openmpi" \
+  MPI_LIBS="-L$lib/openmpi/lib -lmpi" HDF5_LIBS="-L$lib/hdf5/openmpi -lhdf5" all >"$folder/arm.log"
+
+search=/usr/lib/aarch64-linux-gnu
+arm() {
+  BERGTOW_STARTED=1 qemu-aarch64-static -E LD_LIBRARY_PATH=$search:$search/openmpi/lib:$search/hdf5/openmpi -L "$root" \
+    "$folder/arm/bergtow" "$@"
+}
+state() { sed -n 's/.*"state_hash": "\(.*\)".*/\1/p' "$folder/$1/summary.json"; }
+
+passed=0 failed=0
+compare() { # NAME CASE OPTION...
+  local name=$1
+  shift
+  build/release/bergtow run "$@" -o "$folder/here" --force --quiet
+  "$folder/clang/bergtow" run "$@" -o "$folder/there" --force --quiet
+  arm run "$@" -o "$folder/far" --force --quiet
+  echo "$name: gcc $(state here), clang $(state there), ARM $(state far)"
+  if [ "$(state here)" = "$(state there)" ] && [ "$(state here)" = "$(state far)" ]; then passed=$((passed + 1)); else
+    failed=$((failed + 1)); fi
+}
+compare "rafting in the basin" cases/basin/basin-80-rafting.yml --set run.duration=30 --set output.window_start=10
+compare "a vessel and a bridle" cases/field/barents-2005.yml --steps 60
+compare "outlines of a map" cases/outlines/outlines.yml --steps 100
+compare "line in the basin" cases/basin/basin-50.yml --steps 200
+# and a checkpoint from here goes on over there
+build/release/bergtow run cases/basin/basin-50.yml --steps 100 -o "$folder/far" --force --quiet
+arm resume "$folder/far" --steps 100 --quiet
+build/release/bergtow run cases/basin/basin-50.yml --steps 200 -o "$folder/here" --force --quiet
+if [ "$(state here)" = "$(state far)" ]; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+echo "$passed passed, $failed failed"
+[ $failed = 0 ]
