@@ -173,19 +173,20 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 DEPS := build-essential pkg-config git \
         libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
-        libxxhash-dev libcmocka-dev \
-        python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2 \
-        python3-pytest ffmpeg chromium chromium-driver python3-selenium poppler-utils
+        libxxhash-dev \
+        python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2
 
-# For the tests of the Python package; it runs without them, but for open_result.
-DEPS_TEST := python3-xarray python3-pip python3-setuptools python3-wheel
+# For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg (animations),
+# chromium (reports as PDF), xarray (open_result of the Python package).
+DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
+             poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	echo "bergtow needs these Debian packages" \
-	  "(on a bare system 500 MB to fetch, some minutes without a word):" $$missing; \
+	  "(on a bare system 250 MB to fetch, 1.1 GB on the disk; for the tests twice that; some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
@@ -232,12 +233,12 @@ test: deps-test ## every test: units, known answers, same bits, command line, sh
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
-test-long: deps ## tests that take minutes: intervals over fields, long tows, finer steps and tolerance, kills, soak
+test-long: deps-test ## tests that take minutes: intervals over fields, long tows, finer steps and tolerance, kills, soak
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 
 # FLAGS='-j 2 --only solve': tests/mutate.py --help
-mutate: deps ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended
+mutate: deps-test ## wrong lines, one at a time, and which test tells each: hours; goes on where it ended
 	$(PYTHON) tests/mutate.py $(FLAGS)
 
 STUDY := $(BUILD)/partition/study/partition_quality

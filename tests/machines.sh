@@ -1,18 +1,19 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, hash by hash.
+# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, by hashes.
 #
 #     tests/machines.sh [FOLDER]      FOLDER takes 600 MB: Debian's libraries for arm64, and what is built with them
 #
-# Needs gcc-aarch64-linux-gnu, qemu-user-static, clang-14, and the network for Debian's packages of another architecture,
-# which are unpacked into FOLDER and never installed. Ends with `N passed, N failed`.
+# Needs gcc-aarch64-linux-gnu, qemu-user-static, clang-14, and the network for Debian's packages of the other
+# architecture, which are unpacked into FOLDER and never installed. Ends with `N passed, N failed`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(mkdir -p "${1:-/tmp/bergtow-machines}" && cd "${1:-/tmp/bergtow-machines}" && pwd)
 root=$folder/root lib=$folder/root/usr/lib/aarch64-linux-gnu
 
 for tool in aarch64-linux-gnu-gcc qemu-aarch64-static clang-14; do
-  command -v $tool >/dev/null || { echo "$tool is missing: apt-get install gcc-aarch64-linux-gnu qemu-user-static clang-14"; exit 1; }
+  command -v $tool >/dev/null ||
+    { echo "$tool is missing: apt-get install gcc-aarch64-linux-gnu qemu-user-static clang-14"; exit 1; }
 done
 make -s all
 make -s CC=clang-14 BUILD="$folder/clang" all >"$folder/clang.log"

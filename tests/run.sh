@@ -42,7 +42,10 @@ for kind in asan tsan valgrind; do
     if [ $code -eq 77 ]; then echo "    not run: $(tail -1 "$log")"; elif [ $code -ne 0 ]; then cat "$log"; fi
 done
 
-${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE tests/cli tests/parallel >"$log" 2>&1
+# Files of tests side by side, as many as there are cores, up to four.
+workers=$(nproc)
+${PYTHON:-/usr/bin/python3} -m pytest -q -p no:cacheprovider -rfE -n $((workers < 4 ? workers : 4)) --dist loadfile \
+    tests/cli tests/parallel >"$log" 2>&1
 code=$?
 cat "$log"
 p=$(sed -n 's/.*\b\([0-9][0-9]*\) passed.*/\1/p' "$log" | tail -1)

@@ -51,15 +51,16 @@ static void mean_floe(const bt_world *w, bt_window *v)
         v->thickness += b->thickness[i];
         v->drag.water_skin += b->drag[i].water_skin + b->drag[i].water_form * perimeter / BT_PI;
         v->drag.air_skin += b->drag[i].air_skin + b->drag[i].air_form * perimeter / BT_PI;
-        v->vel.x += b->vel[i].x;
-        v->vel.y += b->vel[i].y;
+        // relative to the water, so that the mean of floes that rest in it does to the last bit
+        v->vel.x += b->vel[i].x - w->par.water_u;
+        v->vel.y += b->vel[i].y - w->par.water_v;
         n++;
     }
     if (n == 0) return;
     v->share /= v->mass;
     v->mass /= n, v->drag.water_skin /= n, v->drag.air_skin /= n;
     v->inertia /= n, v->radius /= n, v->area /= n, v->thickness /= n;
-    v->vel.x /= n, v->vel.y /= n;
+    v->vel.x = w->par.water_u + v->vel.x / n, v->vel.y = w->par.water_v + v->vel.y / n;
 }
 
 static double body_at(const bt_world *w) { return w->window->sign * w->tow->travel_x; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Elementary functions: their error against long double, their ends, and a checksum of their bits that every machine and
-// compiler must give.
+// Elementary functions: their error against long double, their ends, and a checksum of their bits that every compiler
+// and machine must give.
 #include "bergtow/base.h"
 #include "base/elementary.h"
 
@@ -111,10 +111,12 @@ static void ends_are_those_of_the_standard(void **state)
     assert_true(bt_atan2(1, zero) == BT_PI / 2 && bt_atan2(-1, zero) == -BT_PI / 2 && bt_atan2(1, 1) == BT_PI / 4);
     assert_true(bt_atan2(INFINITY, INFINITY) == BT_PI / 4 && isnan(bt_atan2(NAN, 1)));
     assert_true(bt_hypot(3, 4) == 5 && bt_hypot(0, 0) == 0 && bt_hypot(huge, 1) == huge && bt_hypot(tiny, 0) == tiny);
-    assert_true(fabs(bt_hypot(3e200, 4e200) / 5e200 - 1) < 1e-15 && fabs(bt_hypot(3e-200, 4e-200) / 5e-200 - 1) < 1e-15);
+    assert_true(fabs(bt_hypot(3e200, 4e200) / 5e200 - 1) < 1e-15);
+    assert_true(fabs(bt_hypot(3e-200, 4e-200) / 5e-200 - 1) < 1e-15);
     assert_true(isnan(bt_hypot(NAN, 1)));
     assert_true(bt_hypot(INFINITY, NAN) == INFINITY);
-    assert_true(bt_erfc(0) == 1 && fabs(bt_erfc(-6) - 2) < 1e-15 && fabs(bt_erfc(2) / 0.004677734981047266 - 1) < 1e-13);
+    assert_true(bt_erfc(0) == 1 && fabs(bt_erfc(-6) - 2) < 1e-15);
+    assert_true(fabs(bt_erfc(2) / 0.004677734981047266 - 1) < 1e-13);
     assert_true(bt_ceil_log2(1) == 0 && bt_ceil_log2(1.1) == 1 && bt_ceil_log2(0.5) == -1 && bt_ceil_log2(3) == 2);
     assert_true(bt_ceil_2log2(1) == 0 && bt_ceil_2log2(1.4) == 1 && bt_ceil_2log2(1.42) == 2 && bt_ceil_2log2(2) == 2);
 }
