@@ -176,8 +176,8 @@ DEPS := build-essential pkg-config git \
         libxxhash-dev \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2
 
-# For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg (animations),
-# chromium (reports as PDF), xarray (open_result of the Python package).
+# For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
+# (animations), chromium (reports as PDF), xarray (open_result of the Python package).
 DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
              poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
 
@@ -186,7 +186,8 @@ deps: ## install the Debian packages that are missing
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
 	echo "bergtow needs these Debian packages" \
-	  "(on a bare system 250 MB to fetch, 1.1 GB on the disk; for the tests twice that; some minutes without a word):" $$missing; \
+	  "(on a bare system 250 MB to fetch, 1.1 GB on the disk, for the tests twice that;" \
+	  "some minutes without a word):" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
 	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
 	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
@@ -233,7 +234,7 @@ test: deps-test ## every test: units, known answers, same bits, command line, sh
 	@! command -v clang-14 >/dev/null || $(AGAIN) CONFIG=tsan all
 	@BERGTOW=build/release/bergtow tests/run.sh $(TEST_BIN)
 
-test-long: deps-test ## tests that take minutes: intervals over fields, long tows, finer steps and tolerance, kills, soak
+test-long: deps-test ## tests that take minutes: intervals over fields, long tows, finer steps, kills, faults, soak
 	@$(AGAIN) all
 	BERGTOW=build/release/bergtow $(PYTEST) -s tests/long
 

@@ -127,7 +127,8 @@ static double log_near(double f, double rest, int k)
                   z * (2 / 7.0 +
                        z * (2 / 9.0 +
                             z * (2 / 11.0 +
-                                 z * (2 / 13.0 + z * (2 / 15.0 + z * (2 / 17.0 + z * (2 / 19.0 + z * (2 / 21.0))))))))));
+                                 z * (2 / 13.0 +
+                                      z * (2 / 15.0 + z * (2 / 17.0 + z * (2 / 19.0 + z * (2 / 21.0))))))))));
     const double small = s * (half + terms) + (k * ln2[1] + rest);
     return k * ln2[0] + (f - (half - small));
 }

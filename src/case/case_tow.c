@@ -273,7 +273,8 @@ static double time_of_wall(const bt_case *c, const bt_path *path)
     enum { TIMES = 2000 };
     double v[2 * BT_MAX_VERTICES], start[2], at[2], tangent[2];
     const int n = bt_case_waterline(c, v);
-    const double cy = bt_cos(c->body.yaw), sy = bt_sin(c->body.yaw), slack = 1e-9 * (c->domain.length + c->domain.width);
+    const double cy = bt_cos(c->body.yaw), sy = bt_sin(c->body.yaw);
+    const double slack = 1e-9 * (c->domain.length + c->domain.width);
     bt_path_at(path, 0, start, tangent);
     for (int i = 1; i <= TIMES; i++) {
         const double time = c->run.duration * i / TIMES;

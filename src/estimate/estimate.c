@@ -234,7 +234,8 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in)
     in->along = rx * ux + ry * uy;
     const double flow = in->speed > 0 ? bt_atan2(ry, rx) - c->body.yaw : ahead;
     in->drag =
-        0.5 * c->water.density * c->body.drag.water_form * c->body.draft * bt_shape_width(n, v, bt_cos(flow), bt_sin(flow)) +
+        0.5 * c->water.density * c->body.drag.water_form * c->body.draft *
+            bt_shape_width(n, v, bt_cos(flow), bt_sin(flow)) +
         c->water.density * c->body.drag.water_skin * bt_shape_moments(n, v).area;
 }
 

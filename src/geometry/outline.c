@@ -89,7 +89,8 @@ bool bt_outline_crosses(int n, const double *v)
                 const double *p = j == i + 1 ? a : b, *q = j == i + 1 ? b : a, *r = j == i + 1 ? d : c;
                 const bool back = (p[0] - q[0]) * (r[0] - q[0]) + (p[1] - q[1]) * (r[1] - q[1]) > 0;
                 if (back &&
-                    fabs(cross(q, p, r)) <= NEAR * bt_hypot(p[0] - q[0], p[1] - q[1]) * bt_hypot(r[0] - q[0], r[1] - q[1]))
+                    fabs(cross(q, p, r)) <=
+                        NEAR * bt_hypot(p[0] - q[0], p[1] - q[1]) * bt_hypot(r[0] - q[0], r[1] - q[1]))
                     return true;
                 continue;
             }

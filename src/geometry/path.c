@@ -33,7 +33,8 @@ bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, d
             if (next > 0) ox = nx / next, oy = ny / next;
             angle = bt_atan2(tx * oy - ty * ox, tx * ox + ty * oy);
             // Not tan of half an angle of 180°, which is large but finite.
-            if (radius > 0 && angle != 0) cut = fabs(angle) < BT_PI - 1e-6 ? radius * bt_tan(0.5 * fabs(angle)) : INFINITY;
+            if (radius > 0 && angle != 0)
+                cut = fabs(angle) < BT_PI - 1e-6 ? radius * bt_tan(0.5 * fabs(angle)) : INFINITY;
         }
         if (used + cut > far) {
             snprintf(why, 200,

@@ -26,7 +26,8 @@ void bt_rounds_scale(bt_problem *p, double heaviest)
 {
     const double energy = heaviest * p->tolerance * p->tolerance;
     p->per_square = p->tolerance > 0 ? ldexp(1, 20 - bt_ceil_2log2(p->tolerance)) : 0x1p60;
-    p->per_energy = energy > 0 && isfinite(energy) ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
+    const bool scaled = energy > 0 && isfinite(energy);
+    p->per_energy = scaled ? ldexp(1, (int)bt_max(-500, bt_min(500, -30 - bt_ceil_log2(energy)))) : 1;
 }
 
 // --- residual passes -------------------------------------------------------------------------------------------------

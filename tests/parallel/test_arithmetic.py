@@ -18,7 +18,8 @@ CASES = {
     "line": changed(TOW, run__duration=10, tow__mode="line", tow__line_length=2, tow__line_stiffness=5e3,
                     tow__line_damping=100),
     "sizes": changed(TOW, run__duration=10, ice__concentration=0.7, ice__size_law="lognormal", ice__size_spread=0.4,
-                     ice__thickness_law="lognormal", ice__thickness_spread=0.3, ice__restitution=0.3, ice__rafting={"kappa": 5}),
+                     ice__thickness_law="lognormal", ice__thickness_spread=0.3, ice__restitution=0.3,
+                     ice__rafting={"kappa": 5}),
     "water": changed(TOW, run__duration=10, ice__shape="rectangles", ice__aspect=1.5, water__latitude="70 deg",
                      water__tide={"major": 0.05, "minor": 0.02, "period": "60 s"},
                      body__shape="ship", body__width=1)
