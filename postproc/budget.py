@@ -55,6 +55,8 @@ def assumed(e):
             attributes = f[f"parameters/{key}"].attrs
             told = {w: attributes.get(w, b"") for w in ("distribution", "source")}
             out[key] = {w: v.decode() if isinstance(v, bytes) else str(v) for w, v in told.items()}
+            if e.units[key] not in ("", "1") and out[key]["distribution"]:
+                out[key]["distribution"] += f" {e.units[key]}"
             if not out[key]["distribution"]:
                 out[key]["distribution"] = ", ".join(dict.fromkeys(str(v) for v in e.parameters[key]))
     return out

@@ -6,6 +6,7 @@ import style
 from text_table import number, pair, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
+MOST_NAMED = 5  # conditions of a warning
 
 
 def _towed(s):
@@ -79,9 +80,15 @@ def warnings(s):
             detail = details.pop()
             out.append(f"WARNING: {what}{f' ({detail})' if detail else ''}.")
         else:
-            out.append(f"WARNING: {what}: " + "; ".join(label + (f" ({detail})" if detail else "")
-                                                        for label, detail in where) + ".")
+            some = [label + (f" ({detail})" if detail else "") for label, detail in where]
+            out.append(f"WARNING: {what}: {several(some)}.")
     return out
+
+
+def several(some):
+    """A list of texts as one, of a long one the first alone: a page of conditions is not read."""
+    return "; ".join(some if len(some) <= MOST_NAMED else
+                     [*some[:MOST_NAMED - 1], f"and {len(some) - MOST_NAMED + 1} more conditions"])
 
 
 def _rows_of(s, name, cells):
@@ -150,9 +157,9 @@ def returns(s, markdown):
     if not hours:
         refused = sorted({x[kind]["refused"] for c in s["conditions"] for x in c["loads"].values() for kind in NAMES
                           if "refused" in x[kind]})
-        return "No return levels" + (f": {'; '.join(refused)}." if refused else ".")
+        return "No return levels" + (f": {several(refused)}." if refused else ".")
     head = ["condition", "load", "tail", "shape", "p", *(f"once in {T:.3g} h" for T in hours), "unit", "hours"]
-    rows, refused = [], []
+    rows, refused = [], {}
     for name in names(s):
         factor, unit, first = _unit(s, name)
         for kind, label in NAMES.items():
@@ -162,7 +169,7 @@ def returns(s, markdown):
                     continue
                 f = x[kind]
                 if "refused" in f:
-                    refused.append(f"{first['label']}, {c['label']}, {label}: {f['refused']}.")
+                    refused.setdefault((first["label"], label), []).append(f"{c['label']}: {f['refused']}")
                     continue
                 at = {level["hours"]: level for level in f["levels"]}
                 rows.append([c["label"], first["label"], label,
@@ -173,7 +180,8 @@ def returns(s, markdown):
             "tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
             "likelihood. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
             "than the largest value seen.")
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {r}" for r in refused)])
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {load}, {tail}, {several(some)}."
+                                                                  for (load, tail), some in refused.items())])
 
 
 def _level(level, factor):

@@ -18,6 +18,7 @@ from test_postproc import script
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import loads  # noqa: E402
+import loads_text  # noqa: E402
 import plot_ensemble  # noqa: E402
 import stat_extreme  # noqa: E402
 import stat_load  # noqa: E402
@@ -194,6 +195,11 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     rows = list(csv.DictReader(open(folder / "statistics.csv")))
     assert float(rows[1]["tow_force_design_n"]) == second["tow"]["value"] and float(
         rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
+
+
+def test_a_warning_of_many_conditions_names_the_first():
+    assert loads_text.several(["a", "b"]) == "a; b"
+    assert loads_text.several(list("abcdefg")) == "a; b; c; d; and 3 more conditions"
 
 
 def test_options_of_the_design_value(statement, tmp_path):

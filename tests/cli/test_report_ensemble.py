@@ -2,7 +2,9 @@
 """The report of an ensemble: the numbers of ensemble.py, every member with its doubts, nothing that a browser would
 complain of."""
 import argparse
+import json
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -19,7 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import ensemble  # noqa: E402
 import report  # noqa: E402
 import report_ensemble  # noqa: E402
+import stat_budget  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
+from case_runs import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"
@@ -153,6 +157,41 @@ def test_members_of_other_builds_and_lost_folders_are_told(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
     assert report_ensemble.provenance(Ensemble(study))[1] is None
+
+
+def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeypatch):
+    """What the other commands left beside the ensemble stands in its report, in the order of a reader's questions."""
+    folder = shutil.copytree(study, tmp_path / "out")
+    row = {"name": "width", "key": "domain.width", "unit": "m", "from": 10.0, "to": 20.0, "finer": "wider",
+           "quantity": "mean ice resistance", "effect": -0.4, "interval_95": [-0.5, -0.3], "fields": 8,
+           "judged": "matters", "recommended": 20.0, "same_ice": False}
+    point = {"value": 0.5, "fields": 2, "made": 2, "parted": 0, "failed": 0, "speed": [0.4, 0.5], "mean_speed": 0.45,
+             "mean_speed_95": [0.2, 0.7], "tow_force": [1e5, 2e5], "mean_tow_force": 1.5e5,
+             "mean_tow_force_95": [None, None], "tension": [2e5, 3e5], "mean_tension": 2.5e5,
+             "mean_tension_95": [None, None]}
+    limit = {"label": "the case", "for": None, "makes_it": 0.5, "does_not": None, "estimate": None, "resolved": True,
+             "why": "every value of the range makes it", "runs": 5, "points": [point, point | {"value": 0.9}]}
+    rng = np.random.default_rng(1)
+    budget = stat_budget.budget({"ice.friction": np.repeat(rng.random(30), 2)}, np.repeat(np.arange(30), 2),
+                                100 + rng.normal(size=60))
+    found = {
+        "converge": {"rows": [row], "looks": 5, "margin": 0.1, "spent_min": 2.0, "budget_min": 10},
+        "budget": budget | {"title": "t", "of": "mean_ice_resistance_n", "units": "N", "meaning": "mean", "wanted": 60,
+                            "assumed": {"ice.friction": {"distribution": "uniform from 0 to 1", "source": "a book"}}},
+        "capability": {"case": "case.yml", "title": "t", "set": [], "search": "ice.concentration", "unit": "",
+                       "range": [0.2, 0.95], "resolution": 0.05, "for": "", "for_unit": "", "speed": 0.3, "share": 0.5,
+                       "most_fields": 12, "breaking_load": None, "budget_min": 5, "spent_min": 1, "grid_runs": 300,
+                       "conditions": [limit]}
+    }
+    for name, content in found.items():
+        (folder / f"{name}.json").write_text(json.dumps(plain(content)))
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
+    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    text = (tmp_path / "page.html").read_text()
+    at = [text.index(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
+                                          "every value of the range makes it")]
+    assert at == sorted(at) and text.index("Assumptions") < at[0]
+    assert text.count("<svg") >= 3 and str(tmp_path) not in text
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):
