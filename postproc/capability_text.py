@@ -8,6 +8,7 @@ from text_table import number, table
 
 import numpy as np
 
+FAR_LOAD = 2  # times the largest tension: a breaking load beyond is not in the picture
 COLOURS = (style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT)
 
 
@@ -63,7 +64,7 @@ def meaning(found):
 
 
 def text(found, markdown=False):
-    return "\n\n".join([limits(found, markdown), curve(found, markdown), meaning(found)])
+    return "\n\n".join([limits(found, markdown), meaning(found), curve(found, markdown)])
 
 
 def _numbers(values):
@@ -86,14 +87,16 @@ def figure(found):
     import matplotlib.pyplot as plt
     some, percent = found["conditions"], found["search"] == "ice.concentration"
     factor = 100.0 if percent else 1.0
-    across = len(some) > 1 and all(c["for"] is not None for c in some)
+    across = len(some) > 1 and all(c["for"] is not None for c in some) and any(
+        c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some)
     fig, grid = plt.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
     width, height = fig.get_size_inches()
     fig.subplots_adjust(left=0.75 / width, right=1 - 0.2 / width, top=1 - 1.0 / height, bottom=0.95 / height,
                         wspace=0.3)
     words = "concentration, %" if percent else f"{found['search']}, {found['unit']}".rstrip(", ")
     largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
-    kilo, newton = style.scale([*largest, found["breaking_load"] or 0.0], "N")
+    kilo, newton = style.scale(largest, "N")
+    parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
     for axes, name, label, unit in ((grid[0, 0], "speed", "speed made good, m/s", 1.0),
                                     (grid[0, 1], "tension", f"largest line tension, {newton}", kilo)):
         for c, colour in zip(some, COLOURS * len(some)):
@@ -107,7 +110,7 @@ def figure(found):
         axes.grid(True)
     grid[0, 0].axhline(found["speed"], color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
                        label=f"to be kept: {number(found['speed'])} m/s")
-    if found["breaking_load"]:
+    if parts:
         grid[0, 1].axhline(found["breaking_load"] / kilo, color=style.INK, linewidth=1, linestyle=(0, (4, 3)),
                            label="breaking load")
         grid[0, 1].legend()

@@ -225,7 +225,7 @@ def test_its_block_for_a_report(tmp_path):
              "mean_tow_force_95": [None, None], "tension": [2e5, None], "mean_tension": None,
              "mean_tension_95": [None, None]}
     hard = point | {"value": 0.9, "made": 0, "mean_speed_95": [None, None]}
-    rows = [{"label": f"ice.thickness {h} m", "for": h, "makes_it": 0.5, "does_not": None, "estimate": None,
+    rows = [{"label": f"ice.thickness {h} m", "for": h, "makes_it": 0.5, "does_not": None, "estimate": 0.8,
              "resolved": False, "why": case_runs.SPENT, "runs": 5, "points": [point, hard]} for h in (0.5, 1.0)]
     found = {"case": "case.yml", "title": "a $ in the title", "set": [], "search": "ice.concentration", "unit": "",
              "range": [0.2, 0.95], "resolution": 0.05, "for": "ice.thickness", "for_unit": "m", "speed": 0.3,
@@ -233,8 +233,13 @@ def test_its_block_for_a_report(tmp_path):
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
     block = capability_text.block(tmp_path)
-    assert "| ice.thickness 0.5 m | 50.0 % | – | – | 5 | not resolved: the budget is spent |" in block["markdown"]
+    assert "| ice.thickness 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
+    for row in rows:
+        row["estimate"] = None
+    (tmp_path / "capability.json").write_text(json.dumps(found))
+    assert len(capability_text.block(tmp_path)["figure"]().axes) == 2  # no limit, no panel of it
+    assert "breaking load" not in [line.get_label() for line in axes[1].lines]  # far above
     assert axes[1].get_ylabel() == "largest line tension, kN" and axes[0].lines[-1].get_ydata()[0] == 0.3
