@@ -46,7 +46,7 @@ def journal(folder):
 def page(monkeypatch):
     """The report of an ensemble as texts: its warnings, and the rows and remarks of its members."""
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 2})
-    monkeypatch.setattr(report_ensemble, "pictures", lambda *_: [])
+    monkeypatch.setattr(report_ensemble, "pictures", lambda *_: {})
 
     def made(folder):
         report.main([str(folder / "all")])
