@@ -165,7 +165,7 @@ def test_a_study_end_to_end(small):
     folder, text = small
     found = json.loads((folder / "out/budget.json").read_text())
     assert found["members"] == found["wanted"] == 24 and found["conditions"] == 12
-    assert "a book, p. 3" in text and "log-normal, 95 % from 0.3 to 0.6; assumed" in text and "not studied" in text
+    assert "a book, p. 3" in text and "log-normal, 95 % from 0.3 to 0.6 m; assumed" in text and "not studied" in text
     with h5py.File(folder / "out/ensemble.h5") as f:
         y = f["summary/mean_ice_resistance_n"][()]
     pairs = y.reshape(12, 2)

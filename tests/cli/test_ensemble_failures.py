@@ -60,7 +60,7 @@ def page(monkeypatch):
             name: re.sub(r"<[^>]*>", "", rest).strip()
             for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)
         }
-        return text.split('<section id=')[0], rows, told
+        return text.split('<section id="method"')[0], rows, told
     return made
 
 
