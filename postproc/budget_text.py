@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The uncertainty budget of budget.py as one table and one picture."""
-import json
 from pathlib import Path
 
 import style
 from stat_budget import TRUSTED_Q2
-from text_table import number, table
+from text_table import number, read_json, table
 
 import numpy as np
 
@@ -117,10 +116,7 @@ def figure(found):
 
 def of_folder(folder):
     """What budget.py left in a folder, None where it has not been there, or its file cannot be read."""
-    try:
-        return json.loads((Path(folder) / "budget.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
+    return read_json(Path(folder) / "budget.json")
 
 
 def block(folder):

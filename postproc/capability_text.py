@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """What capability.py found, as tables and as a picture."""
-import json
 from pathlib import Path
 
 import style
-from text_table import number, table
+from text_table import number, read_json, table
 
 import numpy as np
 
@@ -133,10 +132,7 @@ def figure(found):
 
 def of_folder(folder):
     """What capability.py left in a folder, None where it has not been there, or its file cannot be read."""
-    try:
-        return json.loads((Path(folder) / "capability.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
+    return read_json(Path(folder) / "capability.json")
 
 
 def block(folder):

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from text_table import number, table
+from text_table import number, read_json, table
 
 WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
 
@@ -59,7 +59,4 @@ def verdicts(found, markdown=False):
 
 def of_folder(folder):
     """What converge.py left in a folder, None where it has not been there, or its file cannot be read."""
-    try:
-        return json.loads((Path(folder) / "converge.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
+    return read_json(Path(folder) / "converge.json")

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, and how numbers stand in them."""
+"""Tables of text or Markdown, how numbers stand in them, and the files that they are made from."""
+import json
+
 import numpy as np
 
 import style
@@ -14,6 +16,14 @@ def table(head, rows, markdown):
     def line(cells):
         return "  ".join([cells[0].ljust(width[0])] + [c.rjust(w) for c, w in zip(cells[1:], width[1:])]).rstrip()
     return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
+
+
+def read_json(path):
+    """What a command left in a file, None where there is none, or it cannot be read."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
 
 
 def number(value, digits=3):

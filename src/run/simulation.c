@@ -72,7 +72,7 @@ static bt_status read_case(bt_case *c, const bt_simulation_options *o, bt_errors
     return status;
 }
 
-static char *copy_of(const char *text) { return text ? strcpy(bt_alloc(strlen(text) + 1, 1), text) : NULL; }
+static char *copy_of(const char *text) { return text ? bt_text_copy(text) : NULL; }
 
 static void release(bt_simulation *s)
 {
