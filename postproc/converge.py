@@ -220,19 +220,28 @@ def fields_row(study):
              "judged": "none" if n >= needed else "open"}]
 
 
+def varied(study, kinds, margin, tries, end):
+    """{name: rows}. What is left of the budget goes in equal parts to what is still open, until all is resolved or
+    nothing can be run any more."""
+    found, waiting, before = {}, kinds, -1
+    while waiting and study.made > before:
+        before = study.made
+        for k, kind in enumerate(waiting):
+            study.end = time.monotonic() + (end - time.monotonic()) / (len(waiting) - k)
+            try:
+                found[kind.name] = vary(study, kind, margin, tries)
+            except RunError as error:
+                found[kind.name] = [{"name": kind.name, "key": kind.key, "judged": "open", "why": error.reason}]
+        waiting = [kind for kind in waiting if found[kind.name][-1].get("why") == SPENT]
+    study.end = end
+    return found
+
+
 def converge(study, names, margin, tries=TRIES):
-    """All rows. The budget is shared: what is left goes in equal parts to what is still to be varied."""
-    end, rows = study.end, []
-    chosen = [k for k in KINDS if k.name in names]
+    """All rows."""
     if not study.there("case", FIELDS[0], {}):
         raise RunError(study.folder, f"the budget does not reach for {FIELDS[0]} runs of the case", "raise --budget")
-    for k, kind in enumerate(chosen):
-        study.end = time.monotonic() + (end - time.monotonic()) / (len(chosen) - k)
-        try:
-            rows += vary(study, kind, margin, tries)
-        except RunError as error:
-            rows.append({"name": kind.name, "key": kind.key, "judged": "open", "why": error.reason})
-    study.end = end
+    rows = sum(varied(study, [k for k in KINDS if k.name in names], margin, tries, study.end).values(), [])
     if "window" in names:
         rows += window(study, margin)
     if "fields" in names:

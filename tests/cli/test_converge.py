@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -138,3 +139,26 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
     text = script("ensemble.py", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
     assert "take 20 m, or wider" in text and converge_text.verdicts(found) in text
+
+
+def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monkeypatch):
+    """The first is cheap. The second asks for half of the time, more than its equal share of it was."""
+    class Study:
+        made, end = 0, 0.0
+
+    asked = []
+
+    def vary(study, kind, margin, most):
+        asked.append((kind.name, study.end - time.monotonic()))
+        study.made += kind.name == "dt" and len(asked) < 8
+        enough = kind.name != "dt" or study.end - time.monotonic() > 50
+        return [{"name": kind.name, "judged": "none"} if enough else {"name": kind.name, "why": converge.SPENT}]
+
+    monkeypatch.setattr(converge, "vary", vary)
+    kinds = [k for k in converge.KINDS if k.name in ("start", "dt", "tolerance")]
+    found = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 90)
+    assert [name for name, _ in asked] == ["start", "dt", "tolerance", "dt"]
+    assert [rows[0].get("why") for rows in found.values()] == [None] * 3
+    assert [round(left) for _, left in asked] == [30, 45, 90, 90]
+    never, asked[:] = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 30), []
+    assert never["dt"][0]["why"] == converge.SPENT
