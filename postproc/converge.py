@@ -56,8 +56,8 @@ def times(key, factor):
 
 
 def slower_start(run, k):
-    """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size. It ends
-    well before the window."""
+    """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size. It
+    ends well before the window."""
     first = run.value("tow.ramp")
     own = run.value("body.length") / run.value("tow.speed")
     ramp = first * RAMP ** k if first > 0 else own * RAMP ** (k - 1)
