@@ -220,8 +220,8 @@ static void put_run(driver_file *f, haddr_t address, haddr_t end)
 static void put_superblock(driver_file *f)
 {
     const size_t k = page_from(f, f->super);
-    if (k == f->n_pages || f->pages[k]->at > f->super || !bit_of(f->pages[k]->waits, (size_t)(f->super - f->pages[k]->at)))
-        return;
+    if (k == f->n_pages || f->pages[k]->at > f->super) return;
+    if (!bit_of(f->pages[k]->waits, (size_t)(f->super - f->pages[k]->at))) return;
     struct stat st;
     if (!*f->errnum &&
         (fstat(f->fd, &st) != 0 ||
