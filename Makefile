@@ -15,6 +15,8 @@ MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
 MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
 HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
 HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
+# its part for dimension scales
+HDF5_HL     := $(filter -L%,$(HDF5_LIBS)) -lhdf5_hl
 
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
 # same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
@@ -39,7 +41,7 @@ ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
+LDLIBS := $(HDF5_HL) $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -179,7 +181,7 @@ DEPS := build-essential pkg-config git \
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
 DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
-             poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
+             poppler-utils python3-xarray python3-h5netcdf python3-netcdf4 python3-pip python3-setuptools python3-wheel
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \

@@ -34,8 +34,7 @@ static void fail(bt_h5 *h, const char *action)
     bt_errors_add(h->err, "%s: cannot %s: HDF5: %s; %s", h->path, action, text, bt_file_remedy(0));
 }
 
-/// After writes: HDF5's own word, and what the driver has not told it.
-static void check(bt_h5 *h, bool done)
+void bt_h5_check(bt_h5 *h, bool done)
 {
     if (!done || *h->errnum) fail(h, "write the file");
 }
@@ -116,26 +115,26 @@ void bt_h5_give_up(bt_h5 *h, bt_status status)
 void bt_h5_flush(bt_h5 *h)
 {
     if (idle(h)) return;
-    check(h, H5Fflush(h->file, H5F_SCOPE_LOCAL) >= 0);
+    bt_h5_check(h, H5Fflush(h->file, H5F_SCOPE_LOCAL) >= 0);
 }
 
 void bt_h5_sync_raw(bt_h5 *h)
 {
     if (h->raw < 0 || h->status != BT_OK) return;
     *h->errnum = bt_file_sync(h->raw);
-    check(h, true);
+    bt_h5_check(h, true);
 }
 
 bt_status bt_h5_close(bt_h5 *h)
 {
     if (h->file >= 0) {
         bt_h5_flush(h);
-        check(h, H5Fclose(h->file) >= 0);
+        bt_h5_check(h, H5Fclose(h->file) >= 0);
     }
     if (h->raw >= 0) {
         const int closed = bt_file_close(h->raw);
         if (!*h->errnum) *h->errnum = closed;
-        check(h, true);
+        bt_h5_check(h, true);
     }
     free(h->path);
     free(h->errnum);
@@ -148,7 +147,7 @@ void bt_h5_group(bt_h5 *h, const char *name)
 {
     if (idle(h)) return;
     const hid_t g = H5Gcreate2(h->file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-    check(h, g >= 0 && H5Gclose(g) >= 0);
+    bt_h5_check(h, g >= 0 && H5Gclose(g) >= 0);
 }
 
 /// Creation properties under which two runs of one case give the same file contents.
@@ -171,8 +170,8 @@ static void write_in_space(bt_h5 *h, const char *name, hid_t create, hid_t type,
 {
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
     const bool filled = data && H5Sget_simple_extent_npoints(space) > 0;
-    check(h, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
-    if (d >= 0) check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
+    bt_h5_check(h, d >= 0 && (!filled || H5Dwrite(d, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, data) >= 0));
+    if (d >= 0) bt_h5_check(h, H5Dclose(d) >= 0); // the data of a small dataset go to the file only now
     H5Sclose(space);
     H5Pclose(create);
 }
@@ -202,7 +201,7 @@ hid_t bt_h5_dataset(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
     const hid_t space = H5Screate_simple(rank, dims, NULL);
     const hid_t create = layout(h, rank, chunk ? (hsize_t[]){chunk, rank > 1 ? dims[1] : 1} : NULL, chunk > 0);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
-    check(h, d >= 0);
+    bt_h5_check(h, d >= 0);
     H5Pclose(create);
     H5Sclose(space);
     return d;
@@ -238,7 +237,7 @@ static void attr(bt_h5 *h, const char *object, const char *name, hid_t type, con
     const hid_t space = H5Screate(H5S_SCALAR), o = H5Oopen(h->file, object, H5P_DEFAULT);
     if (o >= 0 && H5Aexists(o, name) > 0) H5Adelete(o, name);
     const hid_t a = o < 0 ? -1 : H5Acreate2(o, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
-    check(h, a >= 0 && H5Awrite(a, type, value) >= 0);
+    bt_h5_check(h, a >= 0 && H5Awrite(a, type, value) >= 0);
     if (a >= 0) H5Aclose(a);
     if (o >= 0) H5Oclose(o);
     H5Sclose(space);
@@ -275,7 +274,7 @@ hid_t bt_h5_growing(bt_h5 *h, const char *name, hid_t type, int rank, const hsiz
     }
     const hid_t space = H5Screate_simple(rank, now, most), create = layout(h, rank, piece, packed);
     const hid_t d = H5Dcreate2(h->file, name, type, space, H5P_DEFAULT, create, H5P_DEFAULT);
-    check(h, d >= 0);
+    bt_h5_check(h, d >= 0);
     H5Pclose(create);
     H5Sclose(space);
     return d;
@@ -295,7 +294,7 @@ void bt_h5_extend(bt_h5 *h, hid_t dataset, hsize_t length)
     hsize_t size[3] = {0};
     const int rank = extent(dataset, size);
     size[0] = length;
-    check(h, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
+    bt_h5_check(h, rank >= 1 && H5Dset_extent(dataset, size) >= 0);
 }
 
 /// A block of a dataset, from start, of the given size.
@@ -304,7 +303,7 @@ static void write_block(bt_h5 *h, hid_t dataset, hid_t mem, int rank, const hsiz
 {
     const hid_t space = H5Dget_space(dataset), here = H5Screate_simple(rank, size, NULL);
     const bool filled = H5Sget_simple_extent_npoints(here) > 0;
-    check(h, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
+    bt_h5_check(h, H5Sselect_hyperslab(space, H5S_SELECT_SET, start, NULL, size, NULL) >= 0 &&
                  (!filled || H5Dwrite(dataset, mem, here, space, H5P_DEFAULT, data) >= 0));
     H5Sclose(here);
     H5Sclose(space);
@@ -362,7 +361,7 @@ uint64_t bt_h5_address(bt_h5 *h, hid_t dataset, bool frames, hsize_t frame, hsiz
         if (address != HADDR_UNDEF) address += BT_CHECKSUM_BYTES;
 #endif
     }
-    check(h, address != HADDR_UNDEF);
+    bt_h5_check(h, address != HADDR_UNDEF);
     return address;
 }
 
@@ -370,5 +369,5 @@ void bt_h5_write_raw(bt_h5 *h, uint64_t address, size_t bytes, const void *data)
 {
     if (h->status != BT_OK) return;
     *h->errnum = bt_file_put(h->raw, (off_t)address, data, bytes);
-    check(h, true);
+    bt_h5_check(h, true);
 }

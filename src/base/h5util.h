@@ -36,6 +36,9 @@ void bt_h5_sync_raw(bt_h5 *h);
 /// Close; releases the path. Returns the status of the whole, this call included.
 bt_status bt_h5_close(bt_h5 *h);
 
+/// After writes: HDF5's own word, and what the driver has kept from it. What is not `done` fails the handle.
+void bt_h5_check(bt_h5 *h, bool done);
+
 void bt_h5_group(bt_h5 *h, const char *name);
 /// Whole dataset [n] (width 0) or [n][width], contiguous. mem: H5T_NATIVE_...
 void bt_h5_write(bt_h5 *h, const char *name, hid_t mem, hsize_t n, hsize_t width, const void *data);

@@ -81,8 +81,12 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// Into a protected by a checksum HDF5 file and back; errors as bt_checksum_check, and BT_ERR_IO.
-bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err);
+/// What an array is, and its units (NULL: it is text); NULL where that is not known.
+typedef const char *bt_item_meaning(const char *name, const char **units);
+
+/// Into an HDF5 file protected by a checksum, with what each array is unless meaning is NULL, and back; errors as
+/// bt_checksum_check, and BT_ERR_IO.
+bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err);
 bt_status bt_snapshot_read(bt_snapshot *s, const char *path, bt_errors *err);
 
 #endif

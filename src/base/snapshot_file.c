@@ -34,7 +34,7 @@ static void enter(bt_h5 *h, const bt_snapshot *s, int k)
     bt_h5_group(h, group);
 }
 
-bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *err)
+bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_meaning *meaning, bt_errors *err)
 {
     bt_h5 h;
     bt_status status = bt_h5_create_with_room(&h, path, err);
@@ -46,6 +46,10 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_errors *e
         snprintf(name, sizeof name, "/%s", i->name);
         if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&h, name, i->data);
         else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
+        const char *units, *text = meaning ? meaning(i->name, &units) : NULL;
+        if (!text) continue;
+        if (units) bt_h5_attr_text(&h, name, "units", units);
+        bt_h5_attr_text(&h, name, "long_name", text);
     }
     status = bt_h5_close(&h);
     return status == BT_OK ? bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, err) : status;

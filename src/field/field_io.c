@@ -25,18 +25,12 @@
 #include "field/field_admit.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/h5util.h"
+#include "base/h5axes.h"
 #include "case/ice_bounds.h"
 #include "base/largest.h"
 #include "base/checksum.h"
 
 // ---- write ----
-
-static void describe(bt_h5 *h, const char *dataset, const char *units, const char *description)
-{
-    bt_h5_attr_text(h, dataset, "units", units);
-    bt_h5_attr_text(h, dataset, "description", description);
-}
 
 bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err)
 {
@@ -54,16 +48,20 @@ bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, 
         bt_h5_write(&h, "/floes/pose", H5T_NATIVE_DOUBLE, n, 3, f->pose);
         bt_h5_write(&h, "/floes/thickness", H5T_NATIVE_DOUBLE, n, 0, f->thickness);
         bt_h5_write(&h, "/floes/area", H5T_NATIVE_DOUBLE, n, 0, f->area);
-        describe(&h, "/floes/offsets", "1", "first vertex of each floe, and the number of vertices");
-        describe(&h, "/floes/vertices", "m", "outlines, body frame, anticlockwise about the centroid");
-        describe(&h, "/floes/pose", "m, m, rad", "x, y, yaw");
-        describe(&h, "/floes/thickness", "m", "thickness");
-        describe(&h, "/floes/area", "m2", "area");
+        bt_h5_describe(&h, "/floes/offsets", "floe_end", "1",
+                       "first vertex of each floe, and the number of vertices");
+        bt_h5_describe(&h, "/floes/vertices", "floe_vertex xy", "m",
+                       "outlines, body frame, anticlockwise about the centroid");
+        bt_h5_describe(&h, "/floes/pose", "floe component", "m, m, rad", "x, y, yaw");
+        bt_h5_describe(&h, "/floes/thickness", "floe", "m", "thickness");
+        bt_h5_describe(&h, "/floes/area", "floe", "m2", "area");
         bt_h5_attr_double(&h, "/floes", "ice_area", f->ice_area);
         bt_h5_attr_double(&h, "/floes", "concentration", f->concentration);
         bt_h5_attr_int(&h, "/floes", "n_floes", f->n);
         char *text = bt_case_resolved(c);
         bt_h5_write_text(&h, "/case", text ? text : "");
+        bt_h5_describe(&h, "/case", NULL, NULL, "the case with every key, in SI units");
+        bt_h5_describe_file(&h, c->run.title);
         free(text);
         bt_h5_attr_text(&h, "/", "program", "bergtow " BT_VERSION);
         status = bt_h5_close(&h);

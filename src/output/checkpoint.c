@@ -11,12 +11,13 @@
 #include "base/fileio.h"
 #include "base/checksum.h"
 #include "base/snapshot.h"
+#include "output/checkpoint_names.h"
 
 bt_status bt_checkpoint_write(const bt_snapshot *s, const char *dir, const char *name, bt_errors *err)
 {
     char *path = bt_file_join(dir, name), *before = bt_file_join(dir, BT_CHECKPOINT_BEFORE),
          *damaged = bt_file_join(dir, BT_CHECKPOINT_DAMAGED), *part = bt_text_of("%s.tmp", path);
-    bt_status status = bt_snapshot_write(s, part, err);
+    bt_status status = bt_snapshot_write(s, part, bt_checkpoint_meaning, err);
     if (status == BT_OK && !strcmp(name, BT_CHECKPOINT_FILE) && access(path, F_OK) == 0) {
         // One that has been damaged meanwhile must not take the place of a sound one.
         bt_errors unheard = {0};

@@ -22,7 +22,7 @@
 #include <unistd.h>
 
 #include "base/fileio.h"
-#include "base/h5util.h"
+#include "base/h5axes.h"
 
 #define COMPRESSED_ROWS (-2)
 
@@ -89,27 +89,21 @@ static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_
     free(u);
 }
 
-static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
-{
-    bt_h5_attr_text(h, path, "units", units);
-    bt_h5_attr_text(h, path, "description", text);
-}
-
 static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
 {
     bt_h5_group(h, "/places");
     bt_h5_attr_double(h, "/places", "time", p->time);
     bt_h5_attr_double(h, "/places", "dt", p->dt);
     bt_h5_write(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body);
-    describe(h, "/places/body", "1", "ids of the two bodies of each contact");
+    bt_h5_describe(h, "/places/body", NULL, "1", "ids of the two bodies of each contact");
     bt_h5_write(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal);
-    describe(h, "/places/normal", "1", "from the first body to the second, world frame");
+    bt_h5_describe(h, "/places/normal", NULL, "1", "from the first body to the second, world frame");
     bt_h5_write(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever);
-    describe(h, "/places/lever", "m",
+    bt_h5_describe(h, "/places/lever", NULL, "m",
              "from the centroid of the first and of the second body to the contact point, world frame, at the start of "
              "the step");
     bt_h5_write(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose);
-    describe(h, "/places/pose", "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
+    bt_h5_describe(h, "/places/pose", NULL, "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
 }
 
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,

@@ -12,6 +12,7 @@
 #include "bergtow/shape.h"
 #include "output/xdmf.h"
 #include "base/elementary.h"
+#include "base/h5axes.h"
 
 _Static_assert(BT_MAX_VERTICES <= UINT8_MAX, "n_vertices counts in bytes");
 
@@ -36,9 +37,6 @@ static outlines create_outlines(bt_h5 *h, const char *group, const char *height,
         // Vertex numbers in XDMF are of 32 bits here: enough for 2^31 vertices a block.
         .topology = bt_slab_fixed(h, topology, H5T_NATIVE_INT32, n_vertices + 2 * n, 0, false),
     };
-    bt_h5_attr_text(h, NAMED("vertices"), "units", "m");
-    bt_h5_attr_text(h, NAMED(height), "units", "m");
-    bt_h5_attr_text(h, NAMED("area"), "units", "m2");
 #undef NAMED
     return o;
 }
@@ -46,13 +44,22 @@ static outlines create_outlines(bt_h5 *h, const char *group, const char *height,
 static void describe(bt_h5 *h, const bt_record_bodies *b)
 {
     const int64_t towed = b->towed < 0 ? -1 : b->towed - b->n_floes;
-    bt_h5_attr_text(h, "/floes/vertices", "description",
-                    "x, y in the frame of the floe, anticlockwise about its centroid");
-    bt_h5_attr_text(h, "/floes/offsets", "description", "floe i has the vertices offsets[i] up to offsets[i + 1]");
-    bt_h5_attr_text(h, "/bodies/height", "description", "draft + sail of the towed body, 0 for walls");
+    bt_h5_describe(h, "/floes/vertices", "floe_vertex xy", "m",
+                   "x, y in the frame of the floe, anticlockwise about its centroid");
+    bt_h5_describe(h, "/floes/offsets", "floe_end", "1", "floe i has the vertices offsets[i] up to offsets[i + 1]");
+    bt_h5_describe(h, "/floes/thickness", "floe", "m", "thickness of each floe");
+    bt_h5_describe(h, "/floes/area", "floe", "m2", "area of each floe");
+    bt_h5_describe(h, "/bodies/vertices", "body_vertex xy", "m",
+                   "x, y in the frame of the body, anticlockwise about its centroid");
+    bt_h5_describe(h, "/bodies/offsets", "body_end", "1", "body i has the vertices offsets[i] up to offsets[i + 1]");
+    bt_h5_describe(h, "/bodies/height", "body", "m", "draft + sail of the towed body, 0 for walls");
+    bt_h5_describe(h, "/bodies/area", "body", "m2", "area of each body");
+    bt_h5_describe(h, "/xdmf/floes", "floe_cell", "1", "polygons of the floes as XDMF's mixed topology");
+    bt_h5_describe(h, "/xdmf/bodies", "body_cell", "1", "polygons of the other bodies as XDMF's mixed topology");
     bt_h5_write_names(h, "/bodies/names", (hsize_t)(b->n_bodies - b->n_floes), b->names);
+    bt_h5_describe(h, "/bodies/names", "body", NULL, "what each body is");
     bt_h5_write(h, "/bodies/towed", H5T_NATIVE_INT64, 1, 0, &towed);
-    bt_h5_attr_text(h, "/bodies/towed", "description", "which of these bodies is towed, -1 = none");
+    bt_h5_describe(h, "/bodies/towed", "one", "1", "which of these bodies is towed, -1 = none");
 }
 
 /// Bodies from .. from + n of the block b to rows first .. first + n of the datasets; `before`: vertices of the rows
@@ -121,15 +128,12 @@ static void create_datasets(bt_frames *f)
     f->body_pose = bt_slab_growing(h, "/frames/body_pose", H5T_NATIVE_DOUBLE, f->n_others, 3);
     f->contact_force = bt_slab_growing(h, "/frames/contact_force", H5T_NATIVE_DOUBLE, f->n_floes, 0);
     f->speed = bt_slab_growing(h, "/frames/speed", H5T_NATIVE_DOUBLE, f->n_floes + f->n_others, 0);
-    bt_h5_attr_text(h, "/frames/time", "units", "s");
-    bt_h5_attr_text(h, "/frames/pose", "units", "m, m, rad");
-    bt_h5_attr_text(h, "/frames/pose", "description", "x, y, yaw of each floe");
-    bt_h5_attr_text(h, "/frames/body_pose", "units", "m, m, rad");
-    bt_h5_attr_text(h, "/frames/body_pose", "description", "x, y, yaw of each of /bodies");
-    bt_h5_attr_text(h, "/frames/contact_force", "units", "N");
-    bt_h5_attr_text(h, "/frames/contact_force", "description", "largest normal contact force on the floe in the step");
-    bt_h5_attr_text(h, "/frames/speed", "units", "m/s");
-    bt_h5_attr_text(h, "/frames/speed", "description", "speed of the centroid: floes, then /bodies");
+    bt_h5_describe(h, "/frames/time", "time", "s", "time of each frame, since the start of the run");
+    bt_h5_describe(h, "/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe");
+    bt_h5_describe(h, "/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies");
+    bt_h5_describe(h, "/frames/contact_force", "time floe", "N",
+                   "largest normal contact force on the floe in the step");
+    bt_h5_describe(h, "/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies");
 }
 
 void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first)
@@ -202,6 +206,14 @@ static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, i
         .force = {.h = f->h, .dataset = -1, .piece = 1, .row_bytes = 4},
     };
     if (force) p.force = bt_slab_fixed(f->h, NAMED("force"), H5T_NATIVE_FLOAT, cells, 0, true);
+    // Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
+    const char *const names[] = {"points", "speed", "force"}, *const units[] = {"m", "m/s", "N"},
+                      *const texts[] = {"x, y of every vertex", "speed of the centroid",
+                                        "largest normal contact force in the step"};
+    for (int k = 0; k < (force ? 3 : 2); k++) {
+        bt_h5_attr_text(f->h, NAMED(names[k]), "units", units[k]);
+        bt_h5_attr_text(f->h, path, "long_name", texts[k]);
+    }
 #undef NAMED
     return p;
 }

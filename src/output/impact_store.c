@@ -7,6 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/h5axes.h"
+
 #define CHUNK 256 // rows of collisions in a chunk: 2 kB a column
 #define PIECE 8192 // rows that are read back at once
 
@@ -41,12 +43,6 @@ static void put_column(bt_impact *rows, int64_t n, int k, const double *x)
     for (int64_t i = 0; i < n; i++) memcpy((char *)&rows[i] + columns[k].offset, &x[i], sizeof *x);
 }
 
-static void describe(bt_h5 *h, const char *path, const char *units, const char *text)
-{
-    bt_h5_attr_text(h, path, "units", units);
-    bt_h5_attr_text(h, path, "description", text);
-}
-
 static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
 {
     bt_h5 *h = s->h;
@@ -61,21 +57,22 @@ static void create_panels(bt_impact_store *s, const bt_panels *p, bool series)
                     "the hull's perimeter in pieces of equal length, anticlockwise in (x, y), panel 0 centred on the "
                     "body's own x axis");
     bt_h5_write(h, "/panels/ends", H5T_NATIVE_DOUBLE, n + 1, 2, start);
-    describe(h, "/panels/ends", "m", "panel k reaches from point k to k + 1, frame of the towed body");
+    bt_h5_describe(h, "/panels/ends", "panel_end xy", "m",
+                   "panel k reaches from point k to k + 1, frame of the towed body");
     bt_h5_write(h, "/panels/middle", H5T_NATIVE_DOUBLE, n, 2, middle);
-    describe(h, "/panels/middle", "m", "middle of each panel, frame of the towed body");
+    bt_h5_describe(h, "/panels/middle", "panel xy", "m", "middle of each panel, frame of the towed body");
     bt_h5_write(h, "/panels/normal", H5T_NATIVE_DOUBLE, n, 2, normal);
-    describe(h, "/panels/normal", "1", "outward normal there");
+    bt_h5_describe(h, "/panels/normal", "panel xy", "1", "outward normal there");
     free(start);
     free(middle);
     free(normal);
     if (!series) return;
     s->force = bt_h5_growing(h, "/panels/force", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){n, 2}, (hsize_t[]){64, n}, false);
     s->normal = bt_h5_growing(h, "/panels/load", H5T_NATIVE_DOUBLE, 2, (hsize_t[]){n}, (hsize_t[]){64, n}, false);
-    describe(h, "/panels/force", "N",
+    bt_h5_describe(h, "/panels/force", "sample panel xy", "N",
              "contact force on each panel, x and y in the frame of the towed body, impulse / dt; a row for each entry "
              "of /series");
-    describe(h, "/panels/load", "N",
+    bt_h5_describe(h, "/panels/load", "sample panel", "N",
              "sum of the normal forces on each panel, impulse / dt; a row for each entry of /series");
 }
 
@@ -93,7 +90,11 @@ void bt_impact_store_create(bt_impact_store *s, bt_h5 *h, const bt_impacts *m, c
         snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
         s->column[k] = bt_h5_growing(h, path, columns[k].whole ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
                                      (hsize_t[]){CHUNK, 1}, false);
-        describe(h, path, columns[k].units, columns[k].description);
+        bt_h5_describe(h, path, NULL, columns[k].units, columns[k].description);
+    }
+    for (int k = 0; k < BT_IMPACT_COLUMNS; k++) { // when their time is there
+        snprintf(path, sizeof path, "/impacts/%s", columns[k].name);
+        bt_h5_axes(h, path, "time");
     }
     s->sum = bt_alloc(3 * (size_t)s->n_panels, sizeof *s->sum);
     create_panels(s, &m->panels, c->output.panels);
@@ -211,7 +212,7 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
     bt_h5_attr_double(h, "/panels", "from", w->start);
     bt_h5_attr_int(h, "/panels", "steps", w->n);
     bt_h5_write(h, "/panels/mean_force", H5T_NATIVE_DOUBLE, (hsize_t)n, 2, x);
-    describe(h, "/panels/mean_force", "N",
+    bt_h5_describe(h, "/panels/mean_force", "panel xy", "N",
              "mean contact force over the window, from the time `from` on, x and y in the frame of the towed body");
     const struct { const char *path, *text; } of_normals[] = {
         {"/panels/mean_load", "mean sum of the normal forces over the window, from the time `from` on"},
@@ -222,10 +223,10 @@ void bt_impact_store_totals(bt_impact_store *s, const bt_impact_count *c, const 
     };
     for (size_t k = 0; k < sizeof of_normals / sizeof *of_normals; k++) {
         bt_h5_write(h, of_normals[k].path, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, x + (2 + k) * n);
-        describe(h, of_normals[k].path, "N", of_normals[k].text);
+        bt_h5_describe(h, of_normals[k].path, "panel", "N", of_normals[k].text);
     }
     bt_h5_write(h, "/panels/collisions", H5T_NATIVE_INT64, (hsize_t)n, 0, count);
-    describe(h, "/panels/collisions", "1", "collisions in the window");
+    bt_h5_describe(h, "/panels/collisions", "panel", "1", "collisions in the window");
     free(x);
     free(count);
     free(before);

@@ -23,6 +23,7 @@
 #include "output/summary_keys.h"
 #include "base/checksum.h"
 #include "output/xdmf.h"
+#include "base/h5axes.h"
 
 #define FLUSH_SECONDS 5.0 // wall time between flushes
 
@@ -37,8 +38,7 @@ static void create_series(bt_record *r)
         const bt_quantity *f = bt_series(k);
         char *name = bt_file_join("/series", f->name);
         r->series[k] = bt_h5_growing(&r->h5, name, H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){BT_RECORD_BUFFER, 1}, false);
-        bt_h5_attr_text(&r->h5, name, "units", f->units);
-        bt_h5_attr_text(&r->h5, name, "description", f->description);
+        bt_h5_describe(&r->h5, name, NULL, f->units, f->description);
         bt_h5_attr_text(&r->h5, name, "merge", merge[f->keep]);
         bt_h5_attr_text(&r->h5, name, "applies", bt_applies_names[f->applies]);
         bt_h5_attr_int(&r->h5, name, "order", k); // a group lists its members by name
@@ -47,12 +47,17 @@ static void create_series(bt_record *r)
         if (f->summary) bt_h5_attr_text(&r->h5, name, "summary", f->summary);
         free(name);
     }
+    for (int k = 0; k < bt_n_series(); k++) { // when their time is there
+        char *name = bt_file_join("/series", bt_series(k)->name);
+        bt_h5_axes(&r->h5, name, "time");
+        free(name);
+    }
 }
 
 static void create_events(bt_record *r)
 {
     static const char *const names[4] = {"/events/time", "/events/kind", "/events/subject", "/events/value"};
-    static const char *const units[4] = {"s", "", "", "see kind"};
+    static const char *const units[4] = {"s", "1", "1", "see kind"};
     static const char *const texts[4] = {"end of the step", "index into kind_names",
                                          "which branch (line_broken) or way-point (waypoint), from 1",
                                          "tension N (line_broken), speed of the body m/s (adrift), way m (waypoint)"};
@@ -60,10 +65,10 @@ static void create_events(bt_record *r)
     for (int k = 0; k < 4; k++) {
         r->events[k] = bt_h5_growing(&r->h5, names[k], k % 3 ? H5T_NATIVE_INT64 : H5T_NATIVE_DOUBLE, 1, NULL,
                                      (hsize_t[]){64, 1}, false);
-        bt_h5_attr_text(&r->h5, names[k], "units", units[k]);
-        bt_h5_attr_text(&r->h5, names[k], "description", texts[k]);
+        bt_h5_describe(&r->h5, names[k], "time", units[k], texts[k]);
     }
     bt_h5_write_names(&r->h5, "/events/kind_names", BT_EVENT_KINDS, bt_event_names);
+    bt_h5_describe(&r->h5, "/events/kind_names", "event_kind", NULL, "what a number in kind stands for");
 }
 
 bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err)
@@ -154,6 +159,9 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
         bt_provenance_write(&r->h5, command_line);
         bt_h5_write_text(&r->h5, "/case", resolved);
         bt_h5_write_text(&r->h5, "/case_as_given", c->text ? c->text : "");
+        bt_h5_describe(&r->h5, "/case", NULL, NULL, "the case with every key, in SI units");
+        bt_h5_describe(&r->h5, "/case_as_given", NULL, NULL, "the case file as it was given");
+        bt_h5_describe_file(&r->h5, c->run.title);
         create_series(r);
         create_events(r);
         bt_frames_create(&r->frames, &r->h5, comm, b);

@@ -32,7 +32,7 @@
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
 #include "base/h5read.h"
-#include "base/h5util.h"
+#include "base/h5axes.h"
 #include "case/schema.h"
 #include "base/checksum.h"
 #include "bergtow/quantity.h"
@@ -156,8 +156,8 @@ static void write_series(bt_h5 *h, const table *t, const bt_study *s, const char
         }
         free(row);
         if (set >= 0) H5Dclose(set);
-        bt_h5_attr_text(h, name, "units", bt_series_find(series[k])->units);
-        bt_h5_attr_text(h, name, "description", bt_series_find(series[k])->description);
+        bt_h5_describe(h, name, "member sample", bt_series_find(series[k])->units,
+                       bt_series_find(series[k])->description);
         free(name);
     }
 }
@@ -193,7 +193,8 @@ static void write_parameter(bt_h5 *h, const bt_study *s, int p, int64_t n)
     if (number) bt_h5_write(h, name, H5T_NATIVE_DOUBLE, (hsize_t)n, 0, value);
     else bt_h5_write_names(h, name, (hsize_t)n, (const char *const *)text);
     const char *unit = key && key->type == BT_KEY_REAL ? bt_units_symbol(key->unit) : "";
-    bt_h5_attr_text(h, name, "units", *unit ? unit : "1");
+    bt_h5_describe(h, name, "member", number ? *unit ? unit : "1" : NULL,
+                   key ? key->doc : "which variant of the study");
     bt_h5_attr_text(h, name, "key", q->name);
     char *distribution = bt_study_distribution(q);
     bt_h5_attr_text(h, name, "distribution", distribution);
@@ -269,16 +270,32 @@ static void describe(bt_h5 *h, const char *name, const char *key, int order)
     const bt_meaning m = bt_summary_meaning(key);
     bt_h5_attr_text(h, name, "key", key);
     bt_h5_attr_int(h, name, "order", order);
+    bt_h5_describe(h, name, "member", m.known && *m.units ? m.units : "1", m.known ? m.description : key);
     if (!m.known) return;
     const struct {
         const char *name, *text;
-    } texts[] = {{"units", m.units},
-                 {"description", m.description},
-                 {"estimate", m.estimate},
+    } texts[] = {{"estimate", m.estimate},
                  {"label", m.label},
                  {"kind", m.kind}};
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         if (*texts[i].text) bt_h5_attr_text(h, name, texts[i].name, texts[i].text);
+}
+
+static void describe_members(bt_h5 *h)
+{
+    static const struct {
+        const char *name, *units, *meaning;
+    } columns[] = {{"/members/id", "1", "number of the member in the study, from 0"},
+                  {"/members/condition", "1", "which condition of the study, from 0"},
+                  {"/members/repeat", "1", "which field of the condition, from 0"},
+                  {"/members/seed", "1", "seed of its field"},
+                  {"/members/status", "1", "0 waiting, 1 finished, 2 failed"},
+                  {"/members/name", NULL, "folder of the member"},
+                  {"/members/state_hash", NULL, "hash of the state at its end"},
+                  {"/members/reason", NULL, "why it failed"}};
+    for (size_t k = 0; k < sizeof columns / sizeof *columns; k++)
+        bt_h5_describe(h, columns[k].name, "member", columns[k].units, columns[k].meaning);
+    bt_h5_attr_text(h, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
 }
 
 static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *dir)
@@ -289,16 +306,18 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
         finished += t->status[m] == BT_MEMBER_FINISHED;
         failed += t->status[m] == BT_MEMBER_FAILED;
     }
+    bt_h5_write(h, "/member", H5T_NATIVE_INT64, n, 0, t->id);
+    bt_h5_describe(h, "/member", "member", "1", "number of the member in the study, from 0");
     bt_h5_group(h, "/members");
     bt_h5_write(h, "/members/id", H5T_NATIVE_INT64, n, 0, t->id);
     bt_h5_write(h, "/members/condition", H5T_NATIVE_INT64, n, 0, t->condition);
     bt_h5_write(h, "/members/repeat", H5T_NATIVE_INT64, n, 0, t->repeat);
     bt_h5_write(h, "/members/seed", H5T_NATIVE_INT64, n, 0, t->seed);
     bt_h5_write(h, "/members/status", H5T_NATIVE_INT64, n, 0, t->status);
-    bt_h5_attr_text(h, "/members/status", "meaning", "0 waiting, 1 finished, 2 failed");
     bt_h5_write_names(h, "/members/name", n, (const char *const *)t->name);
     bt_h5_write_names(h, "/members/state_hash", n, (const char *const *)t->hash);
     bt_h5_write_names(h, "/members/reason", n, (const char *const *)t->reason);
+    describe_members(h);
     bt_h5_group(h, "/parameters");
     for (int p = 0; p < s->n_parameters; p++) write_parameter(h, s, p, t->n);
     bt_h5_group(h, "/summary");
@@ -310,16 +329,18 @@ static void write_all(bt_h5 *h, const table *t, const bt_study *s, const char *d
     }
     write_series(h, t, s, dir);
     bt_h5_write_text(h, "/study", s->text);
+    bt_h5_describe(h, "/study", NULL, NULL, "the study file as it was given");
+    bt_h5_describe_file(h, s->title);
     char *path = bt_file_join(dir, "study.resolved.yml"), *resolved;
     size_t size;
     bt_errors unheard = {0};
     if (bt_file_read(path, "a study", &resolved, &size, &unheard) == BT_OK)
-        bt_h5_write_text(h, "/study_resolved", resolved);
+        bt_h5_write_text(h, "/study_resolved", resolved),
+            bt_h5_describe(h, "/study_resolved", NULL, NULL, "what the members are, and the base case with every key");
     bt_errors_free(&unheard);
     free(resolved);
     free(path);
     bt_h5_attr_text(h, "/", "program", "bergtow " BT_VERSION);
-    if (s->title) bt_h5_attr_text(h, "/", "title", s->title);
     bt_h5_attr_int(h, "/", "n_members", t->n);
     bt_h5_attr_int(h, "/", "n_finished", finished);
     bt_h5_attr_int(h, "/", "n_failed", failed);

@@ -27,6 +27,7 @@
 #include "step/window.h"
 #include "base/checksum.h"
 #include "base/snapshot.h"
+#include "output/checkpoint_names.h"
 #include "output/state.h"
 
 static char folder[] = "/tmp/bergtow-checkpoint-XXXXXX";
@@ -443,7 +444,7 @@ static void damage_is_refused(void **state)
     bt_world_step(w);
     bt_snapshot later = {0};
     save(&t, w, &later);
-    must(bt_snapshot_write(&later, path, &err), &err);
+    must(bt_snapshot_write(&later, path, bt_checkpoint_meaning, &err), &err);
     size_t m;
     char *other = slurp(path, &m);
     assert_int_equal(m, n);
