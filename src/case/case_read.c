@@ -29,9 +29,33 @@ void bt_case_defaults(bt_case *c)
     bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
 }
 
+/// Is the first word of a text, which has more, a key of this section (with its dot)?
+static bool begins_with_key(const bt_key *keys, int n, const char *section, const char *text)
+{
+    char name[160];
+    const size_t word = strcspn(text, " \t:");
+    snprintf(name, sizeof name, "%.60s%.*s", section, word < 90 ? (int)word : 90, text);
+    return text[word] && (bt_schema_find(keys, n, name) >= 0 || bt_schema_is_section(name));
+}
+
+/// A text that is "key value", or "key:value" within { }; its key without the sections is written again.
+static void colon_missing(reader *r, int line, const char *section, const char *text)
+{
+    const size_t word = strcspn(text, " \t:");
+    size_t own = word;
+    while (own && text[own - 1] != '.') own--;
+    const int n = word - own > 60 ? 60 : (int)(word - own);
+    bt_errors_add(r->err, "%s:%d: %s%.64s: a colon%s is missing after the key; write %.*s: and then the value",
+                  r->c->path, line, section, text, text[word] == ':' ? " with a blank" : "", n, text + own);
+}
+
 static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
 {
     char buffer[64];
+    if (begins_with_key(keys, n, "", name)) {
+        colon_missing(r, line, where, name);
+        return;
+    }
     const char *near = bt_schema_suggest(keys, n, name, buffer);
     if (near)
         bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->c->path, line, where, name, near);
@@ -42,6 +66,15 @@ static bool is_nothing(const bt_node *node)
 {
     return node->kind == BT_NODE_SCALAR && node->plain &&
            (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
+}
+
+/// Is the value of a section "key value"?
+static bool lacks_colon(const bt_node *value, const char *name)
+{
+    char section[164];
+    snprintf(section, sizeof section, "%s.", name);
+    return value->kind == BT_NODE_SCALAR && value->plain &&
+           begins_with_key(bt_case_keys, bt_n_case_keys, section, value->text);
 }
 
 // Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed:
@@ -68,6 +101,10 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
             unknown_key(r, bt_case_keys, bt_n_case_keys, line, "", name);
         } else if (value->kind == BT_NODE_MAP) {
             walk(r, value, name);
+        } else if (lacks_colon(value, name)) {
+            char section[164];
+            snprintf(section, sizeof section, "%s.", name);
+            colon_missing(r, value->line, section, value->text);
         } else if (!is_nothing(value)) {
             bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->c->path,
                           line, name);
