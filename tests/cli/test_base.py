@@ -2,6 +2,7 @@
 """Case files with a base: what they mean, what is refused, and that every command and script takes them."""
 import json
 import random
+import sys
 
 import h5py
 import pytest
@@ -9,8 +10,8 @@ import yaml
 
 import random_cases
 from harness import BERGTOW, CASE, DONE, IO, ROOT, TOW, call, changed, differing, run, write_case
-import test_postproc  # noqa: F401  (puts postproc/ on the path)
 
+sys.path.insert(0, str(ROOT / "postproc"))
 import case_file  # noqa: E402
 from bergtow_read import Run  # noqa: E402
 import report_case  # noqa: E402

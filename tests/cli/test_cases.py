@@ -3,6 +3,7 @@
 it is from.
 """
 import re
+import sys
 
 import h5py
 import numpy as np
@@ -10,8 +11,8 @@ import pytest
 import yaml
 
 from harness import BERGTOW, DONE, ROOT, call, run
-import test_postproc  # noqa: F401  (puts postproc/ on the path)
 
+sys.path.insert(0, str(ROOT / "postproc"))
 from case_file import is_study  # noqa: E402
 
 FIELD = ROOT / "cases/field"
