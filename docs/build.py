@@ -25,16 +25,17 @@ HOME = """<!DOCTYPE html>
 
 
 def sphinx(kind, out, *more):
-    call = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", kind, "-d", out / f"doctrees-{kind}", "-c",
-            HERE, *more, out / "source", out / kind]
+    call = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", kind, "-d", out / f"doctrees-{kind}",
+            "-c", HERE, *more, out / "source", out / kind]
     if subprocess.run([str(word) for word in call]).returncode:
         sys.exit(f"docs/build.py: Sphinx ({kind}) complains; see above")
 
 
 def printed(html, folder):
-    """The page with its pictures and styles by their full names, and without links to files that are not in it."""
+    """The page with its pictures and styles by their full names; links within it stay there, others to files go."""
     html = re.sub(r'(<(?:img|link)\b[^>]*?\b(?:src|href)=")(?![a-z]+:)([^"?]+)',
                   lambda m: m[1] + (folder / m[2]).resolve().as_uri(), html)
+    html = re.sub(r'\bhref="[^":#]*#', 'href="#', html)
     html = re.sub(r'<a class="reference download[^>]*>(.*?)</a>', r"\1", html, flags=re.S)
     return re.sub(r"<script\b.*?</script>", "", html, flags=re.S)
 

@@ -33,7 +33,7 @@ autodoc_member_order = "bysource"
 
 
 def plain(app, what, name, obj, options, lines):
-    """Docstrings are plain text: what reStructuredText would take for markup is escaped, and indented lines are code."""
+    """Docstrings are plain text: what reStructuredText would take for markup is escaped; indented lines are code."""
     out = []
     for line in lines:
         code = line.startswith("    ")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pages of the manual from the public headers: what a header says at its head, then its declarations with the comments
-above or beside them. Functions become entries of Sphinx's C domain, so that the index and the search find them; anything
-else is shown as it stands."""
+above or beside them. Functions become entries of Sphinx's C domain, so that index and search find them; anything else
+is shown as it stands."""
 import re
 
 from tables import plain, write

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A tutorial of docs/tutorials as a newcomer follows it: a clean copy of the sources, nothing but the words of the page.
+"""A tutorial of docs/tutorials as a newcomer follows it: in a clean copy of the sources, by the page's words alone.
 
 Blocks are taken in their order. `sh` is run by a shell that ends at the first error; what comes under "Save ... as
 `NAME`:" is written to that file; `text` must have been printed by the command before, line by line; `console` is for a

@@ -20,7 +20,8 @@ typedef struct bt_case_files {
 } bt_case_files;
 
 /// Take over path and text of the case's own file, of size bytes, and read those that it is based on; every text is
-/// parsed. alone: a base is refused, and no file read. After an error, too, bt_case_files_free. Errors: BT_ERR_CASE, BT_ERR_IO (a base cannot be read).
+/// parsed. alone: a base is refused, and no file read. After an error, too, bt_case_files_free. Errors: BT_ERR_CASE,
+/// BT_ERR_IO (a base cannot be read).
 bt_status bt_case_files_read(bt_case_files *f, const char *path, const char *text, size_t size, bool alone,
                              bt_errors *err);
 void bt_case_files_free(bt_case_files *f);

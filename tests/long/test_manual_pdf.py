@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The manual on paper, which takes Chromium a minute: all of it is there, and no link leads to a file of this machine."""
-import re
+"""The manual on paper, which takes Chromium a minute: all of it is there, and no link leads to this machine."""
 import subprocess
 
 from harness import BERGTOW, ROOT
@@ -16,5 +15,4 @@ def test_the_manual_as_pdf(tmp_path):
                   "bt_simulation_create", "ice.rafting.kappa", "Gallery", "Contributing"):
         assert words in text, words
     said = subprocess.run(["pdfinfo", "-url", str(pdf)], capture_output=True, text=True, check=True).stdout
-    assert not re.search(r"file:.*(?<!page\.html)$(?<!#)", "\n".join(
-        line for line in said.splitlines() if "page.html#" not in line), re.M)
+    assert "file:" not in said, said
