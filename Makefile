@@ -60,8 +60,9 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev demo report bench \
-        fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
+.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev deps-docs docs demo report \
+        bench fullscale partition-study validation test test-long mutate lint tidy validate asan \
+        tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -178,10 +179,14 @@ DEPS := build-essential pkg-config git \
         libxxhash-dev \
         python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2
 
+# For make docs, which prints the PDF by the browser that reports are printed by.
+DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
+
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
 DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
-             poppler-utils python3-xarray python3-h5netcdf python3-netcdf4 python3-pip python3-setuptools python3-wheel
+             poppler-utils python3-xarray python3-h5netcdf python3-netcdf4 python3-pip python3-setuptools \
+             python3-wheel $(DEPS_DOCS)
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \
@@ -224,6 +229,13 @@ RUN ?=
 report: deps ## RUN=DIR: a run (with replay) or an ensemble as one HTML page, DIR/report.html
 	@[ -n "$(RUN)" ] || { echo "which run? make report RUN=out/demo"; exit 2; }
 	$(PYTHON) postproc/report.py $(RUN)
+
+deps-docs: ## install what make docs needs
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS) $(DEPS_DOCS)'
+
+docs: deps-docs ## the manual: build/docs/html/index.html and build/docs/bergtow.pdf
+	@$(AGAIN) CONFIG=release all
+	@PYTHONDONTWRITEBYTECODE=1 $(PYTHON) docs/build.py build/release/bergtow build/docs
 
 PYTEST := $(PYTHON) -m pytest -q -p no:cacheprovider
 deps-test: ## install what make test needs

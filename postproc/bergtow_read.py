@@ -23,11 +23,13 @@ import numpy as np
 # Units of a case file, as (up, down): the SI value is number * up / down. A bare angle is in degrees.
 _UNITS = {
     "": (1, 1), "%": (1, 100),
-    "m": (1, 1), "km": (1000, 1), "cm": (1, 100), "mm": (1, 1000), "nmi": (1852, 1),
+    "m": (1, 1), "km": (1000, 1), "cm": (1, 100), "mm": (1, 1000), "nmi": (1852, 1), "ft": (3048, 10000),
     "m/s": (1, 1), "cm/s": (1, 100), "mm/s": (1, 1000), "km/h": (1000, 3600), "kn": (1852, 3600),
+    "ft/s": (3048, 10000),
     "s": (1, 1), "ms": (1, 1000), "min": (60, 1), "h": (3600, 1), "d": (86400, 1),
     "rad": (1, 1), "deg": (np.pi, 180), "°": (np.pi, 180),
-    "N": (1, 1), "kN": (1e3, 1), "MN": (1e6, 1), "GN": (1e9, 1), "Pa": (1, 1), "kPa": (1e3, 1), "MPa": (1e6, 1),
+    "N": (1, 1), "kN": (1e3, 1), "MN": (1e6, 1), "GN": (1e9, 1), "tf": (9806.65, 1),
+    "Pa": (1, 1), "kPa": (1e3, 1), "MPa": (1e6, 1),
 }
 _ANGLES = ("tow.direction", "body.yaw", "water.latitude", "impact.corner_angle")
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bergtow_read import Run, RunError
+from case_file import files
 
 import numpy as np
 
@@ -41,8 +42,12 @@ class CaseRuns:
 
     def __post_init__(self):
         version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
-        #: a run is kept while the case, the program and the values are what they were
-        self.identity = hashlib.sha256(self.case.read_bytes() + version).hexdigest()
+        try:
+            parts = [path for path, _ in files(self.case)]
+        except RunError:
+            parts = [self.case]  # the program says what is wrong with it
+        #: a run is kept while the files of the case, the program and the values are what they were
+        self.identity = hashlib.sha256(b"".join(p.read_bytes() for p in parts) + version).hexdigest()
 
     def path(self, name, i):
         return self.folder / self.subject / name / f"f{i + 1:03d}"

@@ -23,6 +23,7 @@ import command
 import pdf
 import report
 from bergtow_read import Run, RunError
+from case_file import contents, files, is_study, section
 from case_runs import STOPPED, above_zero, program
 from ensemble import whole
 from ensemble_read import FINISHED, Ensemble
@@ -82,17 +83,6 @@ class Work:
                            "mend the case or the study")
         sys.stderr.write(said)
         return first.returncode == 0
-
-
-def contents(path):
-    """The file as YAML. Errors: RunError."""
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise RunError(path, f"cannot be read ({str(error).splitlines()[0]})", "name a case or a study file") from None
-    if not isinstance(found, dict):
-        raise RunError(path, "is neither a case nor a study", "name a case or a study file")
-    return found
 
 
 def reads_ice(case):
@@ -240,8 +230,7 @@ def arguments(argv):
 
 def main(argv=None):
     a, began = arguments(argv), time.monotonic()
-    found = contents(a.file)
-    study = "base" in found
+    study = is_study(program(), contents(a.file))
     if a.budget is None and not study:
         a.budget = BUDGET
     if not a.no_pdf:
@@ -256,7 +245,8 @@ def main(argv=None):
     if study:
         work.ensemble(a.file)
     else:
-        run_case(work, a, found)
+        layers = files(a.file)
+        run_case(work, a, {name: section(layers, name) for name in ("run", "ice")})
     if not a.no_replay:
         make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
     report.write_all(a.output, [a.output / name for name in made], a)

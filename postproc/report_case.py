@@ -46,9 +46,10 @@ class Value:
 
 
 def annotated(text):
-    """{"section.key": (value as written, comment behind it)} of a case in YAML; {} where it cannot be parsed."""
+    """{"section.key": (value as written, comment behind it)} of a case in YAML; {} where it cannot be parsed. A case
+    with a base has a document for each of its files, and the first that has a key holds."""
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
+        roots = list(yaml.compose_all(text, Loader=yaml.SafeLoader))
     except yaml.YAMLError:
         return {}
     out = {}
@@ -58,17 +59,18 @@ def annotated(text):
             for key, value in node.value:
                 walk(value, [*path, str(key.value)])
             return
-        if path[:1] == ["floes"]:
+        if path[:1] in (["floes"], ["base"]):
             return
         rest = text[node.end_mark.index:].split("\n",
                                                 1)[0] if isinstance(node, yaml.ScalarNode) or node.flow_style else ""
         comment = re.match(r"\s+#\s*(.*)", rest)
         value = node.value if isinstance(node, yaml.ScalarNode) else " ".join(
             text[node.start_mark.index:node.end_mark.index].split())
-        out[".".join(path)] = (value, comment[1].strip() if comment else "")
+        out.setdefault(".".join(path), (value, comment[1].strip() if comment else ""))
 
-    if root is not None:
-        walk(root, [])
+    for root in roots:
+        if root is not None:
+            walk(root, [])
     return out
 
 

@@ -73,7 +73,8 @@ enum { BT_EXTRA_KEYS = 32 }; ///< keys that can be added
 
 typedef struct bt_case {
     char *path;       ///< file name as given, for messages
-    char *text;       ///< the file's text
+    char *text;       ///< the file's text; with a base, those of all its files as YAML documents
+    char *floes_path; ///< file that lists the floes, where it is a base of this one, for messages; else NULL
     struct {
         char *title;
         double dt;           ///< Δt, s
@@ -256,7 +257,8 @@ typedef struct bt_case {
     double extra[BT_EXTRA_KEYS]; ///< values of keys that are added to the table, those of force laws (forces.h), SI
 } bt_case;
 
-/// Read and check a case file; every error of the file is appended to err with file, line, key and remedy.
+/// Read and check a case file, with those that it is based on (its key `base`); every error of the files is appended to
+/// err with file, line, key and remedy.
 /// overrides: [n] texts "key=value" that replace the file's values. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_case_read(bt_case *c, const char *path, const char *const *overrides, int n, bt_errors *err);
 

@@ -349,6 +349,12 @@ const keys = {
     c: () => colourBy(state.colour + 1),
 };
 
+// Is half of the field, or half of what the window can show of it, in the window?
+function inSight() {
+    const box = canvas.getBoundingClientRect(), height = Math.min(box.height, innerHeight);
+    return Math.min(box.bottom, innerHeight) - Math.max(box.top, 0) >= height / 2;
+}
+
 function controls() {
     slider.max = T - 1;
     slider.oninput = () => { play(false); seek(slider.value); };
@@ -364,10 +370,13 @@ function controls() {
     follow.checked = state.follow;
     follow.disabled = head.towed === null;
     follow.onchange = () => setFollow(follow.checked);
-    root.addEventListener("keydown", (event) => {
-        const {tagName, type} = event.target, own = ["INPUT", "SELECT", "BUTTON"].includes(tagName);
+    // On the whole page, so that no click has to come first; where the replay is out of sight, Space and Home scroll.
+    document.addEventListener("keydown", (event) => {
+        const {tagName, type} = event.target, inside = root.contains(event.target),
+            own = ["INPUT", "SELECT", "TEXTAREA", "BUTTON", "SUMMARY"].includes(tagName);
         if (event.ctrlKey || event.altKey || event.metaKey || !keys[event.key]) return;
         if (own && (tagName === "SELECT" || type === "range" || event.key === " ")) return;
+        if (!inside && (own || !inSight())) return;
         event.preventDefault();
         keys[event.key](event);
     });

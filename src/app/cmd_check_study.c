@@ -9,6 +9,7 @@
 #include "base/fileio.h"
 #include "base/largest.h"
 #include "base/tree.h"
+#include "case/case_base.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -49,7 +50,7 @@ bool bt_check_is_study(const char *path)
     if (stat(path, &st) == 0 && S_ISREG(st.st_mode) &&
         bt_file_read(path, "a case file", &text, &size, &unheard) == BT_OK) {
         bt_node *root = bt_tree_parse(text, size, path, &unheard);
-        found = bt_tree_has(root, "base");
+        found = bt_case_is_study(root);
         bt_tree_free(root);
     }
     free(text);

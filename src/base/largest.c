@@ -13,6 +13,7 @@ void bt_largest_print(FILE *out)
         const char *unit;
     } rows[] = {
         {"case or study file", BT_MOST_TEXT_BYTES, "bytes"},
+        {"files that a case is based on", BT_MOST_BASES, ""},
         {"its nesting", BT_TREE_DEPTH, "levels"},
         {"its values", BT_TREE_NODES, "in all"},
         {"keys of one section", BT_TREE_MAP, ""},

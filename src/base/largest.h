@@ -16,6 +16,7 @@ enum {
     BT_MOST_TEXT_BYTES = 16 << 20,     ///< a case or study file
     BT_MOST_TABLE_BYTES = 64 << 20,    ///< a CSV table
     BT_MOST_OUTLINE_BYTES = 1 << 30,   ///< a GeoJSON file
+    BT_MOST_BASES = 16,                ///< files that a case is based on, one on the other
     BT_TREE_DEPTH = 16,                ///< nesting of a case or study
     BT_TREE_NODES = 2000000,           ///< values of one file
     BT_TREE_MAP = 256,                 ///< entries of one map

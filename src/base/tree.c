@@ -3,6 +3,7 @@
 #include "base/tree.h"
 
 #include "base/largest.h"
+#include "base/syntax.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +11,8 @@
 
 typedef struct {
     yaml_parser_t yaml;
-    const char *name;
+    const char *name, *text;
+    size_t n;
     bt_errors *err;
     int n_nodes;
     bool failed;
@@ -30,6 +32,23 @@ void bt_tree_free(bt_node *node)
     free(node);
 }
 
+static void tell_syntax(const parser *p)
+{
+    const yaml_parser_t *y = &p->yaml;
+    char why[BT_SYNTAX_WHY];
+    const bt_syntax s = {.text = p->text,
+                         .n = p->n,
+                         .problem = y->problem ? y->problem : "",
+                         .line = (int)y->problem_mark.line + 1,
+                         .begun = y->context ? (int)y->context_mark.line + 1 : 0};
+    const int line = bt_syntax_explain(&s, why);
+    if (line) bt_errors_add(p->err, "%s:%d: not valid YAML: %s", p->name, line, why);
+    else
+        bt_errors_add(p->err, "%s:%d: not valid YAML: %s%s%s; check indentation and colons near this line", p->name,
+                      s.line, y->problem ? y->problem : "unknown error", y->context ? " " : "",
+                      y->context ? y->context : "");
+}
+
 // The next event; on a syntax error one message and false.
 static bool next(parser *p, yaml_event_t *event)
 {
@@ -39,10 +58,7 @@ static bool next(parser *p, yaml_event_t *event)
     if (y->error == YAML_READER_ERROR)
         bt_errors_add(p->err, "%s: byte %zu is not UTF-8 text (%s); is this a case file? save it as UTF-8", p->name,
                       y->problem_offset, y->problem);
-    else
-        bt_errors_add(p->err, "%s:%zu: not valid YAML: %s%s%s; check indentation and colons near this line", p->name,
-                      y->problem_mark.line + 1, y->problem ? y->problem : "unknown error", y->context ? " " : "",
-                      y->context ? y->context : "");
+    else tell_syntax(p);
     return false;
 }
 
@@ -199,7 +215,7 @@ static bt_node *read_document(parser *p)
 
 bt_node *bt_tree_parse(const char *text, size_t n, const char *name, bt_errors *err)
 {
-    parser p = {.name = name, .err = err};
+    parser p = {.name = name, .text = text, .n = n, .err = err};
     if (!yaml_parser_initialize(&p.yaml)) {
         bt_errors_add(err, "%s: libyaml could not start; free some memory", name);
         return NULL;

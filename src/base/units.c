@@ -20,19 +20,20 @@ typedef struct {
     double up, down;
 } unit;
 
-// The first unit of a kind is the SI one.
+// The first unit of a kind is the SI one. ft: the international foot, 0.3048 m; tf: 1000 kg under standard gravity.
 static const unit units[] = {
     {"%", BT_UNIT_RATIO, 1, 100},
     {"m", BT_UNIT_LENGTH, 1, 1}, {"km", BT_UNIT_LENGTH, 1000, 1}, {"cm", BT_UNIT_LENGTH, 1, 100},
-    {"mm", BT_UNIT_LENGTH, 1, 1000}, {"nmi", BT_UNIT_LENGTH, 1852, 1},
+    {"mm", BT_UNIT_LENGTH, 1, 1000}, {"nmi", BT_UNIT_LENGTH, 1852, 1}, {"ft", BT_UNIT_LENGTH, 3048, 10000},
     {"m/s", BT_UNIT_SPEED, 1, 1}, {"cm/s", BT_UNIT_SPEED, 1, 100}, {"mm/s", BT_UNIT_SPEED, 1, 1000},
     {"km/h", BT_UNIT_SPEED, 1000, 3600}, {"kn", BT_UNIT_SPEED, 1852, 3600},
+    {"ft/s", BT_UNIT_SPEED, 3048, 10000},
     {"s", BT_UNIT_TIME, 1, 1}, {"ms", BT_UNIT_TIME, 1, 1000}, {"min", BT_UNIT_TIME, 60, 1},
     {"h", BT_UNIT_TIME, 3600, 1}, {"d", BT_UNIT_TIME, 86400, 1},
     {"rad", BT_UNIT_ANGLE, 1, 1}, {"deg", BT_UNIT_ANGLE, BT_PI, 180}, {"°", BT_UNIT_ANGLE, BT_PI, 180},
     {"rad/s", BT_UNIT_TURN, 1, 1}, {"deg/s", BT_UNIT_TURN, BT_PI, 180},
     {"N", BT_UNIT_FORCE, 1, 1}, {"kN", BT_UNIT_FORCE, 1e3, 1}, {"MN", BT_UNIT_FORCE, 1e6, 1},
-    {"GN", BT_UNIT_FORCE, 1e9, 1},
+    {"GN", BT_UNIT_FORCE, 1e9, 1}, {"tf", BT_UNIT_FORCE, 9806.65, 1},
     {"kg", BT_UNIT_MASS, 1, 1}, {"g", BT_UNIT_MASS, 1, 1000}, {"t", BT_UNIT_MASS, 1e3, 1},
     {"kt", BT_UNIT_MASS, 1e6, 1}, {"Mt", BT_UNIT_MASS, 1e9, 1},
     {"kg/m3", BT_UNIT_DENSITY, 1, 1}, {"kg/m^3", BT_UNIT_DENSITY, 1, 1}, {"kg/m³", BT_UNIT_DENSITY, 1, 1},
@@ -43,6 +44,12 @@ static const unit units[] = {
     {"N/m", BT_UNIT_LINE_LOAD, 1, 1}, {"kN/m", BT_UNIT_LINE_LOAD, 1e3, 1}, {"MN/m", BT_UNIT_LINE_LOAD, 1e6, 1},
 };
 enum { N_UNITS = sizeof units / sizeof *units };
+
+// Units written out as words: read, and neither listed nor written.
+static const struct {
+    const char *word, *symbol;
+} words[] = {{"foot", "ft"},   {"feet", "ft"},  {"knot", "kn"},    {"knots", "kn"}, {"second", "s"}, {"seconds", "s"},
+             {"minute", "min"}, {"minutes", "min"}, {"hour", "h"}, {"hours", "h"},  {"day", "d"},    {"days", "d"}};
 
 // froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b
 // time^c has the exponent 3 a + b + c/2.
@@ -110,6 +117,9 @@ static void list_units(bt_unit kind, char *out, size_t size)
 
 static const unit *find_unit(const char *symbol, size_t n, bt_unit kind)
 {
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (strlen(words[i].word) == n && !memcmp(words[i].word, symbol, n))
+            symbol = words[i].symbol, n = strlen(symbol);
     for (int i = 0; i < N_UNITS; i++)
         if ((kind == BT_UNIT_KINDS || units[i].kind == kind) && strlen(units[i].symbol) == n &&
             !memcmp(units[i].symbol, symbol, n))

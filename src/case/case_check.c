@@ -57,12 +57,12 @@ static char outside(const bt_case *c, box b, double x, double y)
 
 // ---- defaults that follow from other keys ----
 
-// A file that the case names, relative to the folder of the case file, as an absolute path: the resolved file lies
-// elsewhere.
-static void follow_file(const bt_case *c, char **file)
+// A file that the case names, relative to the folder of the file in which the key stands, as an absolute path: the
+// resolved file lies elsewhere.
+static void follow_file(const check *k, const char *key, char **file)
 {
     if (!*file || **file == '/') return;
-    char *folder = bt_file_folder(c->path ? c->path : ""), *absolute = realpath(folder, NULL);
+    char *folder = bt_file_folder(bt_check_file(k, key)), *absolute = realpath(folder, NULL);
     if (absolute) {
         char *joined = bt_file_join(absolute, *file);
         free(*file);
@@ -81,8 +81,9 @@ static void follow_start(bool drifts, double *vx, double *vy)
     fill(vy, 0);
 }
 
-static void follow(bt_case *c)
+static void follow(const check *k)
 {
+    bt_case *c = k->c;
     bool basin = c->domain.frame == BT_FRAME_BASIN;
     if (c->domain.ends == BT_BOUND_MOVING) bt_case_window_follow(c);
     fill(&c->domain.x0, basin ? 0 : -c->domain.length / 2);
@@ -106,10 +107,10 @@ static void follow(bt_case *c)
         follow_start(drift && !f->fixed, &f->vx, &f->vy);
     }
     if (c->output.frame_interval == 0 && c->run.duration > 0) c->output.frame_interval = c->run.duration / 200;
-    follow_file(c, &c->ice.field);
-    follow_file(c, &c->water.current_table);
-    follow_file(c, &c->air.wind_table);
-    follow_file(c, &c->ice.outlines);
+    follow_file(k, "ice.field", &c->ice.field);
+    follow_file(k, "water.current_table", &c->water.current_table);
+    follow_file(k, "air.wind_table", &c->air.wind_table);
+    follow_file(k, "ice.outlines", &c->ice.outlines);
 }
 
 // ---- checks ----
@@ -460,7 +461,8 @@ static void check_floe(const check *k, int index)
     const bt_case *c = k->c;
     const bt_floe_def *f = &c->floes[index];
     char where[256];
-    if (f->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", c->path ? c->path : "case", f->line, index);
+    const char *file = c->floes_path ? c->floes_path : c->path;
+    if (f->line > 0) snprintf(where, sizeof where, "%.180s:%d: floes[%d]", file ? file : "case", f->line, index);
     else snprintf(where, sizeof where, "%.180s: floes[%d]", c->path ? c->path : "case", index);
     bool polygon = f->shape == BT_BODY_POLYGON;
     const size_t before = k->err->n;
@@ -509,7 +511,7 @@ bt_status bt_case_check(bt_case *c, const bt_origin *from, bt_errors *err)
     check k = {.c = c, .from = from, .err = err};
     size_t before = err->n;
     bt_case_tow_course(&k);
-    follow(c);
+    follow(&k);
     bt_case_tow_follow(&k);
     bt_status loaded = bt_case_load_tables(c, err);
     size_t at_files = err->n;

@@ -10,7 +10,7 @@
 
 void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char out[256])
 {
-    const char *path = c->path ? c->path : "case";
+    const char *path = o && o->file ? o->file : c->path ? c->path : "case";
     if (o && o->set && o->place) snprintf(out, 256, "%.120s%.130s", o->place, o->set);
     else if (o && o->set) snprintf(out, 256, "--set %.240s", o->set);
     else if (o && o->line > 0) snprintf(out, 256, "%.160s:%d: %s", path, o->line, key);
@@ -20,6 +20,12 @@ void bt_case_locate(const bt_case *c, const bt_origin *o, const char *key, char 
 static const bt_origin *origin(const bt_check *k, const char *key)
 {
     return k->from ? &k->from[bt_schema_find(bt_case_keys, bt_n_case_keys, key)] : NULL;
+}
+
+const char *bt_check_file(const bt_check *k, const char *key)
+{
+    const bt_origin *o = origin(k, key);
+    return o && o->file && !o->set ? o->file : k->c->path ? k->c->path : "";
 }
 
 bool bt_check_given(const bt_check *k, const char *key)

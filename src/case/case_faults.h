@@ -7,7 +7,8 @@
 
 /// Where the value of a key comes from, for messages and to leave out checks on values that were refused already.
 typedef struct bt_origin {
-    int line;        ///< in the case file; 0 = default or override
+    int line;        ///< in the file; 0 = default or override
+    const char *file; ///< of the files of the case, NULL = its own
     const char *set; ///< the override "key=value", or NULL
     const char *place; ///< where that stands, "FILE:LINE: ", or NULL: in the command line
     bool faulty;     ///< refused; the member holds the default
@@ -23,6 +24,9 @@ typedef struct bt_check {
     const bt_origin *from; ///< [bt_n_case_keys], or NULL
     bt_errors *err;
 } bt_check;
+
+/// The file in which a key stands; the case's own where it is not given.
+const char *bt_check_file(const bt_check *k, const char *key);
 
 bool bt_check_given(const bt_check *k, const char *key);  ///< in the file or by an override
 bool bt_check_sound(const bt_check *k, const char *keys); ///< none of the keys, separated by blanks, was refused

@@ -5,6 +5,7 @@
 #include "bergtow/shape.h"
 #include "base/fileio.h"
 #include "base/largest.h"
+#include "case/case_base.h"
 #include "case/schema.h"
 #include "base/table.h"
 #include "base/tree.h"
@@ -17,10 +18,12 @@
 
 typedef struct {
     bt_case *c;
+    const char *path;         // of the file that is read
     bt_errors *err;
     bt_origin *from;          // [bt_n_case_keys]
     const bt_node **given;    // [bt_n_case_keys] the value of each key, or NULL
     const bt_node *floes;
+    const char *floes_path;
 } reader;
 
 void bt_case_defaults(bt_case *c)
@@ -29,19 +32,65 @@ void bt_case_defaults(bt_case *c)
     bt_schema_preset(bt_case_keys, bt_n_case_keys, c);
 }
 
+/// Is the first word of a text, which has more, a key of this section (with its dot)?
+static bool begins_with_key(const bt_key *keys, int n, const char *section, const char *text)
+{
+    char name[160];
+    const size_t word = strcspn(text, " \t:");
+    snprintf(name, sizeof name, "%.60s%.*s", section, word < 90 ? (int)word : 90, text);
+    return text[word] && (bt_schema_find(keys, n, name) >= 0 || bt_schema_is_section(name));
+}
+
+/// A text that is "key value", or "key:value" within { }; its key without the sections is written again.
+static void colon_missing(reader *r, int line, const char *section, const char *text)
+{
+    const size_t word = strcspn(text, " \t:");
+    size_t own = word;
+    while (own && text[own - 1] != '.') own--;
+    const int n = word - own > 60 ? 60 : (int)(word - own);
+    bt_errors_add(r->err, "%s:%d: %s%.64s: a colon%s is missing after the key; write %.*s: and then the value",
+                  r->path, line, section, text, text[word] == ':' ? " with a blank" : "", n, text + own);
+}
+
 static void unknown_key(reader *r, const bt_key *keys, int n, int line, const char *where, const char *name)
 {
     char buffer[64];
+    if (begins_with_key(keys, n, "", name)) {
+        colon_missing(r, line, where, name);
+        return;
+    }
     const char *near = bt_schema_suggest(keys, n, name, buffer);
     if (near)
-        bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->c->path, line, where, name, near);
-    else bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", r->c->path, line, where, name);
+        bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; did you mean %s?", r->path, line, where, name, near);
+    else bt_errors_add(r->err, "%s:%d: %s%.64s: unknown key; see bergtow --list-keys", r->path, line, where, name);
 }
 
 static bool is_nothing(const bt_node *node)
 {
     return node->kind == BT_NODE_SCALAR && node->plain &&
            (!*node->text || !strcmp(node->text, "~") || !strcmp(node->text, "null"));
+}
+
+/// Is the value of a section "key value"?
+static bool lacks_colon(const bt_node *value, const char *name)
+{
+    char section[164];
+    snprintf(section, sizeof section, "%s.", name);
+    return value->kind == BT_NODE_SCALAR && value->plain &&
+           begins_with_key(bt_case_keys, bt_n_case_keys, section, value->text);
+}
+
+/// The value of a key in the file that is read; one that stands in a file based on this holds.
+static void give(reader *r, int k, const bt_node *value, int line)
+{
+    if (!r->given[k]) {
+        r->given[k] = value;
+        r->from[k].line = line;
+        r->from[k].file = r->path;
+    } else if (r->from[k].file == r->path) {
+        bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them", r->path, line,
+                      bt_case_keys[k].name, r->from[k].line);
+    }
 }
 
 // Sort the entries of a map into the table of given values. Names may be nested (tow: {speed: 1}) or dotted (tow.speed:
@@ -55,21 +104,21 @@ static void walk(reader *r, const bt_node *map, const char *prefix)
         snprintf(name, sizeof name, "%s%s%.90s", prefix, *prefix ? "." : "", map->key[i]);
         int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
         if (k >= 0) {
-            if (r->given[k])
-                bt_errors_add(r->err, "%s:%d: %s: duplicate key, first given in line %d; remove one of them",
-                              r->c->path, line, name, r->from[k].line);
-            else {
-                r->given[k] = value;
-                r->from[k].line = line;
-            }
+            give(r, k, value, line);
         } else if (!strcmp(name, "floes")) {
-            r->floes = value;
+            if (!r->floes) r->floes = value, r->floes_path = r->path;
+        } else if (!strcmp(name, "base")) {
+            continue; // bt_case_files_read has followed it
         } else if (!bt_schema_is_section(name)) {
             unknown_key(r, bt_case_keys, bt_n_case_keys, line, "", name);
         } else if (value->kind == BT_NODE_MAP) {
             walk(r, value, name);
+        } else if (lacks_colon(value, name)) {
+            char section[164];
+            snprintf(section, sizeof section, "%s.", name);
+            colon_missing(r, value->line, section, value->text);
         } else if (!is_nothing(value)) {
-            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->c->path,
+            bt_errors_add(r->err, "%s:%d: %s: is a section and holds keys; write them indented below it", r->path,
                           line, name);
         }
     }
@@ -133,7 +182,7 @@ static void read_given(reader *r)
         if (r->from[k].faulty || r->from[k].set) continue;
         if (!r->given[k]) {
             if (key->preset) continue;
-            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->c->path, key->name,
+            bt_errors_add(r->err, "%s: %s: missing, and it has no default; add it (%s)", r->path, key->name,
                           key->doc);
             r->from[k].faulty = true;
             continue;
@@ -150,7 +199,7 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
     snprintf(item, sizeof item, "floes[%d].", index);
     if (map->kind != BT_NODE_MAP) {
         bt_errors_add(r->err, "%s:%d: floes[%d]: is not a map; write - {shape: disc, length: 1 m, x: 3 m, y: 0 m}",
-                      r->c->path, map->line, index);
+                      r->path, map->line, index);
         return false;
     }
     size_t before = r->err->n;
@@ -160,13 +209,13 @@ static bool read_floe(reader *r, const bt_node *map, int index, bt_floe_def *f)
             unknown_key(r, bt_floe_keys, bt_n_floe_keys, map->key_line[i], item, map->key[i]);
             continue;
         }
-        snprintf(where, sizeof where, "%.180s:%d: %s%s", r->c->path, map->key_line[i], item, bt_floe_keys[k].name);
+        snprintf(where, sizeof where, "%.180s:%d: %s%s", r->path, map->key_line[i], item, bt_floe_keys[k].name);
         read_value(&bt_floe_keys[k], f, map->item[i], where, r->err);
     }
     for (int k = 0; k < bt_n_floe_keys; k++) {
         const bool found = bt_floe_keys[k].preset || bt_tree_has(map, bt_floe_keys[k].name);
         if (!found)
-            bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->c->path, map->line,
+            bt_errors_add(r->err, "%s:%d: %s%s: missing, and it has no default; add it (%s)", r->path, map->line,
                           item, bt_floe_keys[k].name, bt_floe_keys[k].doc);
     }
     return r->err->n == before;
@@ -176,15 +225,17 @@ static void read_floes(reader *r)
 {
     const bt_node *list = r->floes;
     if (!list || is_nothing(list)) return;
+    r->path = r->floes_path;
+    if (strcmp(r->path, r->c->path)) r->c->floes_path = bt_text_copy(r->path);
     if (list->kind != BT_NODE_LIST) {
-        bt_errors_add(r->err, "%s:%d: floes: is not a list; begin each floe with - below it", r->c->path, list->line);
+        bt_errors_add(r->err, "%s:%d: floes: is not a list; begin each floe with - below it", r->path, list->line);
         return;
     }
     if (list->n > BT_MAX_FLOES_BY_HAND) {
         bt_errors_add(r->err,
                       "%s:%d: floes: has %d entries, at most %d are read; put large fields into an HDF5 file and name "
                       "it in ice.field",
-                      r->c->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
+                      r->path, list->line, list->n, BT_MAX_FLOES_BY_HAND);
         return;
     }
     r->c->floes = bt_alloc((size_t)list->n, sizeof *r->c->floes);
@@ -192,7 +243,7 @@ static void read_floes(reader *r)
     for (int i = 0; i < list->n; i++) {
         if (r->err->n - before >= BT_MOST_COMPLAINTS) {
             bt_errors_add(r->err, "%s:%d: floes[%d]: what follows is not looked at after %d errors; mend those first",
-                          r->c->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
+                          r->path, list->item[i]->line, i, BT_MOST_COMPLAINTS);
             return;
         }
         bt_floe_def f = {.line = list->item[i]->line};
@@ -220,7 +271,9 @@ static void read_override(reader *r, const char *set, const char *place)
     int k = bt_schema_find(bt_case_keys, bt_n_case_keys, name);
     if (k < 0) {
         const char *near = bt_schema_suggest(bt_case_keys, bt_n_case_keys, name, buffer);
-        if (!strcmp(name, "floes"))
+        if (!strcmp(name, "base"))
+            bt_errors_add(r->err, "%s: what a case is based on cannot be set here; edit the case file", where);
+        else if (!strcmp(name, "floes"))
             bt_errors_add(r->err, "%s: the list of floes cannot be set here; edit the case file", where);
         else if (bt_schema_is_section(name))
             bt_errors_add(r->err, "%s: %s is a section; set one of its keys, see bergtow --list-keys", where, name);
@@ -231,6 +284,7 @@ static void read_override(reader *r, const char *set, const char *place)
     r->from[k].set = set;
     r->from[k].place = place;
     r->from[k].line = 0;
+    r->from[k].file = NULL;
     if (bt_case_keys[k].type != BT_KEY_POINTS) {
         r->from[k].faulty = !bt_value_read(&bt_case_keys[k], r->c, value, true, why);
         if (r->from[k].faulty) bt_errors_add(r->err, "%s: %s", where, why);
@@ -251,41 +305,34 @@ static void begin_case(bt_case *c, const char *path)
 }
 
 /// The text of c into its values.
-static bt_status read_text(bt_case *c, size_t size, const char *const *overrides, const char *const *place, int n,
-                           bt_errors *err)
+static bt_status read_text(bt_case *c, size_t size, bool alone, const char *const *overrides,
+                           const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
-    const char *path = c->path;
-    bt_node *root = bt_tree_parse(c->text, size, path, err);
-    const char *kind = root && root->kind == BT_NODE_LIST ? "list" : "single text";
-    const bool is_map = root && root->kind == BT_NODE_MAP, study = bt_tree_has(root, "base");
-    if (root && !is_map)
-        bt_errors_add(err,
-                      "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
-                      path, kind);
-    else if (study)
-        bt_errors_add(err,
-                      "%s: is a study, by its key `base`, and no case; run it with `bergtow ensemble`, look at it with "
-                      "`bergtow check`",
-                      path);
-    else if (is_map && !root->n)
-        bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", path);
-    if (!is_map || study || !root->n) {
-        bt_tree_free(root);
-        return BT_ERR_CASE;
+    bt_case_files files;
+    bt_status status = bt_case_files_read(&files, c->path, c->text, size, alone, err);
+    free(c->text);
+    c->text = bt_case_files_text(&files);
+    if (status != BT_OK) {
+        bt_case_files_free(&files);
+        return status;
     }
     reader r = {.c = c, .err = err, .from = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_origin)),
                 .given = bt_alloc((size_t)bt_n_case_keys, sizeof(bt_node *))};
-    walk(&r, root, "");
+    for (int i = 0; i < files.n; i++) {
+        r.path = files.file[i].path;
+        walk(&r, files.file[i].root, "");
+    }
+    r.path = c->path;
     for (int i = 0; i < n; i++) read_override(&r, overrides[i], place ? place[i] : NULL);
     read_given(&r);
     read_floes(&r);
     size_t in_file = err->n;
-    bt_status status = bt_case_check(c, r.from, err);
+    status = bt_case_check(c, r.from, err);
     if (in_file > before) status = BT_ERR_CASE;
     free(r.from);
     free(r.given);
-    bt_tree_free(root);
+    bt_case_files_free(&files);
     return status;
 }
 
@@ -300,7 +347,7 @@ bt_status bt_case_read_placed(bt_case *c, const char *path, const char *const *o
     size_t size;
     begin_case(c, path);
     const bt_status status = bt_file_read(path, "a case file", &c->text, &size, err);
-    return status == BT_OK ? read_text(c, size, overrides, place, n, err) : status;
+    return status == BT_OK ? read_text(c, size, false, overrides, place, n, err) : status;
 }
 
 bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, const char *const *overrides,
@@ -309,7 +356,7 @@ bt_status bt_case_read_text(bt_case *c, const char *path, const char *text, cons
     begin_case(c, path);
     const size_t size = strlen(text);
     c->text = memcpy(bt_alloc(size + 1, 1), text, size + 1);
-    return read_text(c, size, overrides, place, n, err);
+    return read_text(c, size, false, overrides, place, n, err);
 }
 
 static void keep_table(bt_table *t, const bt_table *from)
@@ -327,7 +374,7 @@ bt_status bt_case_read_kept(bt_case *c, const char *path, const char *text, cons
     c->text = bt_text_copy(text);
     keep_table(&c->water.table, current);
     keep_table(&c->air.table, wind);
-    return read_text(c, strlen(text), NULL, NULL, 0, err);
+    return read_text(c, strlen(text), true, NULL, NULL, 0, err);
 }
 
 void bt_case_free(bt_case *c)
@@ -339,5 +386,6 @@ void bt_case_free(bt_case *c)
     free(c->floes);
     free(c->path);
     free(c->text);
+    free(c->floes_path);
     *c = (bt_case){0};
 }

@@ -2,7 +2,7 @@
 // Writing of a case: the resolved file, and the table of keys for --list-keys.
 #include "base/json.h"
 #include "base/largest.h"
-#include "case/schema.h"
+#include "case/case_base.h"
 #include "case/value.h"
 
 #include <stdio.h>
@@ -94,6 +94,8 @@ void bt_case_list_keys(void *stream)
           "floes: is a list of floes given by hand, each a map with the keys\n\n",
           out);
     list_keys(out, bt_floe_keys, bt_n_floe_keys);
+    fputs("\nA case file may begin with another one, and keep or replace its keys\n\n", out);
+    list_keys(out, &bt_base_key, 1);
     fputs("\nA study file, for bergtow ensemble, has these keys in place of sections; maps are shown in "
           "cases/studies/*.yml\n\n",
           out);
@@ -149,6 +151,7 @@ void bt_case_list_keys_json(void *stream)
     bt_json_open(&j, NULL, '{');
     json_keys(&j, "keys", bt_case_keys, bt_n_case_keys);
     json_keys(&j, "floe_keys", bt_floe_keys, bt_n_floe_keys);
+    json_keys(&j, "file_keys", &bt_base_key, 1);
     json_keys(&j, "study_keys", bt_study_keys, bt_n_study_keys);
     bt_json_close(&j, '}');
     fputs(j.text, stream);

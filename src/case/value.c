@@ -31,6 +31,15 @@ bool bt_value_range(const bt_key *k, bt_range *r)
            r->lo < r->hi;
 }
 
+/// A ratio of 2 and more that would do as a percentage is taken for one; 1.2 is as well a slip of 0.12.
+static void suggest_percent(const bt_key *k, const bt_range *r, double value, const char *text, char meant[64])
+{
+    const double ratio = value / 100;
+    if (k->unit != BT_UNIT_RATIO || strchr(text, '%')) return;
+    if (value < 2 || value > 100 || ratio < r->lo || ratio > r->hi) return;
+    snprintf(meant, 64, "did you mean %g or %g %%? ", ratio, value);
+}
+
 static bool in_range(const bt_key *k, double value, const char *text, char *why)
 {
     bt_range r;
@@ -38,7 +47,9 @@ static bool in_range(const bt_key *k, double value, const char *text, char *why)
     if ((r.lo_open ? value > r.lo : value >= r.lo) && (r.hi_open ? value < r.hi : value <= r.hi)) return true;
     const char *bare = bt_units_bare(k->unit);
     bool plain = !strcmp(bare, "-");
-    snprintf(why, BT_WHY, "%.40s is out of range; give a value in %s%s%s", text, k->range, plain ? "" : " ",
+    char meant[64] = "";
+    suggest_percent(k, &r, value, text, meant);
+    snprintf(why, BT_WHY, "%.40s is out of range; %sgive a value in %s%s%s", text, meant, k->range, plain ? "" : " ",
              plain ? "" : bare);
     return false;
 }

@@ -12,7 +12,7 @@ import pytest
 from harness import DONE, ROOT, call
 
 DOCS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-PAGES = [*DOCS, *sorted((ROOT / "cases").glob("*/README.md"))]
+PAGES = [*DOCS, *sorted((ROOT / "docs/tutorials").glob("*.md")), *sorted((ROOT / "cases").glob("*/README.md"))]
 PAGES += [ROOT / folder / "README.md" for folder in ("postproc", "tests", "partition")]
 HEADS = ("src", "include", "partition", "tests", "cases", "docs", "postproc")
 COMMANDS = {"budget", "capability", "converge", "design", "run", "check", "field", "ensemble", "resume", "diff",
@@ -40,8 +40,9 @@ def blocks(text):
 
 
 def commands(text):
-    """Lines of code blocks without their comments."""
-    return [re.sub(r"(^|\s)#\s.*", "", line) for _, lines in blocks(text) for line in lines]
+    """Lines of code blocks without their comments; a line that goes on in the next is one with it."""
+    lines = (re.sub(r"\\\n\s*", "", "\n".join(lines)).split("\n") for _, lines in blocks(text))
+    return [re.sub(r"(^|\s)#\s.*", "", line) for some in lines for line in some]
 
 
 def calls(text):
@@ -115,14 +116,15 @@ def test_links_lead_somewhere(path):
 
 @every_page
 def test_files_named_exist(path):
-    """Paths from the root or from the page's own folder; sources named alone, somewhere. NAME stands for any."""
+    """Paths from the root or from the page's own folder; sources named alone, somewhere, or as a file that the
+    reader is told to save. NAME stands for any."""
     text = re.sub(r"<!--.*?-->", "", path.read_text(), flags=re.S)
     own = [] if path in DOCS else [d.name for d in path.parent.iterdir() if d.is_dir()]
     paths = re.findall(rf"(?<![\w/.-])((?:{'|'.join([*HEADS, *own])})/[\w./*-]*\w)", text)
     assert paths or path not in DOCS
     for file in paths:
         assert "NAME" in file or (ROOT / file).exists() or (path.parent / file).exists(), file
-    names = {p.name for p in files()} | MADE_BY_RUNS
+    names = {p.name for p in files()} | MADE_BY_RUNS | set(re.findall(r"\bas\s+`(\w+\.\w+)`", text))
     for file in re.findall(r"(?<![\w/.<-])(\w+\.(?:c|h|py|sh|csv))\b(?!\()", text):
         assert file in names, file
 

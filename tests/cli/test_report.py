@@ -239,6 +239,32 @@ def test_plays_pauses_and_ends(page):
     assert js(page, "return bergtow.playhead") == 0
 
 
+def test_keys_need_no_click(page, tow):
+    """As long as the replay is in sight; elsewhere they scroll, and other controls keep theirs."""
+    def press(key):
+        ActionChains(page).send_keys(key).perform()
+        return js(page, "return bergtow.playhead")
+
+    js(page, "document.getElementById('replay-field').scrollIntoView({block: 'center'})")
+    assert js(page, "return document.activeElement.tagName") == "BODY"
+    assert press(Keys.ARROW_RIGHT) == 1 and press(Keys.END) == js(page, "return bergtow.frames") - 1
+    assert press(Keys.HOME) == 0
+    press(" ")
+    assert js(page, "return bergtow.playing")
+    press(" ")
+    assert not js(page, "return bergtow.playing")
+    assert js(page, "window.scrollTo(0, document.body.scrollHeight); return window.scrollY") > 0
+    until(lambda: js(page, "return document.getElementById('replay-field').getBoundingClientRect().bottom") < 0)
+    seek(page, 5)
+    assert press(Keys.ARROW_RIGHT) == 5 == press(Keys.HOME)
+    js(page, "document.getElementById('replay-field').scrollIntoView({block: 'center'});"
+       "const i = document.createElement('input'); i.id = 'other'; document.body.append(i);"
+       "i.focus({preventScroll: true})")
+    assert press("f") == 5 == press(Keys.HOME)
+    assert js(page, "return document.getElementById('other').value") == "f"
+    js(page, "document.getElementById('other').remove()")
+
+
 def test_slider_scrubs(page, tow):
     slider = page.find_element("id", "replay-time")
     js(page, "arguments[0].value = 57; arguments[0].dispatchEvent(new Event('input'))", slider)

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+// Case files with a base: "base: other.yml" reads that file first, and what stands beside it replaces keys of it one by
+// one. The list of floes is replaced as a whole. Rejected: YAML's own merge key `<<` with anchors, which stays within a
+// file and merges maps of the first level alone.
+#include "case/case_base.h"
+
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fileio.h"
+#include "base/largest.h"
+
+const bt_key bt_base_key = {
+    .name = "base",
+    .type = BT_KEY_TEXT,
+    .preset = "none",
+    .doc = "a case file whose keys hold where this file says nothing; relative to the folder of this file, as are the "
+           "files that each of the two names",
+};
+
+static const bt_node *entry(const bt_node *root, const char *key, int *line)
+{
+    for (int i = 0; root && root->kind == BT_NODE_MAP && i < root->n; i++)
+        if (!strcmp(root->key[i], key)) {
+            *line = root->key_line[i];
+            return root->item[i];
+        }
+    return NULL;
+}
+
+/// Is this word of the first level of a case alone: a section, a key with a dot, floes?
+static bool is_of_cases(const char *word)
+{
+    char section[64] = "";
+    const size_t n = strcspn(word, ".");
+    if (n < sizeof section) memcpy(section, word, n);
+    return !strcmp(word, "floes") || (strcmp(word, "report") && bt_schema_is_section(section));
+}
+
+bool bt_case_is_study(const bt_node *root)
+{
+    if (!bt_tree_has(root, "base")) return false;
+    bool of_cases = false;
+    for (int i = 0; i < root->n; i++) {
+        const char *word = root->key[i];
+        const bool both = !strcmp(word, "base") || !strcmp(word, "report");
+        if (!both && bt_schema_find(bt_study_keys, bt_n_study_keys, word) >= 0) return true;
+        of_cases = of_cases || is_of_cases(word);
+    }
+    return !of_cases;
+}
+
+static bt_case_file *add(bt_case_files *f, char *path, char *text, size_t size)
+{
+    f->file = bt_realloc(f->file, (size_t)f->n + 1, sizeof *f->file);
+    f->file[f->n] = (bt_case_file){.path = path, .text = text, .size = size};
+    return &f->file[f->n++];
+}
+
+/// Parse the last file, which must hold keys of a case.
+static bt_status parse(bt_case_files *f, bt_errors *err)
+{
+    bt_case_file *file = &f->file[f->n - 1];
+    const bt_node *root = file->root = bt_tree_parse(file->text, file->size, file->path, err);
+    if (!root) return BT_ERR_CASE;
+    if (root->kind != BT_NODE_MAP)
+        bt_errors_add(err,
+                      "%s: is not a case: the file holds a %s; write sections with keys, as in the files of cases/",
+                      file->path, root->kind == BT_NODE_LIST ? "list" : "single text");
+    else if (bt_case_is_study(root))
+        bt_errors_add(err,
+                      "%s: is a study, by its key `base` and no key of a case; run it with `bergtow "
+                      "ensemble`, look at it with `bergtow check`",
+                      file->path);
+    else if (!root->n)
+        bt_errors_add(err, "%s: holds no keys; a case needs at least run.dt and run.duration", file->path);
+    else return BT_OK;
+    return BT_ERR_CASE;
+}
+
+/// The file of this absolute path, or NULL.
+static const bt_case_file *find(const bt_case_files *f, const char *absolute)
+{
+    for (int i = 0; i < f->n; i++) {
+        char *other = realpath(f->file[i].path, NULL);
+        const bool same = other && !strcmp(other, absolute);
+        free(other);
+        if (same) return &f->file[i];
+    }
+    return NULL;
+}
+
+static bt_status read_base(bt_case_files *f, const bt_node *value, int line, bt_errors *err)
+{
+    const char *from = f->file[f->n - 1].path;
+    if (value->kind != BT_NODE_SCALAR || !*value->text) {
+        bt_errors_add(err, "%s:%d: base: needs the name of one file, as in base: basin-80.yml", from, line);
+        return BT_ERR_CASE;
+    }
+    char *folder = bt_file_folder(from),
+         *path = *value->text == '/' ? bt_text_copy(value->text) : bt_file_join(folder, value->text),
+         *absolute = realpath(path, NULL), *text = NULL;
+    const bt_case_file *twin = absolute ? find(f, absolute) : NULL;
+    bt_status status = BT_ERR_CASE;
+    size_t size = 0;
+    bt_errors why = {0};
+    if (twin)
+        bt_errors_add(err, "%s:%d: base: %s is read already: it, or its base, leads here; remove one of these keys",
+                      from, line, twin->path);
+    else if (f->n > BT_MOST_BASES)
+        bt_errors_add(err, "%s:%d: base: more than %d files, each based on the next; write the keys into fewer", from,
+                      line, BT_MOST_BASES);
+    else status = bt_file_read_to(path, "a case file", BT_MOST_TEXT_BYTES, &text, &size, &why);
+    for (size_t i = 0; i < why.n; i++) bt_errors_add(err, "%s:%d: base: %s", from, line, why.text[i]);
+    bt_errors_free(&why);
+    if (status == BT_OK) {
+        add(f, path, text, size);
+        path = text = NULL;
+        status = parse(f, err);
+    }
+    free(folder);
+    free(path);
+    free(absolute);
+    free(text);
+    return status;
+}
+
+bt_status bt_case_files_read(bt_case_files *f, const char *path, const char *text, size_t size, bool alone,
+                             bt_errors *err)
+{
+    *f = (bt_case_files){0};
+    char *copy = bt_alloc(size + 1, 1);
+    add(f, bt_text_copy(path), memcpy(copy, text, size), size);
+    bt_status status = parse(f, err);
+    int line = 0;
+    if (status == BT_OK && alone && bt_tree_has(f->file[0].root, "base")) {
+        bt_errors_add(err, "%s: base: a case that has been kept has none; the file is damaged", path);
+        status = BT_ERR_CASE;
+    }
+    for (const bt_node *base; status == BT_OK && (base = entry(f->file[f->n - 1].root, "base", &line));)
+        status = read_base(f, base, line, err);
+    return status;
+}
+
+void bt_case_files_free(bt_case_files *f)
+{
+    for (int i = 0; i < f->n; i++) {
+        free(f->file[i].path);
+        free(f->file[i].text);
+        bt_tree_free(f->file[i].root);
+    }
+    free(f->file);
+    *f = (bt_case_files){0};
+}
+
+char *bt_case_files_text(const bt_case_files *f)
+{
+    if (f->n == 1) return bt_text_copy(f->file[0].text);
+    bt_text text;
+    bt_text_begin(&text);
+    for (int i = 0; i < f->n; i++) {
+        const char *slash = strrchr(f->file[i].path, '/');
+        fprintf(text.out, "--- # %s\n%s\n", slash ? slash + 1 : f->file[i].path, f->file[i].text);
+    }
+    return bt_text_end(&text);
+}
