@@ -11,10 +11,21 @@ ifneq ($(filter $(CONFIG),fuzz tsan),)
 CC     := clang-14
 endif
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
-MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
-MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
-HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
-HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
+# MPI is that of $(MPICC), whichever it is, or without one what pkg-config knows. HDF5 is the one without MPI, for its
+# parallel driver is not used; or one of the same MPI, since its headers include mpi.h. To choose: make
+# MPICC=mpicc.mpich HDF5=hdf5-mpich, or all four variables of flags by hand (docs/install.md).
+MPICC    ?= mpicc
+known     = $(firstword $(foreach package,$(1),$(shell pkg-config --exists $(package) 2>/dev/null && echo $(package))))
+flags     = $(if $(2),$(shell pkg-config $(1) $(2)))
+MPI_SHOWN  := $(wordlist 2,99,$(shell $(MPICC) -show 2>/dev/null))
+MPI_PKG    := $(if $(MPI_SHOWN),,$(call known,ompi-c mpich mpi-c))
+MPI_CFLAGS := $(filter -I% -D%,$(MPI_SHOWN)) $(call flags,--cflags,$(MPI_PKG))
+MPI_LIBS   := $(filter-out -I% -D% -O% -f%,$(MPI_SHOWN)) $(call flags,--libs,$(MPI_PKG))
+HDF5       ?= $(call known,hdf5-serial $(if $(findstring mpich,$(MPI_LIBS)),hdf5-mpich) \
+                $(if $(findstring openmpi,$(MPI_CFLAGS)),hdf5-openmpi) hdf5)
+HDF5       := $(HDF5)
+HDF5_CFLAGS := $(call flags,--cflags,$(HDF5))
+HDF5_LIBS   := $(or $(call flags,--libs,$(HDF5)),-lhdf5)
 
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
 # same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
@@ -39,7 +50,9 @@ ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
 CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
+# argp is part of glibc, and a library of its own elsewhere.
+ARGP_LIBS := $(if $(wildcard $(addsuffix /libargp.*,/usr/lib /usr/local/lib)),-largp)
+LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) $(ARGP_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -72,10 +85,12 @@ help: ## this list
 # The stamp changes when the flags do, so that a new flag rebuilds everything.
 STAMP := $(BUILD)/flags
 $(STAMP): FORCE
-	@[ -n "$(HDF5_LIBS)" ] && command -v $(firstword $(CC)) >/dev/null || \
-	  { echo "the compiler or a library is missing; run: make deps"; exit 1; }
 	@mkdir -p $(BUILD)
-	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@
+	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || { \
+	  $(CC) $(CFLAGS) -MF /dev/null install/needs.c $(LDLIBS) -o $(BUILD)/needs 2>$(BUILD)/needs.log || { \
+	    echo "the compiler, MPI or a library is missing: make deps installs all of it on Debian;"; \
+	    echo "elsewhere see docs/install.md; the compiler said:"; head -5 $(BUILD)/needs.log; exit 1; }; \
+	  echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@; }
 FORCE:
 
 REV := $(BUILD)/revision.h

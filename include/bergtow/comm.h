@@ -20,14 +20,18 @@ typedef struct bt_comm {
 /// All ranks of the program. Before bt_comm_start, and after bt_comm_end: rank 0 of 1.
 const bt_comm *bt_comm_world(void);
 
+/// The MPI library in use and its version, as in "Open MPI v4.1.4"; written into text, which is returned.
+const char *bt_comm_library(char text[MPI_MAX_LIBRARY_VERSION_STRING]);
+
 /// One rank, whatever else runs: for work of a rank by itself.
 extern const bt_comm bt_comm_alone;
 
-/// Collective. Use MPI as the program has started it, which ends it, too; otherwise start it if a launcher (mpirun,
-/// srun) started this process: a plain start must neither pay for MPI_Init nor need a network. From here on an error of
-/// MPI ends all ranks, and so does an exit() of one rank alone where MPI was started here; an exit(0) or
-/// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line. argc, argv may be NULL.
-/// Errors: BT_ERR_USAGE, told on stderr.
+/// Collective. Use MPI as the program has started it, which ends it, too; otherwise start it if a launcher (mpirun of
+/// any MPI, srun) started this process: a plain start must neither pay for MPI_Init nor need a network. BERGTOW_MPI=yes
+/// or no in the environment decides instead. From here on an error of MPI ends all ranks, and so does an exit() of one
+/// rank alone where MPI was started here; an exit(0) or exit(BT_ERR_USAGE) is taken for one of all ranks, since they
+/// have the same command line. argc, argv may be NULL. Errors: BT_ERR_USAGE, told on stderr; also where the launcher
+/// has started several processes and MPI knows of one.
 bt_status bt_comm_start(int *argc, char ***argv);
 
 /// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst

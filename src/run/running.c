@@ -11,7 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include "bergtow/checkpoint.h"
 #include "contact/contacts.h"
@@ -24,6 +23,7 @@
 #include "case/case_check.h"
 #include "case/cost.h"
 #include "partition/domain.h"
+#include "base/cores.h"
 #include "base/fileio.h"
 #include "output/folder.h"
 #include "output/gather.h"
@@ -118,10 +118,8 @@ int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked)
 {
     if (asked > 0) return asked;
     if (c->run.threads > 0) return (int)c->run.threads;
-    if (comm->size == 1 || getenv("OMP_NUM_THREADS")) return omp_get_max_threads();
-    const int bound = omp_get_num_procs(), share = (int)sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here;
-    const int n = bound < share ? bound : share;
-    return n > 1 ? n : 1;
+    const int share = bt_cores_share(comm); // by all ranks, whatever the environment of each
+    return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }
 
 /// Start the team, with signals left to the main thread (as in bt_comm_start).
