@@ -165,6 +165,7 @@ static bool knows_all(const bt_launcher *by)
         fprintf(stderr, "bergtow: %d processes were started, but %s, the MPI of this program, knows of one; use its own "
                 "mpirun, or srun with the --mpi it needs (BERGTOW_MPI=no: processes that work apart)\n", by->size,
                 bt_comm_library(mpi));
+    else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // the launcher ends all when one has left so
     MPI_Finalize();
     return false;
 }
