@@ -71,7 +71,7 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev demo report bench \
+.PHONY: all help lib tests install uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev demo report bench \
         fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
@@ -186,27 +186,34 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git \
-        libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
-        libxxhash-dev \
-        python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2
+# An MPI or HDF5 that is here already serves. Open MPI, as it is the smaller one. python3-munkres and libblas-dev are
+# named to keep apt from their larger alternatives: scipy in place of munkres for the fonts of matplotlib, and with it
+# a C++ compiler and Boost; OpenBLAS's headers for scipy.
+DEPS_BUILD := gcc libc6-dev pkg-config $(if $(MPI_SHOWN)$(MPI_PKG),,libopenmpi-dev) $(if $(HDF5),,libhdf5-dev) \
+        librandom123-dev libyaml-dev libmetis-dev libjansson-dev libxxhash-dev
+DEPS_DEMO := $(DEPS_BUILD) \
+        python3 python3-numpy python3-h5py python3-matplotlib python3-munkres python3-pil python3-yaml python3-jinja2
+DEPS := $(DEPS_DEMO) libblas-dev python3-scipy
 
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
-DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
+DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
              poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
 
-deps: ## install the Debian packages that are missing
-	@missing=$$(for p in $(DEPS); do \
+# SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
+SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'
+deps: ## install the Debian packages that are missing, for all but the tests
+	@command -v dpkg-query >/dev/null || exit 0; missing=$$(for p in $(DEPS); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages" \
-	  "(on a bare system 250 MB to fetch, 1.1 GB on the disk, for the tests twice that;" \
-	  "some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages:" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
-	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
-	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
+	  echo "no root and no sudo here; install them with:"; \
+	  echo "  apt-get install --no-install-recommends" $$missing; exit 1; fi; \
+	echo "+ $$as apt-get update && $$as apt-get install --no-install-recommends ..."; \
 	$$as apt-get update -qq && \
+	LC_ALL=C apt-get install --no-install-recommends --assume-no $$missing 2>/dev/null | $(SIZE); \
+	echo "fetching and unpacking them: a minute or two, without a word"; \
 	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
 
 # For make lint, and for the other checks of developers; make test needs none of them.
@@ -222,15 +229,17 @@ deps-dev: ## install what tidy, tsan, valgrind, coverage and fuzz need
 # pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
 AGAIN := $(MAKE) --no-print-directory -j$(J)
 
+deps-demo: ## install what make demo needs: no scipy
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS_DEMO)'
+
 DEMO := out/demo
-demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw its pictures
+demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
 	@$(AGAIN) all
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
-	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
 	$(PYTHON) postproc/report.py $(DEMO)
-	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+	@echo "pictures:"; ls $(DEMO)/*.png
 	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
 
 RUN ?=
