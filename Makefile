@@ -14,6 +14,7 @@ CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
 # MPI is that of $(MPICC), whichever it is, or without one what pkg-config knows. HDF5 is the one without MPI, for its
 # parallel driver is not used; or one of the same MPI, since its headers include mpi.h. To choose: make
 # MPICC=mpicc.mpich HDF5=hdf5-mpich, or all four variables of flags by hand (docs/install.md).
+# MPI=no builds a program of one process.
 MPICC    ?= mpicc
 known     = $(firstword $(foreach package,$(1),$(shell pkg-config --exists $(package) 2>/dev/null && echo $(package))))
 flags     = $(if $(2),$(shell pkg-config $(1) $(2)))
@@ -21,6 +22,10 @@ MPI_SHOWN  := $(wordlist 2,99,$(shell $(MPICC) -show 2>/dev/null))
 MPI_PKG    := $(if $(MPI_SHOWN),,$(call known,ompi-c mpich mpi-c))
 MPI_CFLAGS := $(filter -I% -D%,$(MPI_SHOWN)) $(call flags,--cflags,$(MPI_PKG))
 MPI_LIBS   := $(filter-out -I% -D% -O% -f%,$(MPI_SHOWN)) $(call flags,--libs,$(MPI_PKG))
+ifeq ($(MPI),no)
+MPI_CFLAGS := -Iinstall/alone
+MPI_LIBS   :=
+endif
 HDF5       ?= $(call known,hdf5-serial $(if $(findstring mpich,$(MPI_LIBS)),hdf5-mpich) \
                 $(if $(findstring openmpi,$(MPI_CFLAGS)),hdf5-openmpi) hdf5)
 HDF5       := $(HDF5)
@@ -186,14 +191,15 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-# An MPI or HDF5 that is here already serves. Open MPI, as it is the smaller one. python3-munkres and libblas-dev are
+# An MPI or HDF5 that is here already serves. Open MPI is the smaller one. python3-munkres and libblas-dev are
 # named to keep apt from their larger alternatives: scipy in place of munkres for the fonts of matplotlib, and with it
 # a C++ compiler and Boost; OpenBLAS's headers for scipy.
-DEPS_BUILD := gcc libc6-dev pkg-config $(if $(MPI_SHOWN)$(MPI_PKG),,libopenmpi-dev) $(if $(HDF5),,libhdf5-dev) \
+DEPS_MPI := $(if $(MPI_SHOWN)$(MPI_PKG),,libopenmpi-dev)
+DEPS_BUILD := gcc libc6-dev pkg-config $(if $(HDF5),,libhdf5-dev) \
         librandom123-dev libyaml-dev libmetis-dev libjansson-dev libxxhash-dev
 DEPS_DEMO := $(DEPS_BUILD) \
         python3 python3-numpy python3-h5py python3-matplotlib python3-munkres python3-pil python3-yaml python3-jinja2
-DEPS := $(DEPS_DEMO) libblas-dev python3-scipy
+DEPS := $(DEPS_DEMO) $(DEPS_MPI) libblas-dev python3-scipy
 
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
@@ -214,7 +220,8 @@ deps: ## install the Debian packages that are missing, for all but the tests
 	$$as apt-get update -qq && \
 	LC_ALL=C apt-get install --no-install-recommends --assume-no $$missing 2>/dev/null | $(SIZE); \
 	echo "fetching and unpacking them: a minute or two, without a word"; \
-	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	  -o APT::Keep-Downloaded-Packages=false $$missing >/dev/null
 
 # For make lint, and for the other checks of developers; make test needs none of them.
 DEPS_LINT := cppcheck shellcheck pyflakes3
@@ -229,12 +236,12 @@ deps-dev: ## install what tidy, tsan, valgrind, coverage and fuzz need
 # pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
 AGAIN := $(MAKE) --no-print-directory -j$(J)
 
-deps-demo: ## install what make demo needs: no scipy
+deps-demo: ## install what make demo needs: neither MPI nor scipy
 	@$(MAKE) --no-print-directory deps DEPS='$(DEPS_DEMO)'
 
 DEMO := out/demo
 demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
-	@$(AGAIN) all
+	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
@@ -323,6 +330,11 @@ fuzz: all ## hostile input by libFuzzer: TARGET=case, study, outlines, field, ..
 validate: deps ## build/validate/bergtow: assertions, checks of the division, teams of threads for every loop
 	@$(AGAIN) CONFIG=validate all
 
+ifneq ($(filter install,$(MAKECMDGOALS)),)
+ifeq ($(MPI),no)
+$(error bergtow/comm.h of an installed library needs an MPI: make install without MPI=no)
+endif
+endif
 install: all lib $(BUILD)/share/bergtow.pc $(BUILD)/share/bergtow.1 ## program, library, scripts into DESTDIR PREFIX
 	@install/install.sh put $(BUILD) $(VERSION) $(PREFIX) $(DESTDIR)
 
