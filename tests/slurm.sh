@@ -96,8 +96,8 @@ refused() {
   shift
   timeout 60 "$@" run cases/basin/basin-50.yml --steps 1 -o "$folder/refused" --force --quiet \
     >"$folder/refused.log" 2>&1 || status=$?
-  echo "$name: code $status, $(grep -c 'knows of one' "$folder/refused.log") message"
-  [ $status != 0 ] && [ "$(grep -c 'knows of one' "$folder/refused.log")" = 1 ]
+  echo "$name: code $status, $(grep -c 'each is alone' "$folder/refused.log") message"
+  [ $status != 0 ] && [ "$(grep -c 'each is alone' "$folder/refused.log")" = 1 ]
   count $?
 }
 

@@ -162,9 +162,9 @@ static bool knows_all(const bt_launcher *by)
     if (size > 1 || by->size < 2) return true;
     char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
     if (by->first)
-        fprintf(stderr, "bergtow: %d processes were started, but %s, the MPI of this program, knows of one; use its own "
-                "mpirun, or srun with the --mpi it needs (BERGTOW_MPI=no: processes that work apart)\n", by->size,
-                bt_comm_library(mpi));
+        fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start it "
+                "with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
+                by->size, bt_comm_library(mpi));
     else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // the launcher ends all when one has left so
     MPI_Finalize();
     return false;
