@@ -35,9 +35,11 @@ HDF5_LIBS   := $(or $(call flags,--libs,$(HDF5)),-lhdf5)
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
 # same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
 # for AVX2.
+# -fno-tree-slp-vectorize: gcc 12 makes vfmaddsub, one rounding, of a multiplication and what it takes for addsub,
+# whatever -ffp-contract says, where a -march allows it; nothing here gains by that vectorizer.
 # -Wno-psabi: how vectors of four are passed to functions does not matter, as all of those are inlined.
 BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -MMD -MP -ffp-contract=off -fno-math-errno \
-          -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
+          -fno-tree-slp-vectorize -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
 endif
@@ -203,7 +205,8 @@ DEPS := $(DEPS_DEMO) $(DEPS_MPI) libblas-dev python3-scipy
 
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
-DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
+DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
+             chromium chromium-driver ffmpeg \
              poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
 
 # SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.

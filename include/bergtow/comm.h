@@ -63,8 +63,8 @@ bool bt_comm_any(const bt_comm *c, bool value);
 /// Collective. Returns when all ranks have called it; meanwhile the cores are free for the ranks that still work.
 void bt_comm_rest(const bt_comm *c);
 
-/// Until n requests are done. One after the other: gcc takes MPI_STATUSES_IGNORE, the address 1 in MPICH, for an array of
-/// no bytes that MPI_Waitall writes to.
+/// Until n requests are done. One after the other: gcc takes MPI_STATUSES_IGNORE, the address 1 in MPICH, for an array
+/// of no bytes that MPI_Waitall writes to.
 static inline void bt_comm_wait(int n, MPI_Request *request)
 {
     for (int i = 0; i < n; i++) MPI_Wait(&request[i], MPI_STATUS_IGNORE);

@@ -2,6 +2,7 @@
 // The program bergtow: options that need no command, and the way to the commands.
 #include "bergtow/comm.h"
 #include "app/cmd.h"
+#include "app/processor.h"
 #include "revision.h"
 #include "base/cores.h"
 #include "base/suggest.h"
@@ -78,14 +79,15 @@ static void unbind(void)
 
 // Before the constructors of any library, some of which take milliseconds; and an ignored signal stays so over the
 // second start, while a handler would not.
-static void ignore_signals(void)
+static void before_libraries(void)
 {
+    bt_processor_check();
     // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
     signal(SIGUSR1, SIG_IGN);
     // a file at its size limit is an error of the write, with a message, not the end of the program
     signal(SIGXFSZ, SIG_IGN);
 }
-__attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = ignore_signals;
+__attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = before_libraries;
 
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some

@@ -75,8 +75,8 @@ const char *bt_comm_library(char text[MPI_MAX_LIBRARY_VERSION_STRING])
 {
     int length;
     MPI_Get_library_version(text, &length);
-    // "Open MPI v4.1.4, package: ...", "MPICH Version:      4.0.2\nMPICH Release date: ...", "Intel(R) MPI Library 2021.9
-    // for ..."
+    // "Open MPI v4.1.4, package: ...", "MPICH Version:      4.0.2\nMPICH Release date: ...",
+    // "Intel(R) MPI Library 2021.9 for ..."
     text[strcspn(text, ",\n")] = 0;
     char *end = text;
     for (const char *p = text; *p; p++) // one blank for several
@@ -162,8 +162,8 @@ static bool knows_all(const bt_launcher *by)
     if (size > 1 || by->size < 2) return true;
     char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
     if (by->first)
-        fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start it "
-                "with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
+        fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start "
+                "it with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
                 by->size, bt_comm_library(mpi));
     else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // the launcher ends all when one has left so
     MPI_Finalize();

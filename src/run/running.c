@@ -123,8 +123,8 @@ int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked)
     return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }
 
-// Ranks wait for each other, and what one of them gains in a second says little. The validation build has all threads at
-// work, for the thread sanitizer.
+// Ranks wait for each other, and what one of them gains in a second says little. The validation build has all threads
+// at work, for the thread sanitizer.
 #ifdef BT_VALIDATE
 enum { PACED = 0 };
 #else
