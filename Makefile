@@ -78,7 +78,7 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev demo report bench \
+.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev demo report bench \
         fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
@@ -340,6 +340,9 @@ endif
 endif
 install: all lib $(BUILD)/share/bergtow.pc $(BUILD)/share/bergtow.1 ## program, library, scripts into DESTDIR PREFIX
 	@install/install.sh put $(BUILD) $(VERSION) $(PREFIX) $(DESTDIR)
+
+deb: ## Debian packages and their source package: build/deb
+	@install/deb.sh $(VERSION)
 
 uninstall: ## take away what make install has put into DESTDIR PREFIX
 	@install/install.sh remove $(PREFIX) $(DESTDIR)
