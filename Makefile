@@ -78,8 +78,9 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev demo report bench \
-        fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage fuzz
+.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev demo report \
+        bench fullscale partition-study validation test test-long mutate lint tidy validate asan tsan valgrind coverage \
+        fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
