@@ -35,11 +35,9 @@ HDF5_LIBS   := $(or $(call flags,--libs,$(HDF5)),-lhdf5)
 # -ffp-contract=off and never -ffast-math: every build of one compiler gives the same bits, on any processor. For the
 # same reason the target is the plain x86-64 (or ARM); only src/solve/batch.c, where the time goes, is also compiled
 # for AVX2.
-# -fno-tree-slp-vectorize: gcc 12 makes vfmaddsub, one rounding, of a multiplication and what it takes for addsub,
-# whatever -ffp-contract says, where a -march allows it; nothing here gains by that vectorizer.
 # -Wno-psabi: how vectors of four are passed to functions does not matter, as all of those are inlined.
 BASE   := -std=c17 -D_GNU_SOURCE -fopenmp -Iinclude -Isrc -I. -MMD -MP -ffp-contract=off -fno-math-errno \
-          -fno-tree-slp-vectorize -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
+          -Wall -Wextra -Wpedantic -Wshadow -Wno-psabi $(MPI_CFLAGS) $(HDF5_CFLAGS)
 ifeq ($(CI),true)
 BASE   += -Werror
 endif
@@ -56,7 +54,10 @@ OPT_coverage := -O1 -g --coverage -fprofile-abs-path -fprofile-update=atomic
 ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
-CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
+# Where a -march allows fused operations, the vectorizers of gcc 12 make vfmaddsub, with one rounding, of products and
+# what they take for addsub, whatever -ffp-contract says; gcc 14 does not.
+FUSES := $(shell $(CC) $(EXTRA_CFLAGS) -dM -E -x c /dev/null 2>/dev/null | grep -cE '__(FMA|AVX512F)__')
+CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS) $(if $(filter-out 0,$(FUSES)),-fno-tree-vectorize)
 # argp is part of glibc, and a library of its own elsewhere.
 ARGP_LIBS := $(if $(wildcard $(addsuffix /libargp.*,/usr/lib /usr/local/lib)),-largp)
 LDLIBS := $(HDF5_LIBS) $(MPI_LIBS) $(ARGP_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
