@@ -2,9 +2,9 @@
 """Started by the launcher of another MPI, as its environment tells; and BERGTOW_MPI."""
 import pytest
 
-from harness import USAGE, call, changed, environment, write_case
-from harness import BASE as CASE
+from harness import TOW, USAGE, call, changed, environment, write_case
 
+CASE = changed(TOW)
 MPICH = {"PMI_SIZE": 2}
 
 
