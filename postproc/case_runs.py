@@ -37,6 +37,7 @@ class CaseRuns:
     end: float             #: of what is left to a quantity, by time.monotonic()
     last: float            #: of the budget
     seconds: dict = field(default_factory=dict)  #: of a run, by setting
+    made: int = 0          #: runs that were made, and not there before
 
     def __post_init__(self):
         version = subprocess.run([str(self.program), "--version"], capture_output=True).stdout
@@ -80,6 +81,7 @@ class CaseRuns:
             return lines[0] if lines else f"exit code {done.returncode}"
         (path / "call.json").write_text(json.dumps([self.identity, *call]))
         self.seconds[name] = time.monotonic() - t0
+        self.made += 1
         return None
 
     def make(self, name, fields, values):

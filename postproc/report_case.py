@@ -242,10 +242,17 @@ def ranges():
 
 
 def preface(text):
-    """The comment at the head of a case file, without its marks: list of paragraphs."""
-    lines = []
+    """The comment at the head of a case file, without its marks: list of paragraphs. Lines of a sentence are joined;
+    items of a list, tables and what is set in keep theirs."""
+    paragraphs = [""]
     for line in text.splitlines():
         if not line.startswith("#"):
             break
-        lines.append(line.lstrip("#").strip())
-    return [p for p in ("\n".join(lines)).split("\n\n") if p.strip()]
+        line = line.lstrip("#").removeprefix(" ").rstrip()
+        if not line:
+            paragraphs.append("")
+        elif paragraphs[-1]:
+            paragraphs[-1] += ("\n" if re.match(r"\s|[-*|] ", line) else " ") + line
+        else:
+            paragraphs[-1] = line
+    return [p for p in paragraphs if p.strip()]

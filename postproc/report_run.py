@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the report of one run says: its numbers in words, its tables, its pictures. postproc/page/run.html sets it."""
 import re
+from dataclasses import replace
 
 import plot_field
 import plot_force
@@ -312,7 +313,7 @@ def breakable(text):
 
 def context(run, limit=LIMIT, compress=True, given=None):
     """Everything that page/run.html sets. Errors: RunError."""
-    values = report_case.values(run)
+    values = [replace(v, value=report_case.short(v.value)) for v in report_case.values(run)]
     warnings = run.summary.get("warnings")
     replay = Replay(run, limit, compress) if run.n_frames else None
     happened, n_events = events(run)

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -81,13 +82,27 @@ def test_a_start_that_jerks_the_line_is_found(tmp_path):
     assert [row["judged"] for row in slow["rows"]] == ["none"] and "25 s will do" in text
 
 
+def test_a_start_without_a_ramp_is_held_against_one_of_the_own_size(tmp_path):
+    found, text = converged(tmp_path, changed(LINE, tow__ramp=0), "--vary", "start", "--budget", 3, "--tries", 1)
+    row = found["rows"][0]
+    assert row["judged"] == "matters" and row["recommended"] == pytest.approx(2 / 0.13, rel=0.2)
+
+
+def test_a_ramp_ends_before_the_window(tmp_path):
+    """Four times 10 s would end behind the beginning of the window at 30 s; and from 24 s on nothing is left to try."""
+    found, text = converged(tmp_path, changed(LINE, tow__ramp=10), "--vary", "start", "--budget", 3, "--margin", 1e-3)
+    rows = found["rows"]
+    assert [(row["from"], row["to"], row["recommended"]) for row in rows] == [(10, 24, 24), (24, 24, None)]
+    assert [row["judged"] for row in rows] == ["matters"] * 2 and converge.WINDOW_TOO_EARLY in text
+
+
 def test_a_channel_that_is_too_narrow_is_found(tmp_path):
     """Dense ice that is pushed along between walls two body widths apart is another thing than a field."""
     dense = changed(CASE, ice__concentration=0.7, domain__width=4, run__duration=18, output__window_start=6)
     found, text = converged(tmp_path, dense, "--vary", "width", "--budget", 3, "--tries", 1)
     row = found["rows"][0]
     assert row["judged"] == "matters" and row["effect"] < -0.3 and row["fields"] <= 16 and not row["same_ice"]
-    assert "take 8 m, or wider" in text
+    assert "the walls are felt; without them, take 8 m or wider" in text
 
 
 def test_a_tolerance_that_does_not_matter_and_the_fields_that_the_mean_needs(tmp_path):
@@ -102,7 +117,7 @@ def test_runs_are_kept_and_a_spent_budget_is_told(tmp_path):
     found, _ = converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.2, "--margin", 1e-6)
     made = {p: p.stat().st_mtime_ns for p in tmp_path.glob("out/converge/*/*/summary.json")}
     assert found["rows"][0]["judged"] == "open" and found["rows"][0]["why"] in (
-        "the budget is spent", "64 fields scatter too much") and len(made) >= 5
+        "the budget is spent", f"{converge.FIELDS[-1]} fields scatter too much") and len(made) >= 5
     kept = [p for p in made if (p.parent / "call.json").exists()]
     converged(tmp_path, CASE, "--vary", "dt", "--budget", 0.02, "--margin", 1e-6)
     assert len(kept) >= 4 and all(p.stat().st_mtime_ns == made[p] for p in kept)
@@ -132,3 +147,26 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
     text = script("ensemble.py", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
     assert "take 20 m, or wider" in text and converge_text.verdicts(found) in text
+
+
+def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monkeypatch):
+    """The first is cheap. The second asks for half of the time, more than its equal share of it was."""
+    class Study:
+        made, end = 0, 0.0
+
+    asked = []
+
+    def vary(study, kind, margin, most):
+        asked.append((kind.name, study.end - time.monotonic()))
+        study.made += kind.name == "dt" and len(asked) < 8
+        enough = kind.name != "dt" or study.end - time.monotonic() > 50
+        return [{"name": kind.name, "judged": "none"} if enough else {"name": kind.name, "why": converge.SPENT}]
+
+    monkeypatch.setattr(converge, "vary", vary)
+    kinds = [k for k in converge.KINDS if k.name in ("start", "dt", "tolerance")]
+    found = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 90)
+    assert [name for name, _ in asked] == ["start", "dt", "tolerance", "dt"]
+    assert [rows[0].get("why") for rows in found.values()] == [None] * 3
+    assert [round(left) for _, left in asked] == [30, 45, 90, 90]
+    never, asked[:] = converge.varied(Study(), kinds, 0.1, 3, time.monotonic() + 30), []
+    assert never["dt"][0]["why"] == converge.SPENT

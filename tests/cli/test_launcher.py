@@ -2,15 +2,14 @@
 """Started by the launcher of another MPI, as its environment tells; and BERGTOW_MPI."""
 import pytest
 
-from harness import TOW, USAGE, call, changed, environment, write_case
+from harness import TOW, USAGE, call, environment, write_case
 
-CASE = changed(TOW)
 MPICH = {"PMI_SIZE": 2}
 
 
 @pytest.fixture
 def case(tmp_path):
-    return write_case(tmp_path, CASE)
+    return write_case(tmp_path, TOW)
 
 
 @pytest.mark.parametrize("rank", [0, 1])

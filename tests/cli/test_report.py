@@ -504,6 +504,8 @@ def test_where_each_value_comes_from():
     assert values["ice.density"].origin == "default: Hunke & Comeau 2011" and values[
         "ice.shake"].origin == "default, assumed" and values["tow.speed"].value == "0.2 m/s"
     assert report_case.preface(GIVEN) == ["Title.", "ASSUMED: the rest."]
+    assert report_case.preface("# A line\n# goes on.\n#\n# Made by\n#   make x\n# - one\n# two\nrun:") == [
+        "A line goes on.", "Made by\n  make x\n- one two"]
 
 
 @pytest.mark.parametrize("words, kind", [
@@ -532,6 +534,18 @@ def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
     assert values["ice.size"].kind == "assumed" and values[
         "ice.size"].origin == "set by the study: assumed: larger" and values["run.dt"].kind == "study"
     assert values["ice.length"].kind == "memory"
+
+
+def test_paper_has_every_key_with_its_meaning(tow, monkeypatch):
+    """What a page folds away, paper shows; numbers with the digits that they are worth."""
+    monkeypatch.setattr(report_run, "pictures", lambda _: [])
+    with Run(tow.dir) as run:
+        context = report_run.context(run)
+        keys = [v.key for v in report_case.values(run)]
+    on_paper = report.render("run.html", context, paper=True).partition('id="keys"')[2]
+    assert len(keys) > 100 and all(f"<code>{key}</code>" in on_paper for key in keys)
+    assert not re.search(r"<td class=.n.>-?\d+\.\d{9}", on_paper)
+    assert 'id="keys"' not in report.render("run.html", context)
 
 
 def test_every_key_is_labelled(tow):

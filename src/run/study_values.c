@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+// Values of a study: single ones, those of a parameter as a list or as a range with the distribution that is drawn
+// from, and the one that a condition takes.
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/elementary.h"
+#include "base/largest.h"
+#include "base/rng.h"
+#include "base/suggest.h"
+#include "case/schema.h"
+#include "case/value.h"
+#include "run/study_values.h"
+
+void bt_study_complain(const bt_study_reader *r, int line, const char *fmt, ...)
+{
+    char text[600];
+    va_list ap;
+    va_start(ap, fmt);
+    vsnprintf(text, sizeof text, fmt, ap);
+    va_end(ap);
+    if (r->place) bt_errors_add(r->err, "%s: %s", r->place, text);
+    else bt_errors_add(r->err, "%s:%d: %s", r->s->path, line, text);
+}
+
+bool bt_study_is_scalar(const bt_study_reader *r, const bt_node *node, int line, const char *name)
+{
+    if (node->kind == BT_NODE_SCALAR) return true;
+    bt_study_complain(r, line, "%s: needs a single value; write %s: value", name, name);
+    return false;
+}
+
+void bt_study_read_whole(const bt_study_reader *r, const bt_node *node, int line, const char *name, int64_t lo,
+                         int64_t hi, int64_t *out)
+{
+    if (!bt_study_is_scalar(r, node, line, name)) return;
+    char *end;
+    const long long v = strtoll(node->text, &end, 10);
+    if (end == node->text || *end || v < lo || v > hi)
+        bt_study_complain(r, line, "%s: %.60s: give a whole number from %" PRId64 " to %" PRId64, name, node->text, lo,
+                          hi);
+    else *out = v;
+}
+
+bool bt_study_check_value(const bt_study_reader *r, int line, const char *name, int key, const bt_node *value)
+{
+    const bt_key *k = &bt_case_keys[key];
+    if (value->kind != BT_NODE_SCALAR || k->type == BT_KEY_POINTS) {
+        bt_study_complain(r, line, "%s: a study takes single values; make another base case for lists of points", name);
+        return false;
+    }
+    bt_case scratch;
+    bt_case_defaults(&scratch);
+    char why[BT_WHY];
+    const bool good = bt_value_read(k, &scratch, value->text, value->plain, why);
+    if (!good) bt_study_complain(r, line, "%s: %s", name, why);
+    bt_case_free(&scratch);
+    return good;
+}
+
+void bt_study_read_list(const bt_study_reader *r, const bt_node *list, int line, bt_study_parameter *p)
+{
+    if (list->n == 0) bt_study_complain(r, line, "%s: the list is empty; give at least one value", p->name);
+    if (list->n > BT_MOST_VALUES) { // each is compared with all before it
+        bt_study_complain(r, line, "%s: %d values, at most %d are read; take fewer, or a range", p->name, list->n,
+                          BT_MOST_VALUES);
+        return;
+    }
+    p->value = bt_alloc((size_t)list->n, sizeof *p->value);
+    for (int i = 0; i < list->n; i++) {
+        if (!bt_study_check_value(r, list->item[i]->line, p->name, p->key, list->item[i])) continue;
+        for (int j = 0; j < p->n; j++)
+            if (!strcmp(p->value[j], list->item[i]->text))
+                bt_study_complain(r, list->item[i]->line, "%s: %s stands twice in the list; remove one", p->name,
+                                  p->value[j]);
+        p->value[p->n++] = bt_text_copy(list->item[i]->text);
+    }
+}
+
+static const char *const distributions[] = {"uniform", "triangular", "normal", NULL};
+
+/// Standard deviations of a normal distribution between the middle and an end of its range: 95 % lie between the ends;
+/// and those to where it is cut off.
+static const double ends_at = 1.959963984540054, cut_at = 3;
+
+static double normal_below(double z) { return 0.5 * bt_erfc(-z / sqrt(2)); }
+
+/// Place within a range, 0 at its beginning and 1 at its end, below which lies the share u of a distribution.
+static double quantile(bt_distribution d, double u)
+{
+    if (d == BT_UNIFORM) return u;
+    if (d == BT_TRIANGULAR) return u < 0.5 ? sqrt(0.5 * u) : 1 - sqrt(0.5 * (1 - u));
+    // bisection: a study draws a few thousand numbers, once
+    double low = -cut_at, high = cut_at;
+    const double below = normal_below(low) + u * (normal_below(high) - normal_below(low));
+    for (int i = 0; i < 60; i++) {
+        const double middle = 0.5 * (low + high);
+        if (normal_below(middle) < below) low = middle;
+        else high = middle;
+    }
+    return 0.5 * (1 + low / ends_at);
+}
+
+/// Value at a place of a range, 0 ... 1 between its ends, in SI with all its digits.
+static char *range_value(const bt_study_parameter *p, double at)
+{
+    double x = p->logarithmic ? p->from * bt_pow(p->to / p->from, at) : p->from + at * (p->to - p->from);
+    if (at == 0) x = p->from;
+    if (at == 1) x = p->to;
+    if (bt_case_keys[p->key].type == BT_KEY_INT) return bt_text_of("%.0f", nearbyint(x));
+    for (int digits = 6; digits < 17; digits++) { // 0.3, not 0.30000000000000004, where nothing is lost
+        char *text = bt_text_of("%.*g", digits, x);
+        if (fabs(strtod(text, NULL) - x) <= 1e-12 * fabs(x)) return text;
+        free(text);
+    }
+    return bt_text_of("%.17g", x);
+}
+
+static void read_distribution(const bt_study_reader *r, const bt_node *value, int line, bt_study_parameter *p)
+{
+    if (!bt_study_is_scalar(r, value, line, "distribution")) return;
+    int d = 0;
+    while (distributions[d] && strcmp(distributions[d], value->text)) d++;
+    if (distributions[d]) p->distribution = (bt_distribution)d;
+    else bt_study_complain(r, line, "%s.distribution: %.40s: give uniform, triangular or normal", p->name, value->text);
+}
+
+/// Does all that a normal distribution draws beyond the ends of its range belong to the key? A complaint if not.
+static bool in_range_of_key(const bt_study_reader *r, int line, const bt_study_parameter *p)
+{
+    if (p->distribution != BT_NORMAL) return true;
+    bool good = true;
+    for (int k = 0; k < 2 && good; k++) {
+        char *text = range_value(p, quantile(BT_NORMAL, k));
+        const bt_node node = {.kind = BT_NODE_SCALAR, .text = text, .plain = true};
+        char name[160];
+        snprintf(name, sizeof name, "%.80s: a normal distribution with 95 %% from %g to %g reaches", p->name, p->from,
+                 p->to);
+        good = bt_study_check_value(r, line, name, p->key, &node);
+        free(text);
+    }
+    return good;
+}
+
+char *bt_study_distribution(const bt_study_parameter *p)
+{
+    if (!p->continuous) return bt_text_copy("");
+    return bt_text_of("%s%s%s %.6g to %.6g", p->logarithmic ? "log-" : "", distributions[p->distribution],
+                      p->distribution == BT_NORMAL ? ", 95 % from" : " from", p->from, p->to);
+}
+
+void bt_study_read_range(const bt_study_reader *r, const bt_node *map, int line, bt_study_parameter *p)
+{
+    const bt_key *key = &bt_case_keys[p->key];
+    static const char *const known[] = {"from", "to", "n", "scale", "distribution", "source", NULL};
+    if (key->type != BT_KEY_REAL && key->type != BT_KEY_INT) {
+        bt_study_complain(r, line, "%s: has no range; give a list of its values", p->name);
+        return;
+    }
+    double end[2] = {NAN, NAN};
+    int64_t n = 2;
+    bool good = true;
+    p->continuous = true;
+    for (int i = 0; i < map->n; i++) {
+        const bt_node *value = map->item[i];
+        const int at = map->key_line[i];
+        if (!strcmp(map->key[i], "from") || !strcmp(map->key[i], "to")) {
+            bt_case scratch;
+            bt_case_defaults(&scratch);
+            char why[BT_WHY];
+            const bool read =
+                value->kind == BT_NODE_SCALAR && bt_value_read(key, &scratch, value->text, value->plain, why);
+            if (!read)
+                bt_study_complain(r, at, "%s.%s: %s", p->name, map->key[i],
+                                  value->kind == BT_NODE_SCALAR ? why : "needs a single value");
+            else if (key->type == BT_KEY_REAL)
+                memcpy(&end[map->key[i][0] == 't'], (const char *)&scratch + key->offset, sizeof(double));
+            else {
+                int64_t whole;
+                memcpy(&whole, (const char *)&scratch + key->offset, sizeof whole);
+                end[map->key[i][0] == 't'] = (double)whole;
+            }
+            good = good && read;
+            bt_case_free(&scratch);
+        } else if (!strcmp(map->key[i], "n")) {
+            bt_study_read_whole(r, value, at, "n", 2, BT_MOST_VALUES, &n);
+        } else if (!strcmp(map->key[i], "scale")) {
+            if (!bt_study_is_scalar(r, value, at, "scale")) continue;
+            p->logarithmic = !strcmp(value->text, "log");
+            if (!p->logarithmic && strcmp(value->text, "linear"))
+                bt_study_complain(r, at, "%s.scale: %.40s: give linear or log", p->name, value->text);
+        } else if (!strcmp(map->key[i], "distribution")) {
+            read_distribution(r, value, at, p);
+        } else if (!strcmp(map->key[i], "source")) {
+            if (bt_study_is_scalar(r, value, at, "source") && !p->source) p->source = bt_text_copy(value->text);
+        } else {
+            const char *near = bt_suggest(map->key[i], known);
+            bt_study_complain(r, at, "%s.%.40s: unknown key; %s%s", p->name, map->key[i],
+                              near ? "did you mean " : "a range has from, to, n, scale, distribution and source",
+                              near ? near : "");
+        }
+    }
+    p->from = end[0], p->to = end[1];
+    if (good && !(p->from < p->to)) bt_study_complain(r, line, "%s: needs from and to, from below to", p->name);
+    else if (good && p->logarithmic && !(p->from > 0))
+        bt_study_complain(r, line, "%s: a logarithmic range begins above zero; raise from", p->name);
+    else if (good && in_range_of_key(r, line, p)) {
+        p->value = bt_alloc((size_t)n, sizeof *p->value);
+        for (p->n = 0; p->n < n; p->n++) p->value[p->n] = range_value(p, (double)p->n / (double)(n - 1));
+    }
+}
+
+const char *bt_distribution_name(bt_distribution d) { return distributions[d]; }
+
+// --- what a condition takes ------------------------------------------------------------------------------------------
+
+/// The numbers of parameter p in condition c.
+static bt_rng draw(const bt_study *s, int p, int64_t c)
+{
+    return bt_rng_start(s->seed, BT_RNG_HYPERCUBE, c * BT_MAX_PARAMETERS + p);
+}
+
+typedef struct {
+    uint64_t key;
+    int64_t condition;
+} lot;
+
+static int by_lot(const void *a, const void *b)
+{
+    const lot *p = a, *q = b;
+    if (p->key != q->key) return p->key < q->key ? -1 : 1;
+    return (p->condition > q->condition) - (p->condition < q->condition);
+}
+
+/// A random permutation of the strata for each parameter, by sorting lots.
+void bt_study_draw_strata(bt_study *s)
+{
+    lot *l = bt_alloc((size_t)s->n_conditions, sizeof *l);
+    for (int p = 0; p < s->n_parameters; p++) {
+        for (int64_t c = 0; c < s->n_conditions; c++) {
+            bt_rng r = draw(s, p, c);
+            l[c] = (lot){bt_rng_bits(&r), c};
+        }
+        qsort(l, (size_t)s->n_conditions, sizeof *l, by_lot);
+        s->parameter[p].stratum = bt_alloc((size_t)s->n_conditions, sizeof(int64_t));
+        for (int64_t k = 0; k < s->n_conditions; k++) s->parameter[p].stratum[l[k].condition] = k;
+    }
+    free(l);
+}
+
+char *bt_study_value(const bt_study *s, int p, int64_t c)
+{
+    const bt_study_parameter *q = &s->parameter[p];
+    if (s->sampling == BT_SAMPLING_LATIN_HYPERCUBE) {
+        bt_rng r = draw(s, p, c);
+        bt_rng_bits(&r); // the first was for the stratum
+        const double at = ((double)q->stratum[c] + bt_rng_uniform(&r)) / (double)s->n_conditions;
+        if (q->continuous) return range_value(q, quantile(q->distribution, at));
+        const int i = (int)(at * q->n);
+        return bt_text_copy(q->value[i < q->n ? i : q->n - 1]);
+    }
+    // The last parameter runs fastest.
+    for (int i = s->n_parameters - 1; i > p; i--) c /= s->parameter[i].n;
+    return bt_text_copy(q->value[c % q->n]);
+}
