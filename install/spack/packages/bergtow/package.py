@@ -4,7 +4,8 @@
     spack repo add install/spack
     spack dev-build --source-path "$PWD" bergtow@main
 """
-from spack.package import *
+from spack.package import (Executable, MakefilePackage, depends_on, license, on_package_attributes, run_after,
+                           version)
 
 
 class Bergtow(MakefilePackage):
@@ -33,7 +34,7 @@ class Bergtow(MakefilePackage):
     def made_with(self):
         """Variables of the Makefile: Spack's compiler wrapper knows where the libraries are."""
         return [
-            f"CC={spack_cc}",
+            f"CC={self.module.spack_cc}",
             f"MPICC={self.spec['mpi'].mpicc}",
             f"HDF5_CFLAGS={self.spec['hdf5'].headers.include_flags}",
             f"HDF5_LIBS={self.spec['hdf5:c'].libs.ld_flags}",
@@ -43,10 +44,10 @@ class Bergtow(MakefilePackage):
         ]
 
     def build(self, spec, prefix):
-        make("all", *self.made_with)
+        self.module.make("all", *self.made_with)
 
     def install(self, spec, prefix):
-        make("install", f"PREFIX={prefix}", *self.made_with)
+        self.module.make("install", f"PREFIX={prefix}", *self.made_with)
 
     @run_after("install")
     @on_package_attributes(run_tests=True)
