@@ -11,10 +11,26 @@ ifneq ($(filter $(CONFIG),fuzz tsan),)
 CC     := clang-14
 endif
 CC     := $(if $(filter default undefined,$(origin CC)),gcc,$(CC))
-MPI_CFLAGS  := $(shell pkg-config --cflags ompi-c 2>/dev/null)
-MPI_LIBS    := $(shell pkg-config --libs ompi-c 2>/dev/null)
-HDF5_CFLAGS := $(shell pkg-config --cflags hdf5-openmpi 2>/dev/null)
-HDF5_LIBS   := $(shell pkg-config --libs hdf5-openmpi 2>/dev/null)
+# MPI is that of $(MPICC), whichever it is, or without one what pkg-config knows. HDF5 is the one without MPI, for its
+# parallel driver is not used; or one of the same MPI, since its headers include mpi.h. To choose: make
+# MPICC=mpicc.mpich HDF5=hdf5-mpich, or all four variables of flags by hand (docs/install.md).
+# MPI=no builds a program of one process.
+MPICC    ?= mpicc
+known     = $(firstword $(foreach package,$(1),$(shell pkg-config --exists $(package) 2>/dev/null && echo $(package))))
+flags     = $(if $(2),$(shell pkg-config $(1) $(2)))
+MPI_SHOWN  := $(wordlist 2,99,$(shell $(MPICC) -show 2>/dev/null))
+MPI_PKG    := $(if $(MPI_SHOWN),,$(call known,ompi-c mpich mpi-c))
+MPI_CFLAGS := $(filter -I% -D%,$(MPI_SHOWN)) $(call flags,--cflags,$(MPI_PKG))
+MPI_LIBS   := $(filter-out -I% -D% -O% -f%,$(MPI_SHOWN)) $(call flags,--libs,$(MPI_PKG))
+ifeq ($(MPI),no)
+MPI_CFLAGS := -Iinstall/alone
+MPI_LIBS   :=
+endif
+HDF5       ?= $(call known,hdf5-serial $(if $(findstring mpich,$(MPI_LIBS)),hdf5-mpich) \
+                $(if $(findstring openmpi,$(MPI_CFLAGS)),hdf5-openmpi) hdf5)
+HDF5       := $(HDF5)
+HDF5_CFLAGS := $(call flags,--cflags,$(HDF5))
+HDF5_LIBS   := $(or $(call flags,--libs,$(HDF5)),-lhdf5)
 # its part for dimension scales
 HDF5_HL     := $(filter -L%,$(HDF5_LIBS)) -lhdf5_hl
 
@@ -40,8 +56,13 @@ OPT_coverage := -O1 -g --coverage -fprofile-abs-path -fprofile-update=atomic
 ifeq ($(filter $(CONFIG),release debug validate asan fuzz tsan coverage),)
 $(error CONFIG=$(CONFIG) is unknown: use release, debug, validate, asan, fuzz, tsan or coverage)
 endif
-CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS)
-LDLIBS := $(HDF5_HL) $(HDF5_LIBS) $(MPI_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
+# Where a -march allows fused operations, the vectorizers of gcc 12 make vfmaddsub, with one rounding, of products and
+# what they take for addsub, whatever -ffp-contract says; gcc 14 does not.
+FUSES := $(shell $(CC) $(EXTRA_CFLAGS) -dM -E -x c /dev/null 2>/dev/null | grep -cE '__(FMA|AVX512F)__')
+CFLAGS := $(BASE) $(OPT_$(CONFIG)) $(EXTRA_CFLAGS) $(if $(filter-out 0,$(FUSES)),-fno-tree-vectorize)
+# argp is part of glibc, and a library of its own elsewhere.
+ARGP_LIBS := $(if $(wildcard $(addsuffix /libargp.*,/usr/lib /usr/local/lib)),-largp)
+LDLIBS := $(HDF5_HL) $(HDF5_LIBS) $(MPI_LIBS) $(ARGP_LIBS) -lyaml -ljansson -lmetis -lxxhash -lm
 
 REVISION := $(shell git describe --always --dirty 2>/dev/null || echo unknown)
 
@@ -60,9 +81,9 @@ RANK_BIN := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/parallel/*.c))
 # The program with what tests/examples/ adds to it.
 EXTENDED := $(BUILD)/tests/examples/extended
 
-.PHONY: all help lib tests install uninstall clean FORCE deps deps-test deps-lint deps-dev deps-docs docs demo report \
-        bench fullscale partition-study validation test test-long mutate lint tidy validate asan \
-        tsan valgrind coverage fuzz
+.PHONY: all help lib tests install deb uninstall clean FORCE deps deps-demo deps-test deps-lint deps-dev deps-docs \
+        docs demo report bench fullscale partition-study validation test test-long mutate lint tidy validate asan tsan \
+        valgrind coverage fuzz
 .DEFAULT_GOAL := all
 
 all: $(BUILD)/bergtow ## build build/release/bergtow (CONFIG=debug, validate or asan for the others)
@@ -75,10 +96,12 @@ help: ## this list
 # The stamp changes when the flags do, so that a new flag rebuilds everything.
 STAMP := $(BUILD)/flags
 $(STAMP): FORCE
-	@[ -n "$(HDF5_LIBS)" ] && command -v $(firstword $(CC)) >/dev/null || \
-	  { echo "the compiler or a library is missing; run: make deps"; exit 1; }
 	@mkdir -p $(BUILD)
-	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@
+	@echo '$(CC) $(CFLAGS) $(LDLIBS)' | cmp -s - $@ || { \
+	  $(CC) $(CFLAGS) -MF /dev/null install/needs.c $(LDLIBS) -o $(BUILD)/needs 2>$(BUILD)/needs.log || { \
+	    echo "the compiler, MPI or a library is missing: make deps installs all of it on Debian;"; \
+	    echo "elsewhere see docs/install.md; the compiler said:"; head -5 $(BUILD)/needs.log; exit 1; }; \
+	  echo '$(CC) $(CFLAGS) $(LDLIBS)' > $@; }
 FORCE:
 
 REV := $(BUILD)/revision.h
@@ -174,32 +197,41 @@ $(BUILD)/triad: cases/scaling/triad.c $(STAMP)
 
 # --- What a fresh Debian lacks -------------------------------------------------------------------------------
 
-DEPS := build-essential pkg-config git \
-        libyaml-dev libopenmpi-dev openmpi-bin libhdf5-openmpi-dev librandom123-dev libmetis-dev libjansson-dev \
-        libxxhash-dev \
-        python3 python3-numpy python3-scipy python3-h5py python3-matplotlib python3-pil python3-yaml python3-jinja2
+# An MPI or HDF5 that is here already serves. Open MPI is the smaller one. python3-munkres and libblas-dev are
+# named to keep apt from their larger alternatives: scipy in place of munkres for the fonts of matplotlib, and with it
+# a C++ compiler and Boost; OpenBLAS's headers for scipy.
+DEPS_MPI := $(if $(MPI_SHOWN)$(MPI_PKG),,libopenmpi-dev)
+DEPS_BUILD := gcc libc6-dev pkg-config $(if $(HDF5),,libhdf5-dev) \
+        librandom123-dev libyaml-dev libmetis-dev libjansson-dev libxxhash-dev
+DEPS_DEMO := $(DEPS_BUILD) \
+        python3 python3-numpy python3-h5py python3-matplotlib python3-munkres python3-pil python3-yaml python3-jinja2
+DEPS := $(DEPS_DEMO) $(DEPS_MPI) libblas-dev python3-scipy
 
 # For make docs, which prints the PDF by the browser that reports are printed by.
 DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
 
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
-DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
-             poppler-utils python3-xarray python3-h5netcdf python3-netcdf4 python3-pip python3-setuptools \
-             python3-wheel $(DEPS_DOCS)
+DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
+             chromium chromium-driver ffmpeg poppler-utils python3-xarray python3-h5netcdf python3-netcdf4 python3-pip \
+             python3-setuptools python3-wheel $(DEPS_DOCS)
 
-deps: ## install the Debian packages that are missing
-	@missing=$$(for p in $(DEPS); do \
+# SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
+SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'
+deps: ## install the Debian packages that are missing, for all but the tests
+	@command -v dpkg-query >/dev/null || exit 0; missing=$$(for p in $(DEPS); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'install ok installed' || echo $$p; done); \
 	if [ -z "$$missing" ]; then exit 0; fi; \
-	echo "bergtow needs these Debian packages" \
-	  "(on a bare system 250 MB to fetch, 1.1 GB on the disk, for the tests twice that;" \
-	  "some minutes without a word):" $$missing; \
+	echo "bergtow needs these Debian packages:" $$missing; \
 	if [ "$$(id -u)" = 0 ]; then as=; elif command -v sudo >/dev/null; then as=sudo; else \
-	  echo "no root and no sudo here; install them with:"; echo "  apt-get install" $$missing; exit 1; fi; \
-	echo "+ $$as apt-get update && $$as apt-get install" $$missing; \
+	  echo "no root and no sudo here; install them with:"; \
+	  echo "  apt-get install --no-install-recommends" $$missing; exit 1; fi; \
+	echo "+ $$as apt-get update && $$as apt-get install --no-install-recommends ..."; \
 	$$as apt-get update -qq && \
-	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $$missing >/dev/null
+	LC_ALL=C apt-get install --no-install-recommends --assume-no $$missing 2>/dev/null | $(SIZE); \
+	echo "fetching and unpacking them: a minute or two, without a word"; \
+	$$as env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+	  -o APT::Keep-Downloaded-Packages=false $$missing >/dev/null
 
 # For make lint, and for the other checks of developers; make test needs none of them.
 DEPS_LINT := cppcheck shellcheck pyflakes3
@@ -214,15 +246,17 @@ deps-dev: ## install what tidy, tsan, valgrind, coverage and fuzz need
 # pkg-config may only have come with `deps`: what needs the libraries is made by a second make.
 AGAIN := $(MAKE) --no-print-directory -j$(J)
 
+deps-demo: ## install what make demo needs: neither MPI nor scipy
+	@$(MAKE) --no-print-directory deps DEPS='$(DEPS_DEMO)'
+
 DEMO := out/demo
-demo: deps ## tow the berg of cases/basin/basin-80.yml, print the result, draw its pictures
-	@$(AGAIN) all
+demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
+	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)
 	$(PYTHON) postproc/plot_field.py $(DEMO)
-	$(PYTHON) postproc/animate.py $(DEMO) -o $(DEMO)/tow.mp4
 	$(PYTHON) postproc/report.py $(DEMO)
-	@echo "pictures:"; ls $(DEMO)/*.png $(DEMO)/*.mp4
+	@echo "pictures:"; ls $(DEMO)/*.png
 	@echo "all of it as one page, with a replay: $(DEMO)/report.html"
 
 RUN ?=
@@ -313,8 +347,16 @@ fuzz: all ## hostile input by libFuzzer: TARGET=case, study, outlines, field, ..
 validate: deps ## build/validate/bergtow: assertions, checks of the division, teams of threads for every loop
 	@$(AGAIN) CONFIG=validate all
 
+ifneq ($(filter install,$(MAKECMDGOALS)),)
+ifeq ($(MPI),no)
+$(error bergtow/comm.h of an installed library needs an MPI: make install without MPI=no)
+endif
+endif
 install: all lib $(BUILD)/share/bergtow.pc $(BUILD)/share/bergtow.1 ## program, library, scripts into DESTDIR PREFIX
 	@install/install.sh put $(BUILD) $(VERSION) $(PREFIX) $(DESTDIR)
+
+deb: ## Debian packages and their source package: build/deb
+	@install/deb.sh $(VERSION)
 
 uninstall: ## take away what make install has put into DESTDIR PREFIX
 	@install/install.sh remove $(PREFIX) $(DESTDIR)

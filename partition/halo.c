@@ -201,7 +201,7 @@ void bt_domain_connect(bt_world *w)
 static void wait_all(bt_domain *d)
 {
     const double t0 = bt_clock();
-    MPI_Waitall(d->n_requests, d->request, MPI_STATUSES_IGNORE);
+    bt_comm_wait(d->n_requests, d->request);
     d->exchange_s += bt_clock() - t0;
     d->n_requests = 0;
 }

@@ -69,7 +69,7 @@ static char *deliver(const bt_comm *c, parcels *p, int tag, size_t *n_in)
         for (uint64_t done = 0; done < out[r]; done += PIECE)
             MPI_Isend(p->data[r] + done, (int)(out[r] - done < PIECE ? out[r] - done : PIECE), MPI_BYTE, r, tag, c->mpi,
                       &request[n++]);
-    MPI_Waitall(n, request, MPI_STATUSES_IGNORE);
+    bt_comm_wait(n, request);
     free(request);
     free(out);
     free(in);

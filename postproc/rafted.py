@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Where floes lie over each other: the intersections of convex outlines, for pictures."""
 import numpy as np
-from scipy.spatial import cKDTree
 
 LEAST = 1e-3  # of a floe's area: less is the slop of the solver
 
@@ -27,6 +26,19 @@ def area(p):
     return 0.5 * float(np.sum(p[:, 0] * np.roll(p[:, 1], -1) - np.roll(p[:, 0], -1) * p[:, 1])) if len(p) > 2 else 0.0
 
 
+def near(middle, reach):
+    """Pairs (i, j), i < j, in ascending order, of circles that overlap: middles [n, 2], radii [n]."""
+    order = np.argsort(middle[:, 0], kind="stable")
+    x = middle[order, 0]
+    ends = np.searchsorted(x, x + 2 * reach.max(), side="right")
+    found = []
+    for k, (i, end) in enumerate(zip(order, ends)):
+        others = order[k + 1:end]
+        close = np.hypot(*(middle[others] - middle[i]).T) < reach[others] + reach[i]
+        found += [(min(i, j), max(i, j)) for j in others[close]]
+    return sorted(found)
+
+
 def overlaps(outlines):
     """Polygons in which outlines [n][k, 2], repeated corners allowed, overlap by more than the slop: pair by pair."""
     kept = []
@@ -40,9 +52,7 @@ def overlaps(outlines):
     reach = np.array([np.hypot(*(p - m).T).max() for p, m in zip(kept, middle)])
     size = np.array([area(p) for p in kept])
     found = []
-    for i, j in sorted(cKDTree(middle).query_pairs(2 * reach.max())):
-        if np.hypot(*(middle[i] - middle[j])) >= reach[i] + reach[j]:
-            continue
+    for i, j in near(middle, reach):
         both = intersection(kept[i], kept[j])
         if area(both) > LEAST * min(size[i], size[j]):
             found.append(both)

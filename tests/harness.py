@@ -74,7 +74,8 @@ def environment(**extra):
     Threads wait passively: on a machine that is busy with something else, threads that spin at a barrier take the very
     core that the thread they wait for would need (20 times slower, seen with two threads on two cores).
     """
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("OMPI_", "PMIX_", "OMP_"))}
+    theirs = "OMPI_", "PMIX_", "PMI_", "SLURM_", "BERGTOW_MPI", "OMP_"
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(theirs)}
     return kept | {"OMP_WAIT_POLICY": "passive"} | {k: str(v) for k, v in extra.items()}
 
 

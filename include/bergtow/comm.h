@@ -20,14 +20,18 @@ typedef struct bt_comm {
 /// All ranks of the program. Before bt_comm_start, and after bt_comm_end: rank 0 of 1.
 const bt_comm *bt_comm_world(void);
 
+/// The MPI library in use and its version, as in "Open MPI v4.1.4"; written into text, which is returned.
+const char *bt_comm_library(char text[MPI_MAX_LIBRARY_VERSION_STRING]);
+
 /// One rank, whatever else runs: for work of a rank by itself.
 extern const bt_comm bt_comm_alone;
 
-/// Collective. Use MPI as the program has started it, which ends it, too; otherwise start it if a launcher (mpirun,
-/// srun) started this process: a plain start must neither pay for MPI_Init nor need a network. From here on an error of
-/// MPI ends all ranks, and so does an exit() of one rank alone where MPI was started here; an exit(0) or
-/// exit(BT_ERR_USAGE) is taken for one of all ranks, since they have the same command line. argc, argv may be NULL.
-/// Errors: BT_ERR_USAGE, told on stderr.
+/// Collective. Use MPI as the program has started it, which ends it, too; otherwise start it if a launcher (mpirun of
+/// any MPI, srun) started this process: a plain start must neither pay for MPI_Init nor need a network. BERGTOW_MPI=yes
+/// or no in the environment decides instead. From here on an error of MPI ends all ranks, and so does an exit() of one
+/// rank alone where MPI was started here; an exit(0) or exit(BT_ERR_USAGE) is taken for one of all ranks, since they
+/// have the same command line. argc, argv may be NULL. Errors: BT_ERR_USAGE, told on stderr; also where the launcher
+/// has started several processes and MPI knows of one.
 bt_status bt_comm_start(int *argc, char ***argv);
 
 /// Collective. The end of the program: waits for all ranks without using their cores, stops MPI, and returns the worst
@@ -58,6 +62,13 @@ bool bt_comm_any(const bt_comm *c, bool value);
 
 /// Collective. Returns when all ranks have called it; meanwhile the cores are free for the ranks that still work.
 void bt_comm_rest(const bt_comm *c);
+
+/// Until n requests are done. One after the other: gcc takes MPI_STATUSES_IGNORE, the address 1 in MPICH, for an array
+/// of no bytes that MPI_Waitall writes to.
+static inline void bt_comm_wait(int n, MPI_Request *request)
+{
+    for (int i = 0; i < n; i++) MPI_Wait(&request[i], MPI_STATUS_IGNORE);
+}
 
 /// Collective. Sums, largest values and bitwise ors of all ranks in one message. Sums are exact and `bad` is handed on;
 /// a NaN is the largest value. The result is the same on all ranks, in any distribution of the terms. NULL where n is

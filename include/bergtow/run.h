@@ -36,8 +36,8 @@ bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o,
 /// refused.
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
 
-/// OpenMP threads of each rank of comm: as asked (0 = not), else run.threads of the case, else OMP_NUM_THREADS, else
-/// the cores of the node, or those that mpirun has bound this rank to, for the ranks there.
+/// Collective. OpenMP threads of this rank of comm: as asked (0 = not), else run.threads of the case, else
+/// OMP_NUM_THREADS, else the cores that it was given; those that other ranks were given, too, are shared among them.
 int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked);
 
 #endif

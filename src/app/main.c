@@ -2,7 +2,9 @@
 // The program bergtow: options that need no command, and the way to the commands.
 #include "bergtow/comm.h"
 #include "app/cmd.h"
+#include "app/processor.h"
 #include "revision.h"
+#include "base/cores.h"
 #include "base/suggest.h"
 #include "output/quantity_list.h"
 
@@ -40,7 +42,8 @@ enum { N_COMMANDS = sizeof commands / sizeof *commands };
 static void print_version(FILE *out, struct argp_state *state)
 {
     (void)state;
-    fprintf(out, "bergtow %s (%s, %s)\n", BT_VERSION, BT_REVISION, BT_COMPILER);
+    char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+    fprintf(out, "bergtow %s (%s, %s, %s)\n", BT_VERSION, BT_REVISION, BT_COMPILER, bt_comm_library(mpi));
 }
 
 static void print_help(FILE *out)
@@ -51,7 +54,7 @@ static void print_help(FILE *out)
     fputs("\n  --list-keys  the keys of a case file: unit, default, range, meaning; with --json for programs\n"
           "  --list-quantities  the numbers that a run leaves: series, summary, estimates, with units and meaning; "
           "--json too\n"
-          "  --version    version, revision and compiler\n"
+          "  --version    version, revision, compiler and MPI\n"
           "  --help       this text; bergtow COMMAND --help for the options of a command\n\n"
           "Exit codes: 0 done, 2 usage, 3 bad case or field file, 4 input or output failed, 5 numerical failure,\n"
           "6 stopped on a signal or a limit, with a checkpoint.\n",
@@ -70,30 +73,21 @@ static int refuse_word(const char *kind, const char *word, const char *const *kn
 // one core for all its threads. Back to all the places it was given.
 static void unbind(void)
 {
-    const int n_places = omp_get_num_places();
-    if (n_places == 0) return;
     cpu_set_t all;
-    CPU_ZERO(&all);
-    for (int p = 0; p < n_places; p++) {
-        int ids[CPU_SETSIZE];
-        const int n = omp_get_place_num_procs(p);
-        if (n > CPU_SETSIZE) continue;
-        omp_get_place_proc_ids(p, ids);
-        for (int k = 0; k < n; k++) CPU_SET(ids[k], &all);
-    }
-    sched_setaffinity(0, sizeof all, &all);
+    if (omp_get_num_places() > 0 && bt_cores_given(&all)) sched_setaffinity(0, sizeof all, &all);
 }
 
 // Before the constructors of any library, some of which take milliseconds; and an ignored signal stays so over the
 // second start, while a handler would not.
-static void ignore_signals(void)
+static void before_libraries(void)
 {
+    bt_processor_check();
     // asks a run for a checkpoint (halt.h); before its first step, and in other commands, there is none to write
     signal(SIGUSR1, SIG_IGN);
     // a file at its size limit is an error of the write, with a message, not the end of the program
     signal(SIGXFSZ, SIG_IGN);
 }
-__attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = ignore_signals;
+__attribute__((section(".preinit_array"), used)) static void (*const before_all)(void) = before_libraries;
 
 // Threads that spin at a barrier while another program has the core of the thread they wait for made a run on two busy
 // cores 20 times slower; threads that sleep at once pay a wake-up for every colour of a sweep. So: spin for some

@@ -7,11 +7,14 @@
 // message.
 #include "bergtow/comm.h"
 
+#include <ctype.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+
+#include "base/launcher.h"
 
 #define ALONE {.mpi = MPI_COMM_NULL, .rank = 0, .size = 1, .ranks_here = 1}
 const bt_comm bt_comm_alone = ALONE;
@@ -67,6 +70,21 @@ static void combine(void *in, void *inout, int *n, MPI_Datatype *type)
 }
 
 const bt_comm *bt_comm_world(void) { return &world; }
+
+const char *bt_comm_library(char text[MPI_MAX_LIBRARY_VERSION_STRING])
+{
+    int length;
+    MPI_Get_library_version(text, &length);
+    // "Open MPI v4.1.4, package: ...", "MPICH Version:      4.0.2\nMPICH Release date: ...",
+    // "Intel(R) MPI Library 2021.9 for ..."
+    text[strcspn(text, ",\n")] = 0;
+    char *end = text;
+    for (const char *p = text; *p; p++) // one blank for several
+        if (!isspace((unsigned char)*p)) *end++ = *p;
+        else if (end > text && end[-1] != ' ') *end++ = ' ';
+    *end = 0;
+    return text;
+}
 
 static void on_mpi_error(MPI_Comm *mpi, int *code, ...)
 {
@@ -126,13 +144,44 @@ static bool start_mpi(int *argc, char ***argv)
     return started;
 }
 
+/// *wanted: is MPI to be started? As BERGTOW_MPI says, otherwise if a launcher has started this process.
+static bool wants_mpi(const bt_launcher *by, bool *wanted)
+{
+    const char *said = getenv("BERGTOW_MPI");
+    if (!said || !*said) *wanted = by->found;
+    else if (!strcmp(said, "yes") || !strcmp(said, "no")) *wanted = said[0] == 'y';
+    else return fprintf(stderr, "bergtow: BERGTOW_MPI=%s: give yes or no, or unset it\n", said), false;
+    return true;
+}
+
+/// The launcher of one MPI starts programs of another as if each were alone, and they would all do the same work.
+static bool knows_all(const bt_launcher *by)
+{
+    int size;
+    MPI_Comm_size(MPI_COMM_WORLD, &size);
+    if (size > 1 || by->size < 2) return true;
+    char mpi[MPI_MAX_LIBRARY_VERSION_STRING];
+    if (by->first)
+        fprintf(stderr, "bergtow: %d processes were started, but each is alone: this program was built with %s; start "
+                "it with the mpirun of that MPI, or srun with the --mpi it needs (BERGTOW_MPI=no: they work apart)\n",
+                by->size, bt_comm_library(mpi));
+    else nanosleep(&(struct timespec){.tv_nsec = 300000000}, NULL); // the launcher ends all when one has left so
+    MPI_Finalize();
+    return false;
+}
+
 bt_status bt_comm_start(int *argc, char ***argv)
 {
     if (running) return BT_OK;
     int begun = 0;
     MPI_Initialized(&begun);
-    if (!begun && !getenv("OMPI_COMM_WORLD_SIZE") && !getenv("PMIX_RANK")) return BT_OK;
-    if (!begun && !start_mpi(argc, argv)) return BT_ERR_USAGE;
+    if (!begun) {
+        const bt_launcher by = bt_launcher_find();
+        bool wanted;
+        if (!wants_mpi(&by, &wanted)) return BT_ERR_USAGE;
+        if (!wanted) return BT_OK;
+        if (!start_mpi(argc, argv) || !knows_all(&by)) return BT_ERR_USAGE;
+    }
     running = true;
     foreign = begun != 0;
     world.mpi = MPI_COMM_WORLD;

@@ -11,7 +11,7 @@
 
 void bt_provenance_write(bt_h5 *h, const char *command_line)
 {
-    char host[256] = "unknown", text[256];
+    char host[256] = "unknown", mpi[MPI_MAX_LIBRARY_VERSION_STRING], text[sizeof mpi + 60];
     if (gethostname(host, sizeof host - 1) != 0) snprintf(host, sizeof host, "unknown");
 
     const time_t now = time(NULL);
@@ -21,7 +21,7 @@ void bt_provenance_write(bt_h5 *h, const char *command_line)
 
     unsigned major = 0, minor = 0, release = 0;
     H5get_libversion(&major, &minor, &release);
-    snprintf(text, sizeof text, "HDF5 %u.%u.%u, MPI %d.%d", major, minor, release, MPI_VERSION, MPI_SUBVERSION);
+    snprintf(text, sizeof text, "HDF5 %u.%u.%u, %s", major, minor, release, bt_comm_library(mpi));
 
     bt_h5_attr_text(h, "/", "program", "bergtow");
     bt_h5_attr_text(h, "/", "version", BT_VERSION);

@@ -11,6 +11,7 @@
 #include "bergtow/world.h"
 #include "run/guard.h"
 #include "run/halt.h"
+#include "run/pace.h"
 #include "base/progress.h"
 #include "base/snapshot.h"
 
@@ -25,6 +26,7 @@ typedef struct bt_running {
     bt_progress progress;
     bt_halt halt;
     bt_guard guard;
+    bt_pace pace;
     int64_t until;           ///< the run is only made again up to this step, −1 = it is not
     bool begun;              ///< the record, if there is to be one, is open
     int64_t failed;          ///< the step that was not sound, −1 = none

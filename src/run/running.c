@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
-#include <unistd.h>
+#include <time.h>
 
 #include "bergtow/checkpoint.h"
 #include "contact/contacts.h"
@@ -24,6 +24,7 @@
 #include "case/case_check.h"
 #include "case/cost.h"
 #include "partition/domain.h"
+#include "base/cores.h"
 #include "base/fileio.h"
 #include "output/folder.h"
 #include "output/gather.h"
@@ -118,11 +119,17 @@ int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked)
 {
     if (asked > 0) return asked;
     if (c->run.threads > 0) return (int)c->run.threads;
-    if (comm->size == 1 || getenv("OMP_NUM_THREADS")) return omp_get_max_threads();
-    const int bound = omp_get_num_procs(), share = (int)sysconf(_SC_NPROCESSORS_ONLN) / comm->ranks_here;
-    const int n = bound < share ? bound : share;
-    return n > 1 ? n : 1;
+    const int share = bt_cores_share(comm); // by all ranks, whatever the environment of each
+    return getenv("OMP_NUM_THREADS") ? omp_get_max_threads() : share;
 }
+
+// Ranks wait for each other, and what one of them gains in a second says little. The validation build has all threads
+// at work, for the thread sanitizer.
+#ifdef BT_VALIDATE
+enum { PACED = 0 };
+#else
+enum { PACED = 1 };
+#endif
 
 /// Start the team, with signals left to the main thread (as in bt_comm_start).
 static void start_threads(int n)
@@ -141,6 +148,7 @@ static bt_status set_up(run *r, bt_snapshot *kept, bt_errors *err)
 {
     const int threads = bt_run_threads(r->comm, r->c, r->o->threads);
     start_threads(threads);
+    bt_pace_begin(&r->pace, threads, PACED && r->comm->size == 1);
     bt_field f;
     bt_field_init(&f);
     bt_lead_stats lead = {0};
@@ -242,11 +250,26 @@ static bt_status tell_failed(const bt_forces *f, bt_errors *err)
 
 bool bt_running_goes_on(const bt_running *r) { return r->w->step < r->end_step && !bt_halt_stops(r->asked); }
 
+/// s of all threads of this process on a core.
+static double processor_time(void)
+{
+    struct timespec t;
+    return clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t) == 0 ? (double)t.tv_sec + 1e-9 * (double)t.tv_nsec : 0;
+}
+
+static void step_at_pace(bt_world *w, bt_pace *p)
+{
+    if (p->now != omp_get_max_threads()) start_threads(p->now);
+    const double wall = bt_clock(), cpu = processor_time();
+    bt_world_step(w);
+    bt_pace_step(p, bt_clock() - wall, processor_time() - cpu, (double)w->stats.unit_updates);
+}
+
 bt_status bt_running_step(bt_running *r, bt_errors *err)
 {
     bt_world *w = r->w;
     bt_status status = BT_OK;
-    bt_world_step(w);
+    step_at_pace(w, &r->pace);
     add_phases(&r->totals.phases, &w->stats);
     const double t0 = bt_clock();
     if (w->step == r->o->dump_step) status = bt_solver_dump(w, r->o->dump_path, err);

@@ -25,6 +25,11 @@ LONG = changed(TOW, run__dt=0.0002, output__frame_interval=0.1)
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 
 
+def described(dataset):
+    """Its attributes, without those that hold references into the file (its axes)."""
+    return {k: np.asarray(v).tolist() for k, v in dataset.attrs.items() if k not in ("DIMENSION_LIST", "REFERENCE_LIST")}
+
+
 def command(ranks, *arguments):
     return ["mpirun", "--oversubscribe", "-n", str(ranks), *map(str, arguments)]
 
@@ -71,7 +76,7 @@ def test_values_do_not_depend_on_ranks(one, ranks):
     with h5py.File(alone.dir / "result.h5") as a, h5py.File(many.dir / "result.h5") as b:
         assert b.attrs["ranks"] == ranks and b.attrs["complete"] == 1
         for name in "pose", "contact_force", "speed", "body_pose", "time":
-            assert dict(a["frames"][name].attrs) == dict(b["frames"][name].attrs)
+            assert described(a["frames"][name]) == described(b["frames"][name])
     # The table once, and the same but for times.
     assert result.stdout.count("state hash") == 1 and result.stdout.count("mean floe size") == 1
     numbers = [[line

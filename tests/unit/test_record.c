@@ -3,6 +3,7 @@
 //
 //     test_record              the tests
 //     test_record write DIR    write the made-up run into DIR and print its table (for tests/cli/test_xdmf.py)
+#define H5_USE_110_API // H5Ovisit is called as HDF5 1.10 has it, with 1.14 too
 #include "made_up_run.h"
 
 static void series_and_frames_come_back_to_the_bit(void **state)

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// What started this process, as its environment tells: a launcher of parallel programs, or not.
+//
+// MPI itself gives no answer before MPI_Init, and MPI_Init without a launcher takes half a second with Open MPI 4.1,
+// for nothing, at each call of the program. What a launcher sets is fixed by its process management interface: PMI 1
+// and 2 (Hydra of MPICH and Intel MPI, srun --mpi=pmi2, Cray), PMIx (PRRTE, srun --mpi=pmix), or its own names.
+// BERGTOW_MPI=yes helps where none of them is there.
+#include "base/launcher.h"
+
+#include <stdlib.h>
+
+// In this order, for a launcher may itself have been started by another: mpirun within a job starts its servers with
+// srun, whose variables are then those of the servers.
+static const struct {
+    const char *rank, *size; ///< size: NULL where the launcher does not say it
+} kinds[] = {
+    {"OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_SIZE"}, // Open MPI
+    {"PMI_RANK", "PMI_SIZE"},                         // MPICH, Intel MPI, srun --mpi=pmi2
+    {"PMI_ID", NULL},                                 // PMI by port: rank and size come later
+    {"MV2_COMM_WORLD_RANK", "MV2_COMM_WORLD_SIZE"},   // MVAPICH2
+    {"JSM_NAMESPACE_RANK", "JSM_NAMESPACE_SIZE"},     // IBM jsrun
+    {"FLUX_TASK_RANK", "FLUX_JOB_SIZE"},              // Flux
+    {"PALS_RANKID", NULL},                            // HPE Cray PALS
+    {"ALPS_APP_PE", NULL},                            // Cray aprun
+    {"PMIX_RANK", NULL},                              // PMIx: the size is known to its server
+    {"SLURM_PROCID", "SLURM_STEP_NUM_TASKS"},         // srun
+};
+enum { N_KINDS = sizeof kinds / sizeof *kinds };
+
+/// The whole number of a variable, −1 where there is none.
+static int number(const char *name)
+{
+    const char *text = name ? getenv(name) : NULL;
+    char *end = NULL;
+    const long n = text ? strtol(text, &end, 10) : -1;
+    return text && *text && !*end && n >= 0 && n <= INT32_MAX ? (int)n : -1;
+}
+
+bt_launcher bt_launcher_find(void)
+{
+    bt_launcher by = {0};
+    for (int i = 0; i < N_KINDS; i++) {
+        const int rank = number(kinds[i].rank), size = number(kinds[i].size);
+        if (rank < 0) continue;
+        if (i == N_KINDS - 1 && size < 2) continue; // a job script, or a step of one task
+        if (!by.found) by.first = rank == 0;
+        by.found = true;
+        if (size > 0) {
+            by.size = size;
+            break;
+        }
+    }
+    return by;
+}
