@@ -179,7 +179,7 @@ DEPS := build-essential pkg-config git \
 # For the tests: their own tools; and what a single script needs, which says so where it is missing: ffmpeg
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package).
 DEPS_TEST := libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium chromium chromium-driver ffmpeg \
-             poppler-utils python3-xarray python3-pip python3-setuptools python3-wheel
+             poppler-utils python3-hypothesis python3-xarray python3-pip python3-setuptools python3-wheel
 
 deps: ## install the Debian packages that are missing
 	@missing=$$(for p in $(DEPS); do \
