@@ -2,13 +2,13 @@
 """Wrong lines that a test must tell from the right ones: file -> (tests likely to tell, [(text, in its place, why)]).
 
 Each text stands once in its file. A test is a program of tests/unit or tests/physics (`unit/test_cells`), a file of
-Python tests (`cli/test_tow.py`), or scenes (`scenes:line,thrust`). Kinds: a sign, a bound, a term that is dropped, a
-barrier, a constant, an order, a check, a sync."""
+Python tests (`cli/test_tow.py`), or scenes (`scenes:line,thrust`; on threads and ranks: `ranks:line`). Kinds: a sign, a
+bound, a term that is dropped, a barrier, a constant, an order, a check, a sync."""
 
 DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,free_drift_start", "cli/test_balance.py"]
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
 PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
-RANKS = ["scenes:speed_direction,line,window,thrust,tide", "parallel/test_same_bits.py"]
+RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
 FILES = ["cli/test_faults.py", "cli/test_replace.py"]
 OBSERVE = ["cli/test_balance.py", "cli/test_tow.py", "scenes:line_bridle_breaks,thrust,impacts_sine"]
@@ -110,8 +110,8 @@ MUTANTS = {
         ("b[i] + u->w12 * l[1 - i]", "b[i]", "points are not coupled"),
         ("- u->w12 * u->ln[1 - i];", ";", "impulse of the other point stays in the velocity"),
     ]),
-    "src/solve/restitution.c": (["physics/test_impacts", "scenes:restitution,solver_settings",
-                                 "parallel/test_same_bits.py"], [
+    "src/solve/restitution.c": (["physics/test_impacts", "scenes:rebounds,restitution,solver_settings",
+                                 "ranks:rebounds,restitution", "parallel/test_ranks.py"], [
         ("any = b->restitution[ts->cell[k].contacts[i].b] > 0;", "any = 0;", "no rebound is ever lowered"),
         ("if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;", "", "a wall makes one island of all"),
         ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),

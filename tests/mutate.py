@@ -23,7 +23,7 @@ import tempfile
 import time
 
 from harness import ROOT, environment
-from mutants import MUTANTS, RANKS
+from mutants import MUTANTS
 
 HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
@@ -52,22 +52,20 @@ def name_of(mutant):
 
 
 def order_of(tests, wide):
-    """What to run, the cheapest first. Scenes need no other program, so those named come before what is compiled; a
-    bound that only ranks can show is looked for on ranks."""
-    scenes = [t for t in tests if t.startswith("scenes:")]
-    ranks = ["ranks:" + t[7:] for t in scenes if set(RANKS) <= set(tests)]
-    programs = [t for t in tests if t.startswith(("unit/", "physics/"))]
-    single = [t for t in tests if "::" in t]
-    quick = scenes + single + programs + ranks + ([] if single else [SOME])
+    """What to run, the cheapest first: scenes need no other program, so they come before what is compiled."""
+    kinds = [[t for t in tests if t.startswith("scenes:")], [t for t in tests if "::" in t],
+             [t for t in tests if t.startswith(("unit/", "physics/"))], [t for t in tests if t.startswith("ranks:")]]
+    quick = sum(kinds, []) + ([] if kinds[1] else [SOME])
     return [t for t in [*tests, *WIDE] if t not in quick] if wide else quick
 
 
 def run(words, tree, seconds):
     """Exit code and output; a group that hangs is killed whole, and counts as failed."""
+    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1, GOMP_SPINCOUNT=5000,
+                      BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none")
+    del env["OMP_WAIT_POLICY"]  # as tests/run.sh has it: threads that sleep do not race
     p = subprocess.Popen(words, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-                         start_new_session=True,
-                         env=environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1,
-                                         BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none"))
+                         start_new_session=True, env=env)
     try:
         out, _ = p.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:

@@ -221,6 +221,31 @@ static void free_drift_stays(void **state)
     }
 }
 
+/// A floe at rest goes as soon as one thing pushes it, in whatever direction: on a slope a t exactly, in a wind to its
+/// lee.
+static void what_is_pushed_does_not_rest(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        bt_params p = scene_params(0.5, 1);
+        double *const push[] = {&p.air_u, &p.air_v, &p.water_u, &p.water_v, &p.tilt_ax, &p.tilt_ay};
+        *push[k] = -1e-2;
+        if (k == 2) p.air_u = p.water_u; // or the wind alone would keep it awake
+        if (k == 3) p.air_v = p.water_v;
+        double v[8];
+        scene_square(1, v);
+        bt_body_def d = scene_prism(4, v, 20);
+        if (k < 4) d.drag = (bt_drag){.water_skin = 3, .air_skin = 0.01};
+        bt_world *w = one_body(p.dt, &d);
+        w->par = p;
+        for (int s = 0; s < 8; s++) bt_world_step(w);
+        const double along = k & 1 ? w->bodies.vel[0].y : w->bodies.vel[0].x;
+        if (k < 4) assert_true(along < -1e-9 && along > -1e-2);
+        else CHECK_CLOSE(along, -1e-2 * 8 * p.dt, 1e-16);
+        bt_world_free(w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -229,6 +254,7 @@ int main(void)
         cmocka_unit_test(drag_never_reverses),
         cmocka_unit_test(added_mass_takes_no_part),
         cmocka_unit_test(free_drift_stays),
+        cmocka_unit_test(what_is_pushed_does_not_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,6 +44,27 @@ static const bt_force_law spring_law = {.name = "spring",
                                         .n_keys = 2,
                                         .add = spring};
 
+// --- a motor: a thrust that rises with time, a damper that turns -----------------------------------------------------
+
+static void motor(const bt_force_body *b, bt_load *l)
+{
+    l->fx += b->own[0] * b->time;
+    l->gw += b->own[1];
+    l->jw += b->own[1] * b->own[2];
+}
+
+static const bt_law_key motor_keys[] = {
+    {"thrust_rate", "", "0", "[0, 1e9]", "thrust for each second, N/s"},
+    {"damping", "", "0", "[0, 1e9]", "moment for each rate of turn, N m s"},
+    {"rate", "", "0", "[0, 10]", "rate of turn that it drives to, rad/s"},
+};
+static const bt_force_law motor_law = {.name = "motor",
+                                       .doc = "thrust that rises with time, and a damper that turns",
+                                       .towed_only = true,
+                                       .keys = motor_keys,
+                                       .n_keys = 3,
+                                       .add = motor};
+
 static double *own_of(bt_world *w, const bt_force_law *law)
 {
     for (int k = 0; k < w->forces->n; k++)
@@ -205,7 +226,7 @@ static void the_tow_bears_it_at_a_set_speed(void **state)
         const double force = 12 * width_of(w, bt_world_towed(w)),
                      waves = force * cos(BT_PI / 6) + 0.7 * force * (0.05 - v), pull = -3 * x;
         const int n = bt_n_added();
-        assert_int_equal(n, 2);
+        assert_int_equal(n, 3);
         CHECK_CLOSE(o.added[0], -waves, 1e-12 * force);
         CHECK_CLOSE(o.added[1], -pull, 1e-12 * (force + fabs(pull)));
         const double others = o.ice_resistance + o.drag_force + o.coriolis_force + o.tilt_force + o.inertia_force;
@@ -257,6 +278,29 @@ static void the_momentum_balance_closes_on_a_line(void **state)
         assert_true(w->stats.momentum_residual < 1e-12);
     }
     assert_true(turned > 0.05 && touched > 20 && worked > 100);
+    bt_world_free(w);
+}
+
+/// Forces are those of the middle of a step, so k t gives k t²/2m exactly; a damper gives a moment by itself:
+/// I (ω2 − ω1) = Δt g (Ω − ω2).
+static void thrust_of_the_middle_and_moment(void **state)
+{
+    (void)state;
+    enum { STEPS = 30 };
+    const double rate = 0.7, damping = 5, turn = 0.3;
+    bt_params p = scene_params(0.2, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, 20);
+    d.large = true;
+    w->towed = bt_world_add(w, &d);
+    own_of(w, &motor_law)[0] = rate, own_of(w, &motor_law)[1] = damping, own_of(w, &motor_law)[2] = turn;
+    for (int s = 0; s < STEPS; s++) bt_world_step(w);
+    const bt_vel *u = &w->bodies.vel[bt_world_towed(w)];
+    const double time = STEPS * p.dt, left = pow(1 + p.dt * damping / d.inertia, -STEPS);
+    CHECK_CLOSE(u->x, 0.5 * rate * time * time / d.mass, 1e-13);
+    CHECK_CLOSE(u->w, turn * (1 - left), 1e-13);
     bt_world_free(w);
 }
 
@@ -405,7 +449,7 @@ static int set_up(void **state)
     (void)state;
     bt_errors err = {0};
     return !mkdtemp(folder) || bt_force_register(&wave_drift_law, &err) != BT_OK ||
-           bt_force_register(&spring_law, &err) != BT_OK;
+           bt_force_register(&spring_law, &err) != BT_OK || bt_force_register(&motor_law, &err) != BT_OK;
 }
 
 static int clean_up(void **state)
@@ -423,6 +467,7 @@ int main(void)
         cmocka_unit_test(its_keys_are_keys_of_the_case),
         cmocka_unit_test(the_tow_bears_it_at_a_set_speed),
         cmocka_unit_test(the_momentum_balance_closes_on_a_line),
+        cmocka_unit_test(thrust_of_the_middle_and_moment),
         cmocka_unit_test(undisturbed_ice_feels_it),
         cmocka_unit_test(floes_rest_only_without_it),
         cmocka_unit_test(a_run_records_it_and_a_resumed_run_the_same),
