@@ -4,7 +4,7 @@
 and tests run until one fails: the quick ones of those named with it, then two dozen scenes on one rank, which take some
 seconds; with --wide, for survivors, the slow ones named with it, all scenes and the wider suite.
 
-    tests/mutate.py [-j N] [--only TEXT] [--first N] [--wide] [--seconds S]
+    tests/mutate.py [-j N] [--only TEXT] [--first N] [--again] [--wide] [--seconds S]
 
 Results are kept in build/mutate/results.json, by text: a call goes on where the last one ended. Exit code 1 where a
 mutant survives. Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a
@@ -37,6 +37,7 @@ PROGRAMS = [f"{p.parent.name}/{p.stem}" for p in sorted(ROOT.glob("tests/*/test_
 SOME = ("scenes:rebounds,slope,drag_and_mass,few_sweeps,solver_settings,restitution,crushing_press,rafting_press,"
         "body_in_parts_outlines,window_backwards,thrust_waypoints,vessel_details,bridle_unequal,tilt_dynamic,tables,"
         "walls_closing,open_sides,lead_managed,cold_start,plain_schedule,floes_of_each_shape,heavy_body_against_wall")
+AMONG = "ranks:walls_closing,rebounds,few_sweeps,line,window"
 WIDE = ["scenes:", *PROGRAMS, "parallel/test_scenes.py", "parallel/test_same_bits.py", "parallel/test_ranks.py",
         "cli/test_balance.py", "cli/test_tow.py", "cli/test_resume.py", "cli/test_run.py", "cli/test_random_cases.py",
         "parallel/test_everything.py"]
@@ -51,10 +52,16 @@ def name_of(mutant):
     return f"{mutant[0]}: {mutant[1]} -> {mutant[2]}"
 
 
-def order_of(tests, wide):
-    """What to run, the cheapest first: scenes need no other program, so they come before what is compiled."""
+def order_of(mutant, wide):
+    """What to run, the cheapest first: scenes need no other program, so they come before what is compiled. What only
+    ranks can show is looked for on ranks first."""
+    tests = mutant[4]
+    if "domain" in mutant[1] and not any(t.startswith("ranks:") for t in tests):
+        tests = [*tests, AMONG]
     kinds = [[t for t in tests if t.startswith("scenes:")], [t for t in tests if "::" in t],
              [t for t in tests if t.startswith(("unit/", "physics/"))], [t for t in tests if t.startswith("ranks:")]]
+    if "domain" in mutant[1]:
+        kinds.reverse()
     quick = sum(kinds, []) + ([] if kinds[1] else [SOME])
     return [t for t in [*tests, *WIDE] if t not in quick] if wide else quick
 
@@ -143,7 +150,7 @@ def fails(tree, test):
 
 
 def killed_by(tree, mutant, wide):
-    path, text, instead, _, tests = mutant
+    path, text, instead = mutant[:3]
     target = tree / path
     source = target.read_text()
     assert source.count(text) == 1, f"{path}: {source.count(text)} times: {text}"
@@ -152,7 +159,7 @@ def killed_by(tree, mutant, wide):
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        for test in order_of(tests, wide):
+        for test in order_of(mutant, wide):
             found = fails(tree, test)
             if found:
                 return found
@@ -201,13 +208,15 @@ def main():
     p.add_argument("--only", default="", help="mutants whose file, text or reason holds this")
     p.add_argument("--first", type=int, default=0, help="so many, evenly over the list")
     p.add_argument("--wide", action="store_true", help="survivors alone, against the wider suite")
+    p.add_argument("--again", action="store_true", help="survivors alone, after new tests")
     p.add_argument("--seconds", type=float, default=1e9, help="begin none after this time")
     p.add_argument("--report", action="store_true", help="only print what is known")
     a = p.parse_args()
     HERE.mkdir(parents=True, exist_ok=True)
     kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     mutants = [m for m in listed() if a.only in " ".join(m[:4])]
-    todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if a.wide else name_of(m) not in kept)]
+    alive = a.wide or a.again
+    todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if alive else name_of(m) not in kept)]
     if a.first and len(todo) > a.first:
         todo = [todo[k * len(todo) // a.first] for k in range(a.first)]
     if a.report:
