@@ -47,7 +47,7 @@ MUTANTS = {
         ("((double)w->step + 0.5) * w->par.dt", "((double)w->step + 1) * w->par.dt", "forces at the end of the step"),
         ("if (law->towed_only && !b->towed) return;", "", "a tow's law on every floe"),
     ]),
-    "src/force/forces.c": (DRAG, [
+    "src/force/forces.c": (DRAG + ["unit/test_cells"], [
         ("{1 / (m + dt * a.g), 1 / (inertia + dt * a.gw)};", "{1 / m, 1 / (inertia + dt * a.gw)};", "explicit mass"),
         ("1 / (inertia + dt * a.gw)};", "1 / inertia};", "yaw drag outside the effective inertia"),
         (".water_form = 0.5 * water_density", ".water_form = water_density", "twice the form drag of the water"),
@@ -120,7 +120,7 @@ MUTANTS = {
          "k++)\n        for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {\n            bt_contact *u",
          "    if (any == 0) return false;\n    for (bt_idx k = 0; k < ts->n; k++)\n        for (bt_idx j = 0; j < "
          "ts->cell[k].n_contacts; j++) {\n            bt_contact *u", "ranks disagree whether to solve again"),
-        ("s->name[p] = s->name[p] < s->name[q] ? s->name[p] : s->name[q];", "", "islands of ranks are named by chance"),
+        ("s->root[root_of(s, u->b)] = root_of(s, u->a);", "", "every floe an island"),
         ("if (normal == 0 || u->n == 0) continue;", "if (normal == 0) continue;", "sheets pay for rebounds"),
         ("bt_pack_bias(w, &ts->cell[k].contacts[i], &ts->cell[k].gaps[i], 1);", ";", "a lowered rebound stays lowered"),
     ]),
