@@ -41,8 +41,10 @@ LOOKS = len(FIELDS)
 TRIES = 3                   # values of a quantity after each other, at most
 MARGIN = 0.1
 BUDGET = 10.0               # min
+WINDOW_TOO_EARLY = "no longer ramp ends before the window: tow for longer, with a later window"
 EFFORT = 0.05               # relative error of the mean that the number of fields is for
 RAMP = 4.0                  # the ramp is made so many times as long
+LATEST = 0.8                # of the beginning of the window: where a ramp ends at the latest
 
 
 # ---- what is varied
@@ -54,10 +56,12 @@ def times(key, factor):
 
 
 def slower_start(run, k):
-    """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size."""
+    """RAMP times as long each time; from no ramp at all, first the time in which the body moves by its own size. It
+    ends well before the window."""
     first = run.value("tow.ramp")
     own = run.value("body.length") / run.value("tow.speed")
-    return {"tow.ramp": first * RAMP ** k if first > 0 else own * RAMP ** (k - 1)}
+    ramp = first * RAMP ** k if first > 0 else own * RAMP ** (k - 1)
+    return {"tow.ramp": max(first, min(ramp, LATEST * run.window[0])) if run.window else ramp}
 
 
 def longer(run, k):
@@ -169,15 +173,11 @@ def vary(study, kind, margin, most=TRIES):
         rows.append(row | compare(study, kind, names[k], tries[k], names[k + 1], tries[k + 1], margin))
         found = rows[-1]["judged"]
         rows[-1]["recommended"] = a if found == "none" else b if found == "matters" else None
-        if found != "matters" or not possible(study, kind, b):
+        if found == "matters" and b == a:
+            rows[-1] |= {"recommended": None, "why": WINDOW_TOO_EARLY}
+        if found != "matters" or b == a:
             break
     return rows
-
-
-def possible(study, kind, value):
-    """A ramp must end before the window begins."""
-    with Run(study.path("case", 0)) as run:
-        return kind.name != "start" or run.window is None or value < run.window[0]
 
 
 def window(study, margin):

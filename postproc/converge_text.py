@@ -28,6 +28,8 @@ def advice(row):
         return f"{value(row, 'recommended')} fields for {100 * row['wanted_error']:g} %"
     if row["judged"] == "none":
         return f"{at} will do"
+    if row["judged"] == "matters" and row.get("recommended") is None:
+        return row["why"]
     if row["judged"] == "matters" and row.get("walls"):
         return f"the walls are felt; without them, take {at} or {row['finer']}"
     if row["judged"] == "matters":

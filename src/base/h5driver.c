@@ -94,7 +94,36 @@ static void put(driver_file *f, haddr_t address, size_t size, const char *p)
     if (!*f->errnum) *f->errnum = bt_file_put(f->fd, (off_t)address, p, size);
 }
 
-static bool waits(const page *g, size_t i) { return g->waits[i / WORD] >> i % WORD & 1; }
+static bool bit_of(const uint64_t *bits, size_t i) { return bits[i / WORD] >> i % WORD & 1; }
+
+/// The first place from i on whose bit is `set`; PAGE where there is none. By words: a page is looked at many times.
+static size_t first_place(const uint64_t *bits, size_t i, bool set)
+{
+    while (i < PAGE) {
+        const uint64_t word = (set ? bits[i / WORD] : ~bits[i / WORD]) >> i % WORD;
+        if (word) return i + (size_t)__builtin_ctzll(word);
+        i += WORD - i % WORD;
+    }
+    return PAGE;
+}
+
+static void set_bits(uint64_t *bits, size_t from, size_t to, bool set)
+{
+    while (from < to) {
+        const size_t n = to - from < WORD - from % WORD ? to - from : WORD - from % WORD;
+        const uint64_t mask = (n == WORD ? ~(uint64_t)0 : ((uint64_t)1 << n) - 1) << from % WORD;
+        if (set) bits[from / WORD] |= mask;
+        else bits[from / WORD] &= ~mask;
+        from += n;
+    }
+}
+
+/// What of a page lies between two addresses: places from *from to the one returned.
+static size_t part_of(const page *g, haddr_t address, haddr_t end, size_t *from)
+{
+    *from = address > g->at ? (size_t)(address - g->at) : 0;
+    return g->at + PAGE < end ? PAGE : (size_t)(end - g->at);
+}
 
 /// The first page that ends beyond an address.
 static size_t page_from(const driver_file *f, haddr_t address)
@@ -139,12 +168,8 @@ static void keep_waiting(driver_file *f, bool index, haddr_t address, size_t siz
         }
         const size_t from = (size_t)(address - g->at), n = size < PAGE - from ? size : PAGE - from;
         memcpy(g->byte + from, p, n);
-        for (size_t i = from; i < from + n; i++) {
-            const uint64_t bit = (uint64_t)1 << i % WORD;
-            g->waits[i / WORD] |= bit;
-            if (index) g->index[i / WORD] |= bit;
-            else g->index[i / WORD] &= ~bit;
-        }
+        set_bits(g->waits, from, from + n, true);
+        set_bits(g->index, from, from + n, index);
         address += n;
         p += n;
         size -= n;
@@ -155,9 +180,9 @@ static void keep_waiting(driver_file *f, bool index, haddr_t address, size_t siz
 static void forget(driver_file *f, haddr_t address, haddr_t end)
 {
     for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < end; k++) {
-        page *g = f->pages[k];
-        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < end; i++)
-            g->waits[i / WORD] &= ~((uint64_t)1 << i % WORD);
+        size_t from;
+        const size_t to = part_of(f->pages[k], address, end, &from);
+        set_bits(f->pages[k]->waits, from, to, false);
     }
 }
 
@@ -166,8 +191,13 @@ static void overlay(const driver_file *f, haddr_t address, size_t size, char *p)
 {
     for (size_t k = page_from(f, address); k < f->n_pages && f->pages[k]->at < address + size; k++) {
         const page *g = f->pages[k];
-        for (size_t i = address > g->at ? (size_t)(address - g->at) : 0; i < PAGE && g->at + i < address + size; i++)
-            if (waits(g, i)) p[g->at + i - address] = g->byte[i];
+        size_t from;
+        const size_t to = part_of(g, address, address + size, &from);
+        while ((from = first_place(g->waits, from, true)) < to) {
+            const size_t gap = first_place(g->waits, from, false), n = (gap < to ? gap : to) - from;
+            memcpy(p + (g->at + from - address), g->byte + from, n);
+            from += n;
+        }
     }
 }
 
@@ -190,8 +220,8 @@ static void put_run(driver_file *f, haddr_t address, haddr_t end)
 static void put_superblock(driver_file *f)
 {
     const size_t k = page_from(f, f->super);
-    if (k == f->n_pages || f->pages[k]->at > f->super || !waits(f->pages[k], (size_t)(f->super - f->pages[k]->at)))
-        return;
+    if (k == f->n_pages || f->pages[k]->at > f->super) return;
+    if (!bit_of(f->pages[k]->waits, (size_t)(f->super - f->pages[k]->at))) return;
     struct stat st;
     if (!*f->errnum &&
         (fstat(f->fd, &st) != 0 ||
@@ -201,30 +231,33 @@ static void put_superblock(driver_file *f)
     forget(f, f->super, f->super_end);
 }
 
-/// Is byte i of a page of an index that was there at the last flush?
-static bool old_index(const driver_file *f, const page *g, size_t i)
-{
-    return g->at + i < f->flushed && (g->index[i / WORD] >> i % WORD & 1);
-}
-
 /// Bytes without a gap, all of an old index or none, all old or all new.
 typedef struct run {
     haddr_t begin, end;
     bool index;
 } run;
 
+/// Where the bytes of a page that wait from i on end, or change between index and none, or old and new.
+static size_t end_of_run(const driver_file *f, const page *g, size_t i)
+{
+    const size_t gap = first_place(g->waits, i, false), other = first_place(g->index, i, !bit_of(g->index, i));
+    const size_t end = gap < other ? gap : other;
+    return g->at + i < f->flushed && f->flushed < g->at + end ? (size_t)(f->flushed - g->at) : end;
+}
+
 /// All that waits, by address. NULL without memory, or when nothing waits.
 static run *runs_of(driver_file *f, size_t *n)
 {
     run *all = NULL;
     size_t cap = *n = 0;
-    for (size_t k = 0; k < f->n_pages; k++)
-        for (size_t i = 0; i < PAGE; i++) {
-            const page *g = f->pages[k];
-            if (!waits(g, i)) continue;
-            const bool index = old_index(f, g, i);
-            if (*n > 0 && all[*n - 1].end == g->at + i && all[*n - 1].index == index && all[*n - 1].end != f->flushed) {
-                all[*n - 1].end++;
+    for (size_t k = 0; k < f->n_pages; k++) {
+        const page *g = f->pages[k];
+        for (size_t i = 0, end; (i = first_place(g->waits, i, true)) < PAGE; i = end) {
+            end = end_of_run(f, g, i);
+            const bool index = g->at + i < f->flushed && bit_of(g->index, i);
+            run *last = *n > 0 ? &all[*n - 1] : NULL;
+            if (last && last->end == g->at + i && last->index == index && last->end != f->flushed) {
+                last->end = g->at + end;
                 continue;
             }
             if (*n == cap) {
@@ -235,8 +268,9 @@ static run *runs_of(driver_file *f, size_t *n)
                 }
                 all = more;
             }
-            all[(*n)++] = (run){g->at + i, g->at + i + 1, index};
+            all[(*n)++] = (run){g->at + i, g->at + end, index};
         }
+    }
     return all;
 }
 

@@ -22,11 +22,20 @@ enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 };
 
 static long writes_left = -1; // until the writer dies; −1: it lives
 
+typedef struct {
+    size_t begin, end;
+} span;
+
+enum { MOST_SPANS = 4096 };
+static span written[MOST_SPANS]; // of the writes since somebody set the number to 0
+static int n_written;
+
 /// In place of the C library's: writes as it does, until the one at which the program is killed.
 ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
 {
     if (writes_left == 0) _exit(9);
     if (writes_left > 0) writes_left--;
+    if (n_written < MOST_SPANS) written[n_written++] = (span){(size_t)at, (size_t)at + n};
     return syscall(SYS_pwrite64, fd, data, n, at);
 }
 
@@ -250,9 +259,102 @@ static void a_file_of_many_changes_is_whole(void **state)
     unlink(theirs);
 }
 
+enum { LENGTH = 20000, NONE = 0, HEADER = 1, INDEX = 2 };
+
+/// What the driver should hold, a byte each.
+typedef struct {
+    unsigned char byte[LENGTH], waits[LENGTH]; ///< waits: NONE, HEADER or INDEX
+    size_t end, flushed;
+} plain_file;
+
+static int kind_of(const plain_file *m, size_t i)
+{
+    return i < m->flushed && m->waits[i] == INDEX ? INDEX : HEADER;
+}
+
+/// The runs of bytes that a flush should write, in their order. Returns their number.
+static int expected_runs(const plain_file *m, span out[MOST_SPANS])
+{
+    static span by_address[MOST_SPANS];
+    int n = 0, k = 0;
+    for (size_t i = 0; i < LENGTH; i++) {
+        if (m->waits[i] == NONE) continue;
+        span *last = n ? &by_address[n - 1] : NULL;
+        if (last && last->end == i && i != m->flushed && kind_of(m, i) == kind_of(m, last->begin)) last->end++;
+        else by_address[n++] = (span){i, i + 1};
+    }
+    for (int r = 0; r < n; r++)
+        if (by_address[r].begin >= m->flushed) out[k++] = by_address[r];
+    for (int r = 0; r < n; r++)
+        if (by_address[r].begin < m->flushed && kind_of(m, by_address[r].begin) == INDEX) out[k++] = by_address[r];
+    for (int r = n - 1; r >= 0; r--)
+        if (by_address[r].begin < m->flushed && kind_of(m, by_address[r].begin) != INDEX) out[k++] = by_address[r];
+    assert_int_equal(k, n);
+    return n;
+}
+
+static void check_flush(H5FD_t *file, plain_file *m)
+{
+    static span wanted[MOST_SPANS];
+    const int n = expected_runs(m, wanted);
+    n_written = 0;
+    assert_true(H5FDflush(file, H5P_DEFAULT, false) >= 0);
+    assert_int_equal(n_written, n);
+    assert_memory_equal(written, wanted, (size_t)n * sizeof *wanted);
+    memset(m->waits, NONE, sizeof m->waits);
+    m->flushed = m->end;
+}
+
+// Red: a run that goes over a gap, over the end of the last flush, or from an index to a header; what waits not seen by
+// a read, or seen after data took its place.
+static void every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/bt_h5driver_XXXXXX";
+    close(mkstemp(path));
+    static plain_file m;
+    unsigned char some[600], back[600];
+    uint64_t seed = 1;
+    int errnum = 0, flushes = 0;
+    const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+    assert_true(bt_h5driver_select(access, &errnum) >= 0);
+    H5FD_t *file = H5FDopen(path, H5F_ACC_RDWR | H5F_ACC_TRUNC, access, HADDR_UNDEF);
+    assert_non_null(file);
+    assert_true(H5FDset_eoa(file, H5FD_MEM_DEFAULT, LENGTH) >= 0);
+    m = (plain_file){0};
+    for (int n = 0; n < 20000; n++) {
+        const size_t most = n < 2000 ? 1 + (size_t)n * 9 : LENGTH - 700; // the file grows
+        const size_t at = 1 + (size_t)(scene_uniform(&seed) * (double)most);
+        const size_t size = 1 + (size_t)(scene_uniform(&seed) * (scene_uniform(&seed) < 0.8 ? 40 : 600));
+        const double choice = scene_uniform(&seed);
+        if (choice < 0.25) {
+            assert_true(H5FDread(file, H5FD_MEM_OHDR, H5P_DEFAULT, at, size, back) >= 0);
+            assert_memory_equal(back, m.byte + at, size);
+        } else if (choice < 0.99) {
+            const int kind = choice < 0.35 ? NONE : choice < 0.7 ? HEADER : INDEX;
+            for (size_t i = 0; i < size; i++) some[i] = (unsigned char)(256 * scene_uniform(&seed));
+            const H5FD_mem_t type = kind == NONE ? H5FD_MEM_DRAW : kind == HEADER ? H5FD_MEM_OHDR : H5FD_MEM_BTREE;
+            assert_true(H5FDwrite(file, type, H5P_DEFAULT, at, size, some) >= 0);
+            memcpy(m.byte + at, some, size);
+            memset(m.waits + at, kind, size);
+            if (at + size > m.end) m.end = at + size;
+        } else {
+            check_flush(file, &m);
+            flushes++;
+        }
+    }
+    check_flush(file, &m);
+    assert_true(flushes > 100 && errnum == 0);
+    assert_true(H5FDclose(file) >= 0);
+    H5Pclose(access);
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows),
-                                       cmocka_unit_test(a_file_of_many_changes_is_whole)};
+                                       cmocka_unit_test(a_file_of_many_changes_is_whole),
+                                       cmocka_unit_test(
+                                           every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
