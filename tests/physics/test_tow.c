@@ -126,7 +126,8 @@ static void a_slack_line_is_no_damper(void **state)
     bt_world_free(w);
 }
 
-/// A stretched line that slackens within the step damps as long as it is stretched: T Δt = Δt (k s − c v) / (1 + Δt c/m).
+/// A stretched line that slackens within the step damps as long as it is stretched:
+/// T Δt = Δt (k s − c v) / (1 + Δt c/m).
 static void a_stretched_line_damps_while_it_slackens(void **state)
 {
     (void)state;
