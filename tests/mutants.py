@@ -138,7 +138,7 @@ MUTANTS = {
         ("st->projected = work.residual <= p.tolerance;", "", "what is left of overlap is not told"),
         ("bt_domain_settle(w, w->solver->shifted ? w->solver->shift : NULL);", "", "ghosts are not shifted"),
     ]),
-    "src/solve/solver.c": (SOLVE + ["physics/test_tow", "scenes:line,solver_settings,cold_start"], [
+    "src/solve/solver.c": (SOLVE + ["physics/test_tow", "unit/test_cells", "scenes:line,solver_settings,cold_start"], [
         ("#define UPDATES 6.0", "#define UPDATES 2.0", "steps end before they are solved"),
         ("#define ENOUGH 0.3", "#define ENOUGH 3.0", "cells are left too early"),
         ("u->ln[j] = bt_min(u->ln[j], cell->laws.limits[i].most[j]);", ";", "impulses start beyond their bound"),

@@ -166,7 +166,7 @@ def by_hand(table, folder, seed, parts, number):
     case["run"]["duration"] = dt * STEPS
     case["output"] = {"frame_interval": dt}
     case["guard"] = {"overlap": 0, "energy": 0, "unconverged": 0, "escape": False}
-    case["solver"] = {"tolerance": 1e-10, "reference_speed": speed, "max_sweeps": 20000, "position_sweeps": 20000,
+    case["solver"] = {"tolerance": 1e-10, "reference_speed": speed, "max_sweeps": 2000, "position_sweeps": 2000,
                       "slop": 1e-9}
     return case
 
