@@ -31,6 +31,7 @@ for f in $(files '*.py'); do
     "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
 "$python" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
+"$python" tests/mutants.py || complain "mutants: their texts have to follow the sources"
 # shellcheck disable=SC2046 # one word a file
 "$python" tests/columns.py $(files '*.c' '*.h' '*.py' '*.md' \
     '*.sh' '*.js' '*.css' '*.html' '*.yml' '*.supp' \

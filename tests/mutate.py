@@ -1,10 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
 """Does the suite tell wrong lines from right ones? Each mutant of tests/mutants.py is built in a copy of the source,
-and tests run until one fails: the quick ones of those named with it; with --wide, for survivors, the others and the
-wider suite.
+and tests run until one fails: the quick ones of those named with it, then two dozen scenes on one rank, which take some
+seconds; with --wide, for survivors, the slow ones named with it, all scenes and the wider suite.
 
-    tests/mutate.py [-j N] [--only TEXT] [--first N] [--wide] [--seconds S]
+    tests/mutate.py [-j N] [--only TEXT] [--first N] [--again] [--wide] [--seconds S]
 
 Results are kept in build/mutate/results.json, by text: a call goes on where the last one ended. Exit code 1 where a
 mutant survives. Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a
@@ -27,11 +27,17 @@ from mutants import MUTANTS
 
 HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
-PATIENCE = {"build": 300, "test": 240}
+PATIENCE = {"build": 300, "test": 240, "scene": 40}
+# (ranks, threads) of the legs of a run
+LAYOUTS = {"scenes": [((1, 1),)], "ranks": [((1, 2),), ((3, 2), (2, 1))]}
 # Half the time of -O3 to compile, and the same bits.
 MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG"]
 PROGRAMS = [f"{p.parent.name}/{p.stem}" for p in sorted(ROOT.glob("tests/*/test_*.c")) if p.parent.name != "fuzz"]
-SOME = "scenes:rebounds,slope,few_sweeps,crushing_press,rafting_press,solver_settings,body_in_parts_outlines,window"
+#: as different from each other as can be
+SOME = ("scenes:rebounds,slope,drag_and_mass,few_sweeps,solver_settings,restitution,crushing_press,rafting_press,"
+        "body_in_parts_outlines,window_backwards,thrust_waypoints,vessel_details,bridle_unequal,tilt_dynamic,tables,"
+        "walls_closing,open_sides,lead_managed,cold_start,plain_schedule,floes_of_each_shape,heavy_body_against_wall")
+AMONG = "ranks:walls_closing,rebounds,few_sweeps,line,window"
 WIDE = ["scenes:", *PROGRAMS, "parallel/test_scenes.py", "parallel/test_same_bits.py", "parallel/test_ranks.py",
         "cli/test_balance.py", "cli/test_tow.py", "cli/test_resume.py", "cli/test_run.py", "cli/test_random_cases.py",
         "parallel/test_everything.py"]
@@ -46,22 +52,27 @@ def name_of(mutant):
     return f"{mutant[0]}: {mutant[1]} -> {mutant[2]}"
 
 
-def quick_of(tests):
-    """Those of some seconds: scenes, as they need no other program, single tests, or else what is compiled."""
-    return ([t for t in tests if t.startswith("scenes:")] or [t for t in tests if "::" in t] or
-            [t for t in tests if t.startswith(("unit/", "physics/"))])
-
-
-def slow_of(tests):
-    return [t for t in tests if t not in quick_of(tests)]
+def order_of(mutant, wide):
+    """What to run, the cheapest first: scenes need no other program, so they come before what is compiled. What only
+    ranks can show is looked for on ranks first."""
+    tests = mutant[4]
+    if "domain" in mutant[1] and not any(t.startswith("ranks:") for t in tests):
+        tests = [*tests, AMONG]
+    kinds = [[t for t in tests if t.startswith("scenes:")], [t for t in tests if "::" in t],
+             [t for t in tests if t.startswith(("unit/", "physics/"))], [t for t in tests if t.startswith("ranks:")]]
+    if "domain" in mutant[1]:
+        kinds.reverse()
+    quick = sum(kinds, []) + ([] if kinds[1] else [SOME])
+    return [t for t in [*tests, *WIDE] if t not in quick] if wide else quick
 
 
 def run(words, tree, seconds):
     """Exit code and output; a group that hangs is killed whole, and counts as failed."""
+    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1, GOMP_SPINCOUNT=5000,
+                      BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none")
+    del env["OMP_WAIT_POLICY"]  # as tests/run.sh has it: threads that sleep do not race
     p = subprocess.Popen(words, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-                         start_new_session=True,
-                         env=environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1,
-                                         BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none"))
+                         start_new_session=True, env=env)
     try:
         out, _ = p.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
@@ -98,15 +109,15 @@ def prepare(n):
         assert code == 0, out
 
 
-def fails_scenes(tree, names):
-    """The first scene of those named, or of all, that is not what is stored of it, on one layout."""
+def fails_scenes(tree, names, layout):
+    """The first scene of those named, or of all, that is not what is stored of it."""
     import scenes  # reads BERGTOW as it is imported
+    scenes.PATIENCE = PATIENCE["scene"]
     _, _, stored = scenes.stored()
     binary = tree / "build/release/bergtow"
     for name in names or scenes.SCENES:
         with tempfile.TemporaryDirectory() as folder:
             try:
-                layout = scenes.layouts_of(name)[0]
                 found = scenes.digests(scenes.run_scene(pathlib.Path(folder) / "run", name, layout, binary=binary))
             except (scenes.Failed, subprocess.TimeoutExpired, OSError, KeyError, ValueError):
                 return name
@@ -117,9 +128,13 @@ def fails_scenes(tree, names):
 
 def fails(tree, test):
     """Does the test tell? The word for what did, or None."""
-    if test.startswith("scenes:"):
-        found = fails_scenes(tree, [n for n in test[7:].split(",") if n])
-        return found and f"scene {found}"
+    kind, _, names = test.partition(":")
+    if kind in ("scenes", "ranks"):
+        for layout in LAYOUTS[kind]:
+            found = fails_scenes(tree, [n for n in names.split(",") if n], layout)
+            if found:
+                return f"scene {found}" + (f" {layout}" if kind == "ranks" else "")
+        return None
     if test.startswith(("unit/", "physics/")):
         program = f"build/release/tests/{test}"
         code, out = make(tree, program)
@@ -135,7 +150,7 @@ def fails(tree, test):
 
 
 def killed_by(tree, mutant, wide):
-    path, text, instead, _, tests = mutant
+    path, text, instead = mutant[:3]
     target = tree / path
     source = target.read_text()
     assert source.count(text) == 1, f"{path}: {source.count(text)} times: {text}"
@@ -144,9 +159,7 @@ def killed_by(tree, mutant, wide):
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        slow = slow_of(tests)
-        rest = [SOME] + slow + [t for t in WIDE if t not in slow]
-        for test in rest if wide else quick_of(tests) or tests:
+        for test in order_of(mutant, wide):
             found = fails(tree, test)
             if found:
                 return found
@@ -195,13 +208,15 @@ def main():
     p.add_argument("--only", default="", help="mutants whose file, text or reason holds this")
     p.add_argument("--first", type=int, default=0, help="so many, evenly over the list")
     p.add_argument("--wide", action="store_true", help="survivors alone, against the wider suite")
+    p.add_argument("--again", action="store_true", help="survivors alone, after new tests")
     p.add_argument("--seconds", type=float, default=1e9, help="begin none after this time")
     p.add_argument("--report", action="store_true", help="only print what is known")
     a = p.parse_args()
     HERE.mkdir(parents=True, exist_ok=True)
     kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     mutants = [m for m in listed() if a.only in " ".join(m[:4])]
-    todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if a.wide else name_of(m) not in kept)]
+    alive = a.wide or a.again
+    todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if alive else name_of(m) not in kept)]
     if a.first and len(todo) > a.first:
         todo = [todo[k * len(todo) // a.first] for k in range(a.first)]
     if a.report:

@@ -22,13 +22,13 @@ static const double CHECKPOINT_BYTES_PER_FLOE = 1000;
 
 // Of result.h5 without data; of a frame: its group and five datasets (xdmf.h); of a dataset that is deflated, its
 // index.
-static const double RESULT_BASE = 255e3, FRAME_BASE = 2700, INDEX = 2600, LEAST_PACKED = 8192;
+static const double RESULT_BASE = 350e3, FRAME_BASE = 2700, INDEX = 2600, LEAST_PACKED = 8192;
 // Shares that shuffle and deflate leave: of poses, of corners, and of speeds and forces, which are 0 of most floes.
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
 static const double OTHERS_FRAME = 760; // towed body and walls: 80 corners, poses, speeds
 static const double IMPACT_ROWS = 256, IMPACT_COLUMNS = 13, SERIES_CHUNK = 256;
 static const double CHECKPOINT_BASE = 95e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
-static const double TEXTS = 30e3, XDMF_FRAME = 1730;
+static const double TEXTS = 38e3, XDMF_FRAME = 1730;
 static const double VORONOI_CORNERS = 5.6;
 
 double bt_cost_floe_step(double concentration)

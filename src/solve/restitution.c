@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Islands of touching bodies, over ranks too, and the work of their contacts.
 //
-// An island is named by the least gid in it as its rank sees it. Where islands of several ranks meet in a body that
+// An island is named by the gid of a body in it, that of its root. Where islands of several ranks meet in a body that
 // both hold, the names belong together: every rank gathers these few (name here, name there) links and joins them by
-// the same union-find; works of islands that reach over ranks are added as exact sums.
+// the same union-find; works of islands that reach over ranks are added as exact sums, so it does not matter which of
+// its bodies names an island.
 #include "solve/restitution.h"
 
 #include <math.h>
@@ -18,7 +19,7 @@
 
 typedef struct bt_islands {
     bt_idx *root;    ///< [n bodies] union-find of the movable bodies that touch
-    bt_gid *name;    ///< [n bodies] at the roots: least gid of the island, over ranks
+    bt_gid *name;    ///< [n bodies] at the roots: gid of a body of the island, the same on all ranks
     double *share;   ///< [n bodies] at the roots: factor on the restitution
     bt_sum *surplus; ///< [n bodies] at the roots: work of the island's contacts on this rank, less what is allowed, J
     bt_idx cap;
@@ -81,10 +82,7 @@ bool bt_restitution_begin(bt_world *w)
         for (bt_idx j = 0; j < ts->cell[k].n_contacts; j++) {
             const bt_contact *u = &ts->cell[k].contacts[j];
             if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;
-            const bt_idx p = root_of(s, u->a), q = root_of(s, u->b);
-            if (p == q) continue;
-            s->root[q] = p;
-            s->name[p] = s->name[p] < s->name[q] ? s->name[p] : s->name[q];
+            s->root[root_of(s, u->b)] = root_of(s, u->a);
         }
     if (w->domain) {
         bt_gid *name = bt_alloc((size_t)b->n, sizeof *name);

@@ -175,7 +175,6 @@ void bt_tow_begin_rows(bt_world *w)
         b->taut = !b->broken && (b->length > b->length0 || b->length + t->dt * rate > b->length0);
         b->a = b->broken ? 0 : t->dt * b->k * (b->length - b->length0);
         b->b = b->broken ? 0 : t->dt * (b->k * theta * t->dt + (b->taut ? b->c : 0));
-        if (!b->taut) b->lambda = 0;
     }
 }
 

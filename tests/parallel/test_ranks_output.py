@@ -27,7 +27,8 @@ ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 
 def described(dataset):
     """Its attributes, without those that hold references into the file (its axes)."""
-    return {k: np.asarray(v).tolist() for k, v in dataset.attrs.items() if k not in ("DIMENSION_LIST", "REFERENCE_LIST")}
+    references = "DIMENSION_LIST", "REFERENCE_LIST"
+    return {k: np.asarray(v).tolist() for k, v in dataset.attrs.items() if k not in references}
 
 
 def command(ranks, *arguments):

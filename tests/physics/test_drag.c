@@ -78,6 +78,31 @@ static void force_and_moment_are_the_integral(void **state)
     }
 }
 
+/// On a body that is led, deflection and the tilt that balances the current bear f k×(U − U_w) of its mass, along and
+/// across.
+static void a_led_body_is_deflected(void **state)
+{
+    (void)state;
+    uint64_t rng = 7;
+    for (int trial = 0; trial < 10; trial++) {
+        double v[8];
+        scene_square(2, v);
+        bt_body_def d = scene_prism(4, v, 10);
+        d.motion = BT_KINEMATIC, d.large = true, d.vx = scene_uniform(&rng) - 0.5, d.vy = scene_uniform(&rng) - 0.5;
+        bt_world *w = one_body(0.5, &d);
+        const double f = w->par.coriolis = 1e-2, u = w->par.balance_u = scene_uniform(&rng) - 0.5,
+                     o = w->par.balance_v = scene_uniform(&rng) - 0.5, push = 0.5 * d.mass * f;
+        bt_impulse law[BT_MAX_FORCE_LAWS], series[BT_MAX_FORCE_SERIES];
+        bt_forces_impulses(w, 0, law, series);
+        const bt_impulse turn = series[bt_force_series_find("coriolis")], tilt = series[bt_force_series_find("tilt")];
+        CHECK_CLOSE(turn.x, -push * d.vy, 1e-15);
+        CHECK_CLOSE(turn.y, push * d.vx, 1e-15);
+        CHECK_CLOSE(turn.x + tilt.x, -push * (d.vy - o), 1e-15);
+        CHECK_CLOSE(turn.y + tilt.y, push * (d.vx - u), 1e-15);
+        bt_world_free(w);
+    }
+}
+
 /// An outline with a bay has the drag of its hull, and in translation that of its width.
 static void a_bay_is_passed_by(void **state)
 {
@@ -221,14 +246,42 @@ static void free_drift_stays(void **state)
     }
 }
 
+/// A floe at rest goes as soon as one thing pushes it, in whatever direction: on a slope a t exactly, in a wind to its
+/// lee.
+static void what_is_pushed_does_not_rest(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 6; k++) {
+        bt_params p = scene_params(0.5, 1);
+        double *const push[] = {&p.air_u, &p.air_v, &p.water_u, &p.water_v, &p.tilt_ax, &p.tilt_ay};
+        *push[k] = -1e-2;
+        if (k == 2) p.air_u = p.water_u; // all goes with the water: that is rest
+        if (k == 3) p.air_v = p.water_v;
+        double v[8];
+        scene_square(1, v);
+        bt_body_def d = scene_prism(4, v, 20);
+        if (k < 4) d.drag = (bt_drag){.water_skin = 3, .air_skin = 0.01};
+        bt_world *w = one_body(p.dt, &d);
+        w->par = p;
+        assert_int_equal(bt_forces_rest(w), k == 2 || k == 3);
+        for (int s = 0; s < 8; s++) bt_world_step(w);
+        const double along = k & 1 ? w->bodies.vel[0].y : w->bodies.vel[0].x;
+        if (k < 4) assert_true(along < -1e-9 && along > -1e-2);
+        else CHECK_CLOSE(along, -1e-2 * 8 * p.dt, 1e-16);
+        bt_world_free(w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(force_and_moment_are_the_integral),
+        cmocka_unit_test(a_led_body_is_deflected),
         cmocka_unit_test(a_bay_is_passed_by),
         cmocka_unit_test(drag_never_reverses),
         cmocka_unit_test(added_mass_takes_no_part),
         cmocka_unit_test(free_drift_stays),
+        cmocka_unit_test(what_is_pushed_does_not_rest),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -44,6 +44,46 @@ static const bt_force_law spring_law = {.name = "spring",
                                         .n_keys = 2,
                                         .add = spring};
 
+// --- a motor: a thrust that rises with time, a damper that turns -----------------------------------------------------
+
+static void motor(const bt_force_body *b, bt_load *l)
+{
+    l->fx += b->own[0] * b->time;
+    l->gw += b->own[1];
+    l->jw += b->own[1] * b->own[2];
+}
+
+/// Takes back what Coriolis and skin drag do, but for a thousandth of the former at 1 m/s: no velocity balances it.
+static void follow(const bt_force_body *b, bt_load *l)
+{
+    const double u = b->vel.x - b->par->water_u, v = b->vel.y - b->par->water_v, slip = b->own[1] * hypot(u, v);
+    l->fx += b->own[0] * (b->vel.y + 1e-3) + slip * u;
+    l->fy += -b->own[0] * b->vel.x + slip * v;
+}
+
+static const bt_law_key motor_keys[] = {
+    {"thrust_rate", "", "0", "[0, 1e9]", "thrust for each second, N/s"},
+    {"damping", "", "0", "[0, 1e9]", "moment for each rate of turn, N m s"},
+    {"rate", "", "0", "[0, 10]", "rate of turn that it drives to, rad/s"},
+};
+static const bt_force_law motor_law = {.name = "motor",
+                                       .doc = "thrust that rises with time, and a damper that turns",
+                                       .towed_only = true,
+                                       .keys = motor_keys,
+                                       .n_keys = 3,
+                                       .add = motor};
+
+static const bt_law_key follow_keys[] = {
+    {"deflection", "", "0", "[0, 1e9]", "mass times Coriolis parameter, kg/s"},
+    {"skin", "", "0", "[0, 1e9]", "coefficient of skin drag, kg/m"},
+};
+static const bt_force_law follow_law = {.name = "follow",
+                                        .doc = "what keeps a body from ever drifting freely",
+                                        .towed_only = true,
+                                        .keys = follow_keys,
+                                        .n_keys = 2,
+                                        .add = follow};
+
 static double *own_of(bt_world *w, const bt_force_law *law)
 {
     for (int k = 0; k < w->forces->n; k++)
@@ -205,7 +245,7 @@ static void the_tow_bears_it_at_a_set_speed(void **state)
         const double force = 12 * width_of(w, bt_world_towed(w)),
                      waves = force * cos(BT_PI / 6) + 0.7 * force * (0.05 - v), pull = -3 * x;
         const int n = bt_n_added();
-        assert_int_equal(n, 2);
+        assert_int_equal(n, 4);
         CHECK_CLOSE(o.added[0], -waves, 1e-12 * force);
         CHECK_CLOSE(o.added[1], -pull, 1e-12 * (force + fabs(pull)));
         const double others = o.ice_resistance + o.drag_force + o.coriolis_force + o.tilt_force + o.inertia_force;
@@ -260,6 +300,29 @@ static void the_momentum_balance_closes_on_a_line(void **state)
     bt_world_free(w);
 }
 
+/// Forces are those of the middle of a step, so k t gives k t²/2m exactly; a damper gives a moment by itself:
+/// I (ω2 − ω1) = Δt g (Ω − ω2).
+static void thrust_of_the_middle_and_moment(void **state)
+{
+    (void)state;
+    enum { STEPS = 30 };
+    const double rate = 0.7, damping = 5, turn = 0.3;
+    bt_params p = scene_params(0.2, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, 20);
+    d.large = true;
+    w->towed = bt_world_add(w, &d);
+    own_of(w, &motor_law)[0] = rate, own_of(w, &motor_law)[1] = damping, own_of(w, &motor_law)[2] = turn;
+    for (int s = 0; s < STEPS; s++) bt_world_step(w);
+    const bt_vel *u = &w->bodies.vel[bt_world_towed(w)];
+    const double time = STEPS * p.dt, left = pow(1 + p.dt * damping / d.inertia, -STEPS);
+    CHECK_CLOSE(u->x, 0.5 * rate * time * time / d.mass, 1e-13);
+    CHECK_CLOSE(u->w, turn * (1 - left), 1e-13);
+    bt_world_free(w);
+}
+
 // --- ice -------------------------------------------------------------------------------------------------------------
 
 /// Undisturbed ice of a window moves as a floe among it that nothing touches, and begins as free drift has it.
@@ -295,6 +358,26 @@ static void undisturbed_ice_feels_it(void **state)
     // F (cos, sin) + g (U_w − U) + skin drag = 0 but for Coriolis and wind, which are small here
     assert_true(drift[0] > 0.1 + 0.1 && drift[1] > 0.1);
     bt_world_free(w);
+}
+
+/// Forces that nothing balances, although they are small beside each of them: no drift is found.
+static void no_drift_where_nothing_balances(void **state)
+{
+    (void)state;
+    for (int never = 0; never < 2; never++) {
+        bt_params p = scene_params(1e-3, 1);
+        p.coriolis = 1e-2, p.water_u = 1;
+        bt_world *w = bt_world_create(&p);
+        double v[8], drift[2];
+        scene_square(1, v);
+        bt_body_def d = scene_prism(4, v, 20);
+        d.large = true, d.drag.water_skin = 1e-3 * d.mass * p.coriolis;
+        w->towed = bt_world_add(w, &d);
+        if (never) own_of(w, &follow_law)[0] = d.mass * p.coriolis, own_of(w, &follow_law)[1] = d.drag.water_skin;
+        const bool hold[2] = {false, false};
+        assert_int_equal(bt_drift_velocity(w, bt_world_towed(w), hold, drift), !never);
+        bt_world_free(w);
+    }
 }
 
 /// A floe in water at rest: it rests without waves, and is moved by them, also in the step after they have risen.
@@ -405,7 +488,8 @@ static int set_up(void **state)
     (void)state;
     bt_errors err = {0};
     return !mkdtemp(folder) || bt_force_register(&wave_drift_law, &err) != BT_OK ||
-           bt_force_register(&spring_law, &err) != BT_OK;
+           bt_force_register(&spring_law, &err) != BT_OK || bt_force_register(&motor_law, &err) != BT_OK ||
+           bt_force_register(&follow_law, &err) != BT_OK;
 }
 
 static int clean_up(void **state)
@@ -423,7 +507,9 @@ int main(void)
         cmocka_unit_test(its_keys_are_keys_of_the_case),
         cmocka_unit_test(the_tow_bears_it_at_a_set_speed),
         cmocka_unit_test(the_momentum_balance_closes_on_a_line),
+        cmocka_unit_test(thrust_of_the_middle_and_moment),
         cmocka_unit_test(undisturbed_ice_feels_it),
+        cmocka_unit_test(no_drift_where_nothing_balances),
         cmocka_unit_test(floes_rest_only_without_it),
         cmocka_unit_test(a_run_records_it_and_a_resumed_run_the_same),
     };

@@ -177,6 +177,32 @@ static void projection_adds_no_velocity(void **state)
     bt_world_free(w);
 }
 
+/// Squares that hit each other with friction and rebound gain energy by Newton's law, and the restitution of their
+/// island is lowered. Another island, which touches no body of it but the same wall, keeps its own: −e v.
+static void a_rebound_is_lowered_in_its_island_alone(void **state)
+{
+    (void)state;
+    enum { SIDE = 4 };
+    const double v = 0.7, e = 0.9;
+    uint64_t rng = 5;
+    int lowered = 0;
+    for (int trial = 0; trial < 12; trial++) {
+        bt_params p = scene_params(0.02, 1);
+        bt_world *w = bt_world_create(&p);
+        scene_wall(w, 0, -50, 5, 50, 1.5);
+        for (int k = 0; k < SIDE * SIDE; k++)
+            add_square(w, -0.505 - 1.005 * (k % SIDE), -20 + 1.005 * (k / SIDE), 0, 2 * (1 + k % SIDE) * 0.5,
+                       scene_uniform(&rng) - 0.5, 1, 1.5, e);
+        add_square(w, -0.505, 20, 0, v, 0, 1, 0, e);
+        bt_world_step(w);
+        if (w->stats.converged) assert_true(w->stats.contact_work <= 1e-8);
+        lowered += w->stats.restitution_cut;
+        CHECK_CLOSE(w->bodies.vel[bt_world_index(w, 1 + SIDE * SIDE)].x, -e * v, 1e-8);
+        bt_world_free(w);
+    }
+    assert_true(lowered > 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -184,6 +210,7 @@ int main(void)
         cmocka_unit_test(eccentric_impact),       cmocka_unit_test(row_of_touching_floes),
         cmocka_unit_test(row_of_separate_floes),  cmocka_unit_test(no_tunnelling),
         cmocka_unit_test(heavy_body_squeezes_a_row), cmocka_unit_test(projection_adds_no_velocity),
+        cmocka_unit_test(a_rebound_is_lowered_in_its_island_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

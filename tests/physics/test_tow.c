@@ -126,6 +126,40 @@ static void a_slack_line_is_no_damper(void **state)
     bt_world_free(w);
 }
 
+/// A stretched line that slackens within the step damps as long as it is stretched:
+/// T Δt = Δt (k s − c v) / (1 + Δt c/m).
+static void a_stretched_line_damps_while_it_slackens(void **state)
+{
+    (void)state;
+    const double dt = 0.1, k = 40, c = 1, stretch = 0.01, v = 0.3;
+    bt_world *w = tow_world(dt, 50, (bt_drag){0});
+    bt_tow *t = w->tow;
+    t->mode = BT_TOW_LINE;
+    t->n_branches = 1;
+    t->branch[0] = (bt_branch){.length0 = 10, .k = k, .c = c};
+    t->carriage_x = 10 + stretch;
+    w->bodies.vel[bt_world_towed(w)].x = v;
+    bt_world_step(w);
+    assert_true(dt * v > stretch);
+    CHECK_CLOSE(bt_tow_tension(t, 0), (k * stretch - c * v) / (1 + dt * c / body_mass(w)), 1e-12);
+    bt_world_free(w);
+}
+
+/// A vessel without thrust on a slack line goes with the current, along its course and across.
+static void a_vessel_drifts_with_the_current(void **state)
+{
+    (void)state;
+    bt_world *w = vessel_world(0.1, 50, 1000, 1, 0, -20);
+    bt_tow *t = w->tow;
+    t->vessel.bollard_pull = 500;
+    t->vessel.free_resistance = 1e5;
+    w->par.water_u = 0.1, w->par.water_v = -0.4;
+    for (int s = 0; s < 50; s++) bt_world_step(w); // within 1 / (1 + R t/M)
+    CHECK_CLOSE(t->vessel.vx, 0.1, 1e-2);
+    CHECK_CLOSE(t->vessel.vy, -0.4, 1e-2);
+    bt_world_free(w);
+}
+
 /// Bridle: two branches at ±0.6 m. Their stiffnesses add along the tow; a body that is turned is turned back. Against
 /// drag k_d V² each carries half, more by the angle between them.
 static void bridle_shares_the_load(void **state)
@@ -480,6 +514,8 @@ int main(void)
         cmocka_unit_test(free_vessel_and_body_swing_with_the_reduced_mass),
         cmocka_unit_test(body_in_the_wind_swings_on_a_fixed_end),
         cmocka_unit_test(a_slack_line_is_no_damper),
+        cmocka_unit_test(a_stretched_line_damps_while_it_slackens),
+        cmocka_unit_test(a_vessel_drifts_with_the_current),
         cmocka_unit_test(bridle_shares_the_load),
         cmocka_unit_test(a_branch_breaks_at_its_load),
         cmocka_unit_test(the_other_branch_takes_over),

@@ -345,6 +345,31 @@ static void a_blow_goes_through_a_row(void **state)
     bt_world_free(w);
 }
 
+/// The work by which ranks are balanced is that of the sweeps, cell by cell: in batches, and of a large body.
+static void work_is_counted_cell_by_cell(void **state)
+{
+    (void)state;
+    bool outrun;
+    int64_t repeats, before = 0;
+    double lost;
+    bt_world *w = hit_row(8, 2.5, 0, &outrun, &repeats, &lost);
+    double s[8];
+    scene_square(5, s);
+    bt_body_def d = scene_prism(4, s, 100);
+    d.x = 10, d.large = true;
+    bt_world_add(w, &d);
+    for (int k = 0; k < 4; k++) {
+        bt_world_step(w);
+        int64_t work = 0;
+        for (bt_idx c = 0; c < w->cells->n; c++) work += w->cells->cell[c].work.updates;
+        assert_int_equal(work - before, w->stats.unit_updates);
+        before = work;
+    }
+    assert_true(w->cells->cell[w->cells->n - 1].work.updates > 0);
+    assert_true(before > w->cells->cell[w->cells->n - 1].work.updates);
+    bt_world_free(w);
+}
+
 /// (margin: a power of two, which is not rounded up). Do the contacts of every cell, together, have the pairs that
 /// testing all with all finds, each once?
 static void check_contacts(bt_world *w, double margin)
@@ -496,6 +521,7 @@ int main(void)
         cmocka_unit_test(uniform_current_is_a_moving_frame),
         cmocka_unit_test(old_displacements_are_forgotten),
         cmocka_unit_test(a_blow_goes_through_a_row),
+        cmocka_unit_test(work_is_counted_cell_by_cell),
         cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
         cmocka_unit_test(a_body_far_away_covers_no_cell),
