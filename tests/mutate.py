@@ -113,7 +113,7 @@ def fails_scenes(tree, names, layout):
     """The first scene of those named, or of all, that is not what is stored of it."""
     import scenes  # reads BERGTOW as it is imported
     scenes.PATIENCE = PATIENCE["scene"]
-    _, _, stored = scenes.stored()
+    _, stored = scenes.stored()
     binary = tree / "build/release/bergtow"
     for name in names or scenes.SCENES:
         with tempfile.TemporaryDirectory() as folder:
