@@ -2,8 +2,8 @@
 """Scenes with every mode and option leave what is stored of them, bit for bit, and the same in another layout.
 
 The digests in scenes.json hold for every libm, compiler and processor, so that they are one more proof of that.
-`tests/scenes.py --compare OLD_BINARY` shows what has moved. What is new in the output, a series or a key of the summary,
-is let through; what is gone or changed is named.
+`tests/scenes.py --compare OLD_BINARY` shows what has moved. What is new in the output, a series or a key of the
+summary, is let through; what is gone or changed is named.
 """
 import json
 import subprocess
