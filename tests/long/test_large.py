@@ -4,6 +4,7 @@ import os
 import signal
 import time
 
+import h5py
 import numpy as np
 import pytest
 
@@ -11,28 +12,44 @@ from harness import changed, write_case
 from resuming import assert_same_result, check_readable, children, done, started
 
 FOUR = 1 << 32
-# So loose and small a current of ice that hardly a floe meets another: what takes the time is the output.
+# Loose ice that a current sets in motion: what takes the time is the output.
+TILE, SIDE = 3600, 6 * 3600
 LOOSE = {
     "run": {"dt": 1, "duration": 300},
-    "domain": {"frame": "geographic", "sides": "periodic", "ends": "wall"},
-    "ice": {"concentration": 0.3, "size": 30, "thickness": 1, "shape": "voronoi", "start": "rest"},
-    "body": {"length": 80, "draft": 60},
-    "tow": {"mode": "speed", "speed": 0.5, "ramp": 0},
+    "domain": {"frame": "geographic", "x0": 0, "y0": 0, "length": SIDE, "width": SIDE, "sides": "periodic"},
+    "ice": {"concentration": 0.5, "size": 30, "thickness": 1, "start": "rest"},
+    "body": {"shape": "none"},
+    "tow": {"mode": "none"},
     "water": {"current_x": 0.1, "current_y": 0.05},
     "output": {"frame_interval": 1, "checkpoint_steps": 0, "checkpoint_wall": 0, "window_start": 1},
 }
 
 
-def field(floes, **changes):
-    """A case of about so many floes."""
-    side = (floes * np.pi / 4 * 30**2 / 0.3)**0.5
-    return changed(LOOSE, domain__length=side, domain__width=side, **changes)
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    """Some 330,000 floes: those of one tile side by side, for a field so large takes minutes to make."""
+    folder = tmp_path_factory.mktemp("field")
+    write_case(folder, changed(LOOSE, domain__length=TILE, domain__width=TILE))
+    done(1, "field", "case.yml", "-o", "tile.h5", cwd=folder)
+    with h5py.File(folder / "tile.h5") as f, h5py.File(folder / "field.h5", "w") as out:
+        tile = {k: f["floes"][k][:] for k in ("offsets", "vertices", "pose", "thickness")}
+        places = [(TILE * i, TILE * j, 0) for i in range(SIDE // TILE) for j in range(SIDE // TILE)]
+        floes = out.create_group("floes")
+        floes["offsets"] = np.append(np.concatenate([tile["offsets"][:-1] + k * tile["offsets"][-1]
+                                                     for k in range(len(places))]), len(places) * tile["offsets"][-1])
+        floes["vertices"] = np.tile(tile["vertices"], (len(places), 1))
+        floes["pose"] = np.concatenate([tile["pose"] + place for place in places])
+        floes["thickness"] = np.tile(tile["thickness"], len(places))
+        floes.attrs["ice_area"], floes.attrs["n_floes"] = SIDE**2, len(floes["pose"])
+        floes.attrs["concentration"] = f["floes"].attrs["concentration"]
+        assert len(floes["pose"]) > 300_000
+    return folder / "field.h5"
 
 
-def test_a_result_beyond_four_gigabytes(tmp_path):
+def test_a_result_beyond_four_gigabytes(tmp_path, field):
     """Killed when more than that is written, taken up by one rank: as the run that was never stopped, which one rank
     has written and packed."""
-    write_case(tmp_path, field(200_000, output__checkpoint_steps=50))
+    write_case(tmp_path, changed(LOOSE, run__duration=200, output__checkpoint_steps=40, ice__field=str(field)))
     p = started(2, "run", "case.yml", "-o", "killed", "--quiet", "--threads", 1, cwd=tmp_path)
     part = tmp_path / "killed/result.h5.tmp"
     while p.poll() is None and not (part.exists() and part.stat().st_size > 1.02 * FOUR):
@@ -63,10 +80,11 @@ def ranks_of(launcher):
 
 
 @pytest.mark.parametrize("rank", [0, 1])
-def test_a_rank_dies_in_a_checkpoint_of_300000_floes(tmp_path, rank):
+def test_a_rank_dies_in_a_checkpoint_of_300000_floes(tmp_path, field, rank):
     """kill -9 to one of two ranks while the file is being written: the launcher ends the other, the checkpoint before
     it still stands, and the run that goes on from it ends as the one that was never stopped."""
-    write_case(tmp_path, field(300_000, run__duration=12, output__frame_interval=12, output__checkpoint_steps=2))
+    write_case(tmp_path, changed(LOOSE, run__duration=12, output__frame_interval=12, output__checkpoint_steps=2,
+                                 ice__field=str(field)))
     done(2, "run", "case.yml", "-o", "whole", "--quiet", "--threads", 1, cwd=tmp_path, timeout=600)
     within = 0
     for delay in (0, 0.05, 0.2):
