@@ -59,7 +59,8 @@ def system(path, found, said):
         raise RunError(path, "says no coordinate reference system", SAY)
     if theirs is None or ours is None:
         return theirs or ours
-    if LOCAL in (theirs, ours) and theirs != ours or theirs != LOCAL and not same(theirs, ours):
+    local = isinstance(theirs, str), isinstance(ours, str)
+    if local[0] != local[1] or not local[0] and not same(theirs, ours):
         raise RunError(path, f"is in {name_of(theirs)}, and --crs says {name_of(ours)}",
                        "leave --crs out, or correct the file (ogr2ogr -a_srs, gdal_edit.py -a_srs)")
     return theirs
@@ -86,7 +87,7 @@ def same(a, b):
 
 
 def name_of(crs):
-    if crs == LOCAL:
+    if isinstance(crs, str):
         return "local metres"
     code = crs.to_authority()
     return f"{':'.join(code)} ({crs.name})" if code else crs.name
@@ -95,7 +96,7 @@ def name_of(crs):
 def hold_against(path, crs, xy):
     """Refuse coordinates that contradict their system. xy: of all shapes, (n, 2)."""
     far, span = np.abs(xy).max(axis=0), np.ptp(xy, axis=0)
-    if crs == LOCAL:
+    if isinstance(crs, str):
         return
     unit = crs.axis_info[0].unit_conversion_factor
     if crs.is_geographic:
@@ -119,7 +120,7 @@ def hold_against(path, crs, xy):
 class Plane:
     """A plane at a place. Degrees in, metres out."""
 
-    crs: object             #: of the map
+    crs: object             #: of the map: a pyproj.CRS, or LOCAL (to compare the two, PROJ would parse the latter)
     centre: tuple           #: longitude, latitude, degrees; of local metres the place of 0, 0
     heading: float = None   #: degrees from north to east, of the first axis
     accuracy: float = 0.0   #: m, of the step to WGS 84; NaN: not known
@@ -132,7 +133,7 @@ class Plane:
         xy = np.concatenate([vertices(s.geometry) for s in found.shapes])
         hold_against(found.path, crs, xy)
         plane = Plane(crs, centre, heading)
-        if crs == LOCAL:
+        if isinstance(crs, str):
             plane.centre = centre or tuple((xy.min(axis=0) + xy.max(axis=0)) / 2)
             return plane
         if centre and not (abs(centre[0]) <= 360 and abs(centre[1]) <= 90):
@@ -176,7 +177,7 @@ class Plane:
 
     def onto(self, xy):
         """Metres in the plane of coordinates of the map."""
-        if self.crs == LOCAL:
+        if isinstance(self.crs, str):
             return self.turned(np.asarray(xy) - self.centre)
         return self.turned(np.array(self._aeqd(*self.lonlat(xy).T)).T)
 
@@ -204,7 +205,7 @@ class Plane:
         plane's north and the true one, degrees; least and greatest scale of the map, or None where it has degrees."""
         xy = np.asarray(xy)
         out = {"farthest_m": float(np.hypot(*xy.T).max())}
-        if self.crs == LOCAL:
+        if isinstance(self.crs, str):
             return out
         lonlat = self.degrees(xy)
         f = self._aeqd.get_factors(*lonlat.T)

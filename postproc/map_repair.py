@@ -30,8 +30,9 @@ except ImportError:  # map_read.need_libraries tells it
 
 MOST_VERTICES = 128      # src/geometry/shape.h
 SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
-NO_AREA = 1e-9           # shared, of the smaller floe: rounding
-PASSES = 40
+THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
+READER = 1e-3            # overlap that src/field/field_check.c takes, of the mean size
+PASSES, PATIENCE = 40, 8
 NAMED = 20               # of those that are named in the record
 
 #: what is counted, in the order of the report
@@ -101,14 +102,17 @@ class Rules:
     keep_cut: bool = True
     box: tuple = None           #: length along the first axis and width, about the centre
     clear: float = 0.0          #: radius about the centre
+    thin: float = 0.0           #: follows
+    reach: float = 0.0          #: by which a floe is enlarged before it is cut out of another
 
 
 def repaired(shapes, rules, book):
     """The floes. Errors: RunError where nothing is left."""
     floes = [floe for shape in shapes for floe in whole(shape, book)]
     floes = [f for f in floes if chosen(f, rules, book)]
-    if floes and rules.tolerance is None:
-        rules.tolerance = 1e-3 * float(np.mean([diameter(f.polygon) for f in floes]))
+    finest = READER * float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1.0
+    rules.tolerance = rules.tolerance or finest
+    rules.thin = THIN * min(rules.tolerance, finest)
     floes = [f for floe in floes for f in simplified(floe, rules, book)]
     floes = [f for f in floes if large_enough(f, rules, book) and stays(f, rules, book)]
     return apart(floes, rules, book)
@@ -188,7 +192,7 @@ def simplified(floe, rules, book):
     if too_many(polygon):
         polygon = fewer(before, tolerance)
         book.note("vertices", floe.name, before.area, polygon.area)
-    return opened(Floe(floe.name, polygon, floe.thickness, floe.cut), tolerance, book)
+    return opened(Floe(floe.name, polygon, floe.thickness, floe.cut), rules, book)
 
 
 def too_many(polygon):
@@ -205,15 +209,15 @@ def fewer(polygon, tolerance, inside=False):
     return out
 
 
-def opened(floe, tolerance, book):
-    """Floes without spikes, necks and cracks thinner than a ten-thousandth of the tolerance. What is thinner may fold
-    over when its coordinates are rounded, as they are in degrees: C asks of exact signs."""
-    thin, polygon = 1e-4 * tolerance, floe.polygon
+def opened(floe, rules, book):
+    """Floes without spikes, necks and cracks that are too thin: when their coordinates are rounded, as they are in
+    degrees, they may fold over, and the reader looks at exact signs."""
+    thin, polygon = rules.thin, floe.polygon
     if polygon.is_empty or polygon.minimum_clearance >= thin:
         return [floe] if not polygon.is_empty else []
     parts = [polygon.simplify(thin)]
     wide = thin
-    while any(p.minimum_clearance < thin for p in parts) and wide < tolerance:
+    while any(p.minimum_clearance < thin for p in parts) and wide < rules.tolerance:
         style = {"join_style": 2, "mitre_limit": 10}
         wide *= 2
         parts = [Polygon(q.exterior) for p in [polygon] for q in parts_of(
@@ -261,9 +265,11 @@ def meeting(floes, changed):
 
 
 def apart(floes, rules, book):
-    """Floes that share no area. A cut can leave what overlaps another, so: until a pass changes nothing."""
+    """Floes that share no area. A cut can leave what overlaps another, so: until a pass changes nothing. Where the tip
+    of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made wider."""
     changed = np.ones(len(floes), bool)
-    for _ in range(PASSES):
+    for k in range(PASSES):
+        rules.reach = min(rules.tolerance, rules.thin * 2.0 ** (k - PATIENCE)) if k > PATIENCE else 0.0
         new, touched = {}, set()
         for i, j in sorted(meeting(floes, changed)):
             if i in touched or j in touched:  # it is looked at again as it is now
@@ -283,10 +289,11 @@ def apart(floes, rules, book):
 
 
 def parted(a, b, rules, book):
-    """([Floe] of a, [Floe] of b), or None where they share no area."""
+    """([Floe] of a, [Floe] of b), or None where they share no area: none but what an outline that moves by `thin` adds.
+    """
     small, large = sorted((a, b), key=lambda f: f.polygon.area)
     shared = small.polygon.intersection(large.polygon).area
-    if shared <= NO_AREA * small.polygon.area:
+    if shared <= rules.thin * small.polygon.length:
         return None
     if shared >= SAME * small.polygon.area:
         twice = shared >= SAME * large.polygon.area
@@ -299,10 +306,11 @@ def parted(a, b, rules, book):
 
 def without(large, small, rules, book):
     """What is left of one floe without the area of another."""
-    parts = [Polygon(p.exterior) for p in parts_of(large.polygon.difference(small.polygon))]
+    knife = small.polygon.buffer(rules.reach, join_style=2) if rules.reach else small.polygon
+    parts = [Polygon(p.exterior) for p in parts_of(large.polygon.difference(knife))]
     book.note("overlaps", f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
     out = [Floe(large.name, p, large.thickness, large.cut) for p in parts]
-    out = [f for piece in out for f in opened(piece, rules.tolerance, book) if large_enough(f, rules, book)]
+    out = [f for piece in out for f in opened(piece, rules, book) if large_enough(f, rules, book)]
     for floe in out:
         if too_many(floe.polygon):
             less = fewer(floe.polygon, rules.tolerance, inside=True)

@@ -171,7 +171,7 @@ def bent(geometry, plane):
     worst = 0.0
     for p in getattr(geometry, "geoms", [geometry]):
         ring = np.asarray(p.exterior.coords)
-        if plane.crs != map_read.LOCAL and plane.crs.is_geographic:  # an edge over the 180th meridian is a short one
+        if not isinstance(plane.crs, str) and plane.crs.is_geographic:  # an edge over the 180th meridian is a short one
             ring = ring.copy()
             ring[:, 0] = np.unwrap(ring[:, 0], period=360)
         xy, between = plane.onto(ring), plane.onto((ring[:-1] + ring[1:]) / 2)
@@ -205,7 +205,7 @@ def summed_up(floes, found, rules):
 
 def geojson(floes, found, plane):
     """The text. A file in degrees carries its centre where the reader looks for it."""
-    local = plane.crs == map_read.LOCAL or plane.heading is not None
+    local = isinstance(plane.crs, str) or plane.heading is not None
     mark = {"frame": "basin"} if plane.heading is not None else {} if local else {"origin": list(plane.centre)}
     head = {"type": "FeatureCollection", "made_by": command.MARK, "bergtow": mark}
     if found.about:
