@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Polygons of a map to floes: simple rings of at most 128 vertices that share no area. Every change is counted.
+"""Polygons of a map to floes: simple rings of at most 128 vertices that neither overlap nor touch. Every change is counted.
 
     book = Ledger()
     floes = repaired(shapes, Rules(tolerance=2.0), book)       shapes of map_read.py in metres of a plane
@@ -11,6 +11,9 @@ image's edge, where they are to go; overlaps, and what the cuts leave.
 An overlap is taken from the larger of two floes, which it changes least. Where it is nearly all of both they are the
 same floe traced twice; where it is nearly all of the smaller one, that one lies in the other. Rejected: a middle line
 through the overlap, which changes both, and of three floes depends on the order.
+
+Floes that touch are drawn apart by a gap of GAP: two that share an edge to the last bit, as neighbours of one label
+image do, have no side to which they part, and the reader takes corners of their convex parts for overlaps.
 
 A sliver is what is nowhere as wide as the tolerance: a disc of this diameter fits into it nowhere.
 """
@@ -32,6 +35,7 @@ MOST_VERTICES = 128      # src/geometry/shape.h
 SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
 THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
 READER = 1e-3            # overlap that src/field/field_check.c takes, of the mean size
+GAP = 2e-5               # left between floes, of the mean size
 PASSES, PATIENCE = 40, 8
 NAMED = 20               # of those that are named in the record
 
@@ -54,6 +58,7 @@ KINDS = {
     "twice": "floes traced twice, one of them left out",
     "within": "floes that lie in another, left out",
     "overlaps": "overlaps of two floes, taken from the larger",
+    "touching": "floes that touched another, drawn back from it",
     "split": "floes cut in pieces by that",
     "narrow": "outlines with spikes or necks that are too thin to compute with, opened there",
     "vertices": f"outlines of more than {MOST_VERTICES} vertices, simplified further",
@@ -102,7 +107,8 @@ class Rules:
     keep_cut: bool = True
     box: tuple = None           #: length along the first axis and width, about the centre
     clear: float = 0.0          #: radius about the centre
-    thin: float = 0.0           #: follows
+    thin: float = 0.0           #: follows, as the next
+    gap: float = 0.0            #: between floes
     reach: float = 0.0          #: by which a floe is enlarged before it is cut out of another
 
 
@@ -112,7 +118,7 @@ def repaired(shapes, rules, book):
     floes = [f for f in floes if chosen(f, rules, book)]
     finest = READER * float(np.mean([diameter(f.polygon) for f in floes])) if floes else 1.0
     rules.tolerance = rules.tolerance or finest
-    rules.thin = THIN * min(rules.tolerance, finest)
+    rules.thin, rules.gap = THIN * min(rules.tolerance, finest), GAP / READER * finest
     floes = [f for floe in floes for f in simplified(floe, rules, book)]
     floes = [f for f in floes if large_enough(f, rules, book) and stays(f, rules, book)]
     return apart(floes, rules, book)
@@ -265,7 +271,7 @@ def meeting(floes, changed):
 
 
 def apart(floes, rules, book):
-    """Floes that share no area. A cut can leave what overlaps another, so: until a pass changes nothing. Where the tip
+    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing. Where the tip
     of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made wider."""
     changed = np.ones(len(floes), bool)
     for k in range(PASSES):
@@ -289,26 +295,26 @@ def apart(floes, rules, book):
 
 
 def parted(a, b, rules, book):
-    """([Floe] of a, [Floe] of b), or None where they share no area: none but what an outline that moves by `thin` adds.
-    """
+    """([Floe] of a, [Floe] of b), or None where they lie apart. What an outline that moves by `thin` shares is none."""
     small, large = sorted((a, b), key=lambda f: f.polygon.area)
     shared = small.polygon.intersection(large.polygon).area
-    if shared <= rules.thin * small.polygon.length:
+    overlap = shared > rules.thin * small.polygon.length
+    if not overlap and small.polygon.distance(large.polygon) >= rules.gap / 2:
         return None
     if shared >= SAME * small.polygon.area:
         twice = shared >= SAME * large.polygon.area
         gone = b if twice else small
         book.note("twice" if twice else "within", f"{gone.name} ({(a if gone is b else b).name})", gone.polygon.area)
         return ([a], []) if gone is b else ([], [b])
-    pieces = without(large, small, rules, book)
+    pieces = without(large, small, "overlaps" if overlap else "touching", rules, book)
     return (pieces, [b]) if large is a else ([a], pieces)
 
 
-def without(large, small, rules, book):
+def without(large, small, kind, rules, book):
     """What is left of one floe without the area of another."""
-    knife = small.polygon.buffer(rules.reach, join_style=2) if rules.reach else small.polygon
-    parts = [Polygon(p.exterior) for p in parts_of(large.polygon.difference(knife))]
-    book.note("overlaps", f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
+    knife = small.polygon.buffer(rules.gap + rules.reach, join_style=2)
+    parts = [trimmed(p, rules.tolerance) for p in parts_of(large.polygon.difference(knife))]
+    book.note(kind, f"{large.name} ({small.name})", large.polygon.area, sum(p.area for p in parts))
     out = [Floe(large.name, p, large.thickness, large.cut) for p in parts]
     out = [f for piece in out for f in opened(piece, rules, book) if large_enough(f, rules, book)]
     for floe in out:
@@ -322,6 +328,25 @@ def without(large, small, rules, book):
         for k, floe in enumerate(out):
             floe.name = f"{large.name}, piece {k + 1}"
     return out
+
+
+def trimmed(polygon, tolerance):
+    """The outer ring without the short edges that a cut leaves: corners that stick out by less than the tolerance go,
+    so nothing is added."""
+    ring = np.asarray(polygon.exterior.coords)[:-1]
+    ring = ring if polygon.exterior.is_ccw else ring[::-1]
+    place = 0
+    while place < len(ring) > 3:
+        before, here, after = ring[place - 1], ring[place], ring[(place + 1) % len(ring)]
+        a, b, chord = here - before, after - here, after - before
+        out, long = a[0] * b[1] - a[1] * b[0], np.hypot(*chord)
+        short = min(np.hypot(*a), np.hypot(*b)) < tolerance and 0 < out < tolerance * long
+        less = np.delete(ring, place, axis=0)
+        if short and Polygon(less).is_valid:
+            ring, place = less, max(place - 1, 0)
+        else:
+            place += 1
+    return Polygon(ring)
 
 
 def hull_of(floes):
