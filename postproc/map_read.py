@@ -81,6 +81,7 @@ def read(path, how):
     """The map. Errors: RunError."""
     need_libraries()
     gdal.UseExceptions()
+    ogr.UseExceptions()
     if not path.exists():
         raise RunError(path, "no such file", "name a file of outlines or of labels")
     if path.suffix.lower() == ".npy":

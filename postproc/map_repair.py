@@ -196,8 +196,8 @@ def simplified(floe, rules, book):
     if len(polygon.exterior.coords) < len(before.exterior.coords):
         book.note("simplified", floe.name, before.area, polygon.area)
     if too_many(polygon):
-        polygon = fewer(before, tolerance)
-        book.note("vertices", floe.name, before.area, polygon.area)
+        first, polygon = polygon.area, fewer(before, tolerance)
+        book.note("vertices", floe.name, first, polygon.area)
     return opened(Floe(floe.name, polygon, floe.thickness, floe.cut), rules, book)
 
 

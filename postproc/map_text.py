@@ -109,16 +109,17 @@ def floe_lines(told):
 
 def case_lines(path, told, heading, margin):
     """Lines for a case that reads the file: in the geographic frame x is north."""
-    low, high = np.array(told["reach_m"][:2]) - margin, np.array(told["reach_m"][2:]) + margin
     x0, x1, y0, y1 = told["rectangle_m"]
+    low = np.minimum(told["reach_m"][:2], (x0, y0)) - margin
+    high = np.maximum(told["reach_m"][2:], (x1, y1)) + margin
     if heading is None:
         low, high, x0, x1, y0, y1 = low[::-1], high[::-1], y0, y1, x0, x1
     low, size = np.floor(low), np.ceil(high) - np.floor(low)
     frame, bays = "geographic" if heading is None else "basin", told["convex"] < told["floes"]
-    return ["in the case:",
+    return ["in a case beside it:",
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
             f"width: {size[1]:.0f} m}}",
-            f"  ice: {{outlines: {path}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, y_max: {y1:.1f} m"
+            f"  ice: {{outlines: {path.name}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, y_max: {y1:.1f} m"
             + (", nonconvex: split}" if bays else "}")]
 
 

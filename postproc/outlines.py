@@ -22,6 +22,7 @@ from bergtow_read import RunError
 
 import numpy as np
 
+PIXEL = 0.55            # tolerance, of a pixel: half of one, as steps along a straight shore have, would be a tie
 MARGIN = 1.0            # m, of the domain around all floes
 LEAST_SIZE = 0.01       # m, mean; below it metres are degrees
 EDGE = 64               # pieces of an edge of the image, which is bent in the plane
@@ -114,7 +115,7 @@ def arguments(argv):
                    "circle about the centre: room for the towed body, which may be on the map itself")
     p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
     p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
-                   "simplified, and the width of a sliver (default: half a pixel; a thousandth of the mean floe size)")
+                   "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
     p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
     p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
     p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
@@ -183,7 +184,7 @@ def rules_of(a, found):
     """Lengths of the repair: of an image they follow from its pixels."""
     pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
     along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
-    return map_repair.Rules(tolerance=a.tolerance or (pixel / 2 if pixel else None),
+    return map_repair.Rules(tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
                             least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
                             keep_cut=a.cut == "keep", box=along, clear=a.clear)
 
