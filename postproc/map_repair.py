@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Polygons of a map to floes: simple rings of at most 128 vertices that neither overlap nor touch. Every change is counted.
+"""Polygons of a map to floes: simple rings of at most 128 vertices that neither overlap nor touch. Every change is
+counted.
 
     book = Ledger()
     floes = repaired(shapes, Rules(tolerance=2.0), book)       shapes of map_read.py in metres of a plane
@@ -271,8 +272,9 @@ def meeting(floes, changed):
 
 
 def apart(floes, rules, book):
-    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing. Where the tip
-    of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made wider."""
+    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing. Where
+    the tip of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made
+    wider."""
     changed = np.ones(len(floes), bool)
     for k in range(PASSES):
         rules.reach = min(rules.tolerance, rules.thin * 2.0 ** (k - PATIENCE)) if k > PATIENCE else 0.0

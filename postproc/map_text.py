@@ -98,10 +98,11 @@ def floe_lines(told):
              f"{length(q['least'])} to {length(q['largest'])}",
              f"concentration: {told['concentration']:.3f} of what was imaged of {length(x1 - x0)} by {length(y1 - y0)}"]
     if told["imaged_share"] < 0.97:
-        lines.append(f"only {100 * told['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the rest "
-                     "for water: choose a smaller one with --box")
+        lines.append(f"only {100 * told['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the "
+                     "rest for water: choose a smaller one with --box")
     if told["with_thickness"]:
-        lines.append(f"thickness: {told['with_thickness']} floes have one, {told['mean_thickness_m']:.3g} m in the mean")
+        lines.append(f"thickness: {told['with_thickness']} floes have one, {told['mean_thickness_m']:.3g} m in the "
+                     "mean")
     lines.append("       size, m          floes   share of the ice")
     return lines + [f"{row['from_m']:9.4g} to {row['to_m']:<9.4g} {row['floes']:6d} {100 * row['share_of_area']:8.1f} %"
                     for row in told["distribution"]]
@@ -119,8 +120,8 @@ def case_lines(path, told, heading, margin):
     return ["in a case beside it:",
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
             f"width: {size[1]:.0f} m}}",
-            f"  ice: {{outlines: {path.name}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, y_max: {y1:.1f} m"
-            + (", nonconvex: split}" if bays else "}")]
+            f"  ice: {{outlines: {path.name}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, "
+            f"y_max: {y1:.1f} m" + (", nonconvex: split}" if bays else "}")]
 
 
 def record(found, plane, crs, told, bend, book, rules, floes):

@@ -258,7 +258,8 @@ def main(argv=None):
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
     told, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
     if numbers["mean_size_m"] < LEAST_SIZE:
-        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in metres",
+        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
+                       "metres",
                        "say its crs: --crs EPSG:4326")
     print("\n".join(map_text.plane_lines(plane, told, bend)))
     print(f"tolerance: {map_text.length(rules.tolerance)}")
@@ -267,7 +268,8 @@ def main(argv=None):
     print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN)))
     print(a.output)
     if a.record:
-        command.write_json(plain(map_text.record(found, plane, crs, told, bend, book, rules, numbers)), a.record, a.force)
+        record = map_text.record(found, plane, crs, told, bend, book, rules, numbers)
+        command.write_json(plain(record), a.record, a.force)
         print(a.record)
     if a.picture:
         import map_picture

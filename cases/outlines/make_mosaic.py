@@ -4,9 +4,9 @@
     /usr/bin/python3 cases/outlines/make_mosaic.py [-o FILE.tif]
 
 SYNTHETIC: no ice of this shape was ever seen, and the file says so itself. A GeoTIFF in polar stereographic metres
-(EPSG:3413), 2 m a pixel: 0 water, 1 an iceberg, each other label a floe, 65535 beyond the edge of the swath. It has what
-such files have: shores as staircases, ponds, crumbs of a pixel or two, one label in several pieces, floes cut by the
-edge.
+(EPSG:3413), 2 m a pixel: 0 water, 1 an iceberg, each other label a floe, 65535 beyond the edge of the swath. It has
+what such files have: shores as staircases, ponds, crumbs of a pixel or two, one label in several pieces, floes cut by
+the edge.
 """
 import argparse
 import pathlib
