@@ -45,7 +45,7 @@ CLOSING = {
 }
 
 
-def changed(base, **changes):
+def changed(base, /, **changes):
     """A copy of a case with changes "section.key" written as section__key; None removes the key."""
     case = copy.deepcopy(base)
     for name, value in changes.items():

@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/prctl.h>
 #include <unistd.h>
 
 static const struct {
@@ -98,7 +99,10 @@ __attribute__((section(".preinit_array"), used)) static void (*const before_all)
 // library read their settings before main, hence the second start; the user's own win.
 static void start_with_settings(char **argv)
 {
-    if (getenv("BERGTOW_STARTED")) return;
+    if (getenv("BERGTOW_STARTED")) {
+        prctl(PR_SET_NAME, "bergtow"); // else ps, top and killall know it as exe
+        return;
+    }
     bool set = setenv("BERGTOW_STARTED", "1", 1) == 0;
     if (!getenv("OMP_WAIT_POLICY")) set = setenv("GOMP_SPINCOUNT", "5000", 0) == 0 && set;
     set = setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 0) == 0 && set;

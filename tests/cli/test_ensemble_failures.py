@@ -152,6 +152,21 @@ def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
     assert differing(quiet / "all/ensemble.h5", tmp_path / "all/ensemble.h5") == []
 
 
+@pytest.mark.parametrize("size", ["16k", "900k"])
+def test_four_jobs_on_a_full_disk(quiet, tmp_path, tmpfs, size):
+    """All of them end by themselves and say why, in whatever file they find it full; with room, one more call ends as
+    the ensemble that always had it."""
+    folder = prepare(tmp_path)
+    tmpfs(folder / "all", size) # not enough for the study's own files; for one member of three
+    jobs = [started(1, "ensemble", "study.yml", "-o", "all", "--threads", 1, cwd=folder) for _ in range(4)]
+    for out, err, code in [(*p.communicate(timeout=60), p.returncode) for p in jobs]:
+        assert code == IO and "No space left" in err, (code, out, err)
+    subprocess.run(["mount", "-o", "remount,size=64m", folder / "all"], check=True)
+    assert ensemble(folder, "--retry-failed").returncode == DONE
+    assert differing(quiet / "all/ensemble.h5", folder / "all/ensemble.h5") == [] and statuses(folder) == dict.fromkeys(
+        ("c001-r001", "c002-r001", "c003-r001"), 1)
+
+
 def test_a_folder_that_cannot_be_made(quiet, tmp_path):
     prepare(tmp_path)
     (tmp_path / "all/members").mkdir(parents=True)

@@ -121,7 +121,7 @@ static int run_without_space(rlim_t limit)
         else if (!strstr(err.text[0], "result.part.h5") && !strstr(err.text[0], "case.resolved.yml")) code = 12;
         else if (!strstr(err.text[0], "File too large")) code = 13;
         else if (access(in_folder("full/summary.json"), F_OK) == 0) code = 14;
-        else if (limit > 60000) { // what was flushed before is still there, in series of one length
+        else if (limit > 300000) { // what was flushed before is still there, in series of one length
             int seen[3];
             lengths_seen_by_others(in_folder("full/result.part.h5"), seen);
             if (seen[0] != seen[1]) code = 15;
