@@ -315,7 +315,7 @@ def regions(values, mask):
     image = gdal.GetDriverByName("MEM").Create("", columns, rows, 2, gdal.GDT_Int32)
     image.GetRasterBand(1).WriteArray(values)
     image.GetRasterBand(2).WriteArray(mask.astype(np.int32))
-    memory = gdal.GetDriverByName("Memory").Create("", 0, 0, 0, gdal.GDT_Unknown)
+    memory = (gdal.GetDriverByName("Memory") or gdal.GetDriverByName("MEM")).Create("", 0, 0, 0, gdal.GDT_Unknown)
     layer = memory.CreateLayer("regions")
     layer.CreateField(ogr.FieldDefn("value", ogr.OFTInteger))
     gdal.Polygonize(image.GetRasterBand(1), image.GetRasterBand(2), layer, 0)

@@ -272,8 +272,8 @@ def meeting(floes, changed):
 
 
 def apart(floes, rules, book):
-    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing. Where
-    the tip of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made
+    """Floes that neither overlap nor touch. A cut can leave what overlaps another, so: until a pass changes nothing.
+    Where the tip of one floe lies in a crack of another that `opened` closes again, PATIENCE ends and the crack is made
     wider."""
     changed = np.ones(len(floes), bool)
     for k in range(PASSES):
