@@ -172,8 +172,7 @@ class Plane:
 
     def lonlat(self, xy):
         """Degrees on WGS 84 of coordinates of the map."""
-        lon, lat = self._to.transform(*np.asarray(xy).T)
-        return np.c_[wrapped(np.asarray(lon)), lat]
+        return np.array(self._to.transform(*np.asarray(xy).T)).T
 
     def onto(self, xy):
         """Metres in the plane of coordinates of the map."""
@@ -222,11 +221,6 @@ class Plane:
 
 def about(centre):
     return pyproj.Proj(proj="aeqd", lon_0=centre[0], lat_0=centre[1], datum="WGS84", units="m")
-
-
-def wrapped(lon):
-    """Longitudes in (-180, 180], so that one meridian has one number."""
-    return lon - 360 * np.ceil((lon - 180) / 360)
 
 
 def middle(lonlat):

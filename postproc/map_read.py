@@ -63,7 +63,7 @@ class Map:
     """What a file holds."""
 
     path: Path
-    crs: str                    #: WKT, LOCAL, or None where the file says nothing
+    crs: str                    #: WKT or a name, LOCAL, or None where the file says nothing
     shapes: list
     seen: object = None         #: what was imaged, in the coordinates of the file; None: not known
     pixels: int = 0             #: in `seen`
@@ -186,10 +186,8 @@ def crs_of_layer(path, source, layer):
     if source.GetDriver().ShortName == "GeoJSON":
         crs = head_of(path).get("crs")
         name = crs.get("properties", {}).get("name") if isinstance(crs, dict) else None
-        if name == LOCAL:
-            return LOCAL
         if crs is not None:
-            return f"{name}"  # for PROJ to judge: map_plane.py
+            return f"{name}"  # for PROJ to judge, but for LOCAL: map_plane.py
     reference = layer.GetSpatialRef()
     return reference.ExportToWkt() if reference else None
 
