@@ -145,11 +145,6 @@ class Plane:
             raise RunError(found.path, "lies about latitude {1:.4g}, longitude {0:.4g}, where no sea ice is".format(
                 *plane.centre), "swap the coordinates if latitude comes first, or give the place with --centre")
         plane._aeqd = about(plane.centre)
-        far = np.hypot(*np.array(plane._aeqd(*lonlat.T)))
-        if far.max() > FARTHEST:
-            raise RunError(found.path, f"reaches {far.max() / 1e3:.4g} km from the centre, {plane.centre[0]:.6g}, "
-                           f"{plane.centre[1]:.6g}; bergtow takes 100 km",
-                           "choose a part with --where, or with ogr2ogr -clipsrc, or set --centre")
         return plane
 
     def _prepare(self, found, xy):

@@ -146,8 +146,10 @@ def in_plane(found, plane):
     """Shapes in metres of the plane; and how far edges that are straight on the map bend there, m."""
     bend = 0.0
     for shape in found.shapes:
-        bend = max(bend, bent(shape.geometry, plane))
-        shape.geometry = moved(shape.geometry, plane.onto)
+        there = moved(shape.geometry, plane.onto)
+        if there.distance(map_repair.Point(0, 0)) < map_plane.FARTHEST:  # others are not for this plane
+            bend = max(bend, bent(shape.geometry, plane))
+        shape.geometry = there
     if found.seen is not None:
         found.seen = moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
     return bend
@@ -257,6 +259,9 @@ def main(argv=None):
         print("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
     told, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
+    if told["farthest_m"] > map_plane.FARTHEST:
+        raise RunError(found.path, f"has floes {told['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes 100 km",
+                       "choose a part with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
         raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
                        "metres",

@@ -224,6 +224,14 @@ def test_halves_at_the_180th_meridian_are_joined(tmp_path):
     assert abs(abs(record["plane"]["centre"][0]) - 180) < 1e-6
 
 
+def test_a_part_of_a_large_map(tmp_path):
+    """What lies beyond the plane's reach is no hindrance when the box leaves it out."""
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS] + [places(RINGS[0], 60.0, 74.0)])
+    rings, record = outlines(map_, "--centre", f"{LON},{LAT}", "--box", "3km,4km", "--heading", 90)
+    assert counted(record) == {"outside": 1} and len(rings) == len(RINGS)
+    assert record["plane"]["farthest_m"] < 2e3 and record["plane"]["edges_bend_m"] < 0.01
+
+
 # ---- formats
 
 
