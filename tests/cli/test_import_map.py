@@ -226,7 +226,7 @@ def test_halves_at_the_180th_meridian_are_joined(tmp_path):
 
 def test_a_part_of_a_large_map(tmp_path):
     """What lies beyond the plane's reach is no hindrance when the box leaves it out."""
-    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS] + [places(RINGS[0], 60.0, 74.0)])
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS] + [places(regular(0, 0, 30e3), 60.0, 74.0)])
     rings, record = outlines(map_, "--centre", f"{LON},{LAT}", "--box", "3km,4km", "--heading", 90)
     assert counted(record) == {"outside": 1} and len(rings) == len(RINGS)
     assert record["plane"]["farthest_m"] < 2e3 and record["plane"]["edges_bend_m"] < 0.01
