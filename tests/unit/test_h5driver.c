@@ -372,10 +372,28 @@ static void a_write_cut_short_goes_on(void **state)
     assert_int_equal(bt_file_close(fd), EBADF); // what the system says of a close is passed on
 }
 
+/// Where a text cannot have its name, because a folder has it, nothing is left under the temporary one.
+static void a_text_that_fails_leaves_nothing(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/bergtow-text-XXXXXX", path[64], part[80];
+    bt_errors err = {0};
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/text", folder);
+    snprintf(part, sizeof part, "%s.tmp", path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    assert_int_equal(bt_file_write(path, "words", &err), BT_ERR_IO);
+    assert_int_equal(access(part, F_OK), -1);
+    assert_int_equal(rmdir(path), 0);
+    assert_int_equal(rmdir(folder), 0);
+    bt_errors_free(&err);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows),
                                        cmocka_unit_test(a_write_cut_short_goes_on),
+                                       cmocka_unit_test(a_text_that_fails_leaves_nothing),
                                        cmocka_unit_test(a_file_of_many_changes_is_whole),
                                        cmocka_unit_test(
                                            every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte)};
