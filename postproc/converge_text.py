@@ -44,7 +44,9 @@ def cells(row):
     if "from" not in row:
         return [row["name"], "–", "–", "–", "–", WORDS[row["judged"]], row.get("why", "–")]
     on = f"{row['fields']}, {'the same ice' if row['same_ice'] else 'other ice'}"
-    return [row["name"], f"{value(row, 'from')} -> {value(row, 'to')}", row["quantity"],
+    # the same twice: a start whose ramp can be no longer, looked at as it is
+    values = " -> ".join(dict.fromkeys((value(row, "from"), value(row, "to"))))
+    return [row["name"], values, row["quantity"],
             f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
 
 

@@ -13,6 +13,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Numbers in a row of loads. Explicit: FX, FY (N), MOMENT (N m). Linear, taken at the end of the step, j − K (U, ω) as
 /// in bt_load: G, GX, GY, GW (kg/s, kg m/s, kg m/s, kg m²/s), JX, JY, JW (N, N, N m). A force that falls with the
 /// velocity belongs into the linear part: G = k and JX, JY = k U_ref draw the body towards U_ref, whatever the step.
@@ -46,5 +50,9 @@ typedef int bt_applied_force(const bt_applied *a, void *user);
 /// it was made, and one world steps at a time. name: lower case, digits and _; doc: one line, "drag of my own".
 /// Errors: BT_ERR_USAGE, with reason and remedy in err.
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -9,6 +9,10 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define BT_VERSION "0.1.0"
 
 typedef int64_t bt_gid; ///< global id of a body: the same in every decomposition, never reused
@@ -78,5 +82,9 @@ static inline double bt_max(double a, double b) { return a > b ? a : b; }
 #endif
 
 #define BT_PI 3.14159265358979323846
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

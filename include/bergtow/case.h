@@ -11,6 +11,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum { BT_FRAME_BASIN, BT_FRAME_GEOGRAPHIC } bt_frame;              // basin, geographic
 // wall, periodic, open, moving (ends only)
 typedef enum { BT_BOUND_WALL, BT_BOUND_PERIODIC, BT_BOUND_OPEN, BT_BOUND_MOVING } bt_bound;
@@ -334,5 +338,9 @@ void bt_case_list_keys(void *stream);
 /// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows),
 /// contact, range, choices and meaning; numbers of the range in the contact of a number written without one.
 void bt_case_list_keys_json(void *stream);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -6,10 +6,19 @@
 #ifndef BERGTOW_COMM_H
 #define BERGTOW_COMM_H
 
+// of a C++ program: without the old C++ bindings of MPI, which drop warnings and need a library of their own
+#ifdef __cplusplus
+#define OMPI_SKIP_MPICXX 1
+#define MPICH_SKIP_MPICXX 1
+#endif
 #include <mpi.h>
 
 #include "bergtow/base.h"
 #include "bergtow/sum.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef struct bt_comm {
     MPI_Comm mpi;    ///< MPI_COMM_NULL without MPI; never used when size is 1
@@ -39,7 +48,7 @@ bt_status bt_comm_start(int *argc, char ***argv);
 int bt_comm_end(int code);
 
 /// Ends all ranks now, from any one, without waiting for the others. Flushes stdout and stderr first.
-_Noreturn void bt_comm_abort(int code);
+void bt_comm_abort(int code) __attribute__((noreturn));
 
 /// Collective. The ranks of c that name the same group, as ranks of their own. Release with bt_comm_split_end
 /// (collective over the group).
@@ -96,5 +105,9 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
 /// Collective. Rows of doubles [n][width] from all ranks to rank 0, in the order of the ranks: [*total][width] there,
 /// to be freed; NULL and *total = 0 elsewhere.
 double *bt_comm_gather(const bt_comm *c, int64_t n, int width, const double *rows, int64_t *total);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

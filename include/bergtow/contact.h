@@ -18,6 +18,10 @@
 #include "bergtow/law_key.h"
 #include "bergtow/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// A contact of two bodies, as a law sees it.
 typedef struct bt_touch {
     const bt_world *w;
@@ -72,5 +76,9 @@ bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err);
 /// Those added, in their order.
 int bt_n_contact_laws(void);
 const bt_contact_law *bt_contact_law_of(int k);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

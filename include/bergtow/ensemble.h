@@ -31,6 +31,10 @@
 #include "bergtow/comm.h"
 #include "bergtow/study.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum {
     BT_MAX_ATTEMPTS = 20,     ///< of a member whose process dies each time
     BT_SUSPECT_ATTEMPTS = 10, ///< from here on it is run while no other of its kind is
@@ -63,5 +67,9 @@ bt_member_state bt_ensemble_state(const char *folder, int *code, char **why);
 /// Make DIR/ensemble.h5 from the files of the members that are sound; the caller holds DIR/lock. Errors: BT_ERR_IO.
 struct bt_member_records;
 bt_status bt_ensemble_gather(const bt_study *s, const char *dir, struct bt_member_records *records, bt_errors *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

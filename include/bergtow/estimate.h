@@ -44,6 +44,10 @@
 #include "bergtow/case.h"
 #include "bergtow/field.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// The program's own; those that are registered follow.
 typedef enum {
     BT_EST_LICHEY_HELLMER,
@@ -126,5 +130,9 @@ void bt_estimate_conditions(const bt_case *c, bt_estimate_input *in);
 
 /// Area-weighted means of a field: thickness and radius of the circle of a floe's area, m. 0 without floes.
 void bt_estimate_field(const bt_field *f, double *thickness, double *radius);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

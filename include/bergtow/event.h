@@ -8,6 +8,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Appended to, never renumbered: the numbers stand in result.h5.
 typedef enum {
     BT_EVENT_LINE_BROKEN, ///< subject: branch from 1; value: tension, N
@@ -36,5 +40,9 @@ extern const char *const bt_event_names[];
 
 /// One event as a sentence without its time: "branch 1 of the tow line broke at 2.04e+05 N".
 void bt_event_describe(const bt_event *e, char out[160]);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// Write the local problem in two dimensions: find u, r with
 ///     u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= mu r_n, r_t against u_t,
 /// two rows a contact: normal, then tangent; u in m/s, r in N s. (FCLIB: Acary, Brémond, Koziara, Pérignon 2014,
@@ -42,5 +46,9 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
                                  const double *solution_u, const double *solution_r, const double *bound,
                                  const double *disc, const bt_fclib_places *places, const char *title,
                                  const char *description, bt_errors *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -7,6 +7,10 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// What became of outlines that were read, instead of silence.
 typedef struct bt_outline_counts {
     int64_t read;     ///< outlines of a GeoJSON file; 0 for other fields
@@ -92,5 +96,9 @@ bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex
 /// Largest overlap depth of any two floes, and of any floe with the closed walls, the towed body and the floes given by
 /// hand, m (0 = none). By separating axes, independent of the contact detection.
 double bt_field_overlap(const bt_case *c, const bt_field *f);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -52,6 +52,10 @@
 #include "bergtow/law_key.h"
 #include "bergtow/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum {
     BT_MAX_FORCE_LAWS = 24,
     BT_MAX_FORCE_SERIES = 2 * BT_MAX_FORCE_LAWS,
@@ -86,7 +90,8 @@ typedef struct bt_load {
 /// Drag in a stream. Without room for it the load is no number, and the run ends in this step.
 static inline void bt_load_stream(bt_load *l, double u, double v, double skin, double form)
 {
-    if (l->n_streams < BT_MAX_STREAMS) l->stream[l->n_streams++] = (bt_stream){u, v, skin, form};
+    const bt_stream stream = {u, v, skin, form};
+    if (l->n_streams < BT_MAX_STREAMS) l->stream[l->n_streams++] = stream;
     else l->fx = NAN;
 }
 
@@ -229,5 +234,9 @@ bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
 /// Drag of one body from its outline, draft and coefficients: multiplied out.
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include "bergtow/case.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// An added key: always a real number.
 typedef struct bt_law_key {
     const char *name;          ///< after the name of the law or section: the key is NAME.name
@@ -25,5 +29,9 @@ bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *
 
 /// own[k]: value of the k-th in SI units.
 void bt_keys_values(const bt_case *c, const char *section, const bt_law_key *keys, int n, double *own);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -5,6 +5,10 @@
 
 #include "bergtow/shape.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { BT_MAX_PART_VERTICES = 3 * BT_MAX_VERTICES }; ///< of all parts of one outline: n + 2 (n − 3) at most
 
 /// Convex parts of a simple polygon.
@@ -49,5 +53,9 @@ void bt_outline_project(double lon, double lat, double lon0, double lat0, double
 /// The place (lon, lat), rad, longitude from −π to π, of metres north and east of (lon0, lat0): the inverse of
 /// bt_outline_project, to rounding, within a tenth of the earth's radius.
 void bt_outline_unproject(double north, double east, double lon0, double lat0, double *lon, double *lat);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -15,6 +15,10 @@
 
 #include "bergtow/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { BT_MAX_ADDED = 32 }; ///< quantities beside the program's own
 
 /// How the steps of one sample merge, and the steps of the window for the summary.
@@ -80,5 +84,9 @@ const bt_quantity *bt_added(int k);
 /// "tow - drag - Coriolis - tilt - ... - inertia": what the ice resistance is by the balance of the towed body, in the
 /// labels of the series whose role is BT_ROLE_BALANCE. Made anew whenever quantities are added; not from two threads.
 const char *bt_balance_words(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

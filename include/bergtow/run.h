@@ -9,6 +9,10 @@
 #include "bergtow/case.h"
 #include "bergtow/comm.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct bt_run_options {
     const char *dir;          ///< output folder
     /// OpenMP threads of each rank, 0 = run.threads of the case, or all cores shared by the ranks
@@ -39,5 +43,9 @@ bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors 
 /// Collective. OpenMP threads of this rank of comm: as asked (0 = not), else run.threads of the case, else
 /// OMP_NUM_THREADS, else the cores that it was given; those that other ranks were given, too, are shared among them.
 int bt_run_threads(const bt_comm *comm, const bt_case *c, int asked);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -7,6 +7,10 @@
 #include "bergtow/field.h"
 #include "bergtow/world.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 /// What the recorder wants to know of the bodies beside their outlines.
 typedef struct bt_roster {
     bt_idx n_floes;         ///< generated or read, then given by hand
@@ -27,5 +31,9 @@ void bt_setup_drift(const bt_case *c, double size, double thickness, double floe
 
 /// Constants of the step from the case. size: mean floe size, m.
 bt_params bt_setup_params(const bt_case *c, double size);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -8,6 +8,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 #define BT_MAX_VERTICES 128 ///< of one polygon; the contact code keeps per-pair buffers of this length
 
 /// Moments of a polygon about its own centroid.
@@ -68,5 +72,9 @@ enum { BT_MAX_ADDED_SHAPES = 4 };
 /// docs/how-to-add-a-body-shape.md. Name and function must stay where they are. Errors: BT_ERR_USAGE with reason and
 /// remedy: a name that is taken or none, no convex outline of 2 × 1 m, no room.
 bt_status bt_shape_register(const char *name, bt_shape_outline outline, bt_errors *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -11,8 +11,9 @@
 //
 // Errors. Whatever can fail returns a bt_status; bt_last_error has the texts, one a line, each with the reason and the
 // remedy. No call ends the program, with two exceptions that leave nothing to return to: memory that runs out
-// (bt_on_out_of_memory is told first) and an MPI call that fails (all ranks are ended). After a step that failed, the
-// state is for looking at; end the simulation.
+// (bt_on_out_of_memory is called first) and an MPI call that fails (all ranks are ended). After a step that failed, the
+// state is for looking at; end the simulation. The command makes the state before such a step again, from the last
+// checkpoint (failure.h5); the library does not, for it does not know what the program has done in between.
 //
 // Threads. One thread of the program makes all calls, of all simulations; a simulation uses threads of OpenMP within a
 // step. Functions that a program adds to the table of force laws are called by those threads at once; applied forces
@@ -33,6 +34,10 @@
 #include "bergtow/applied.h"
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct bt_simulation bt_simulation;
 
 typedef struct bt_simulation_options {
@@ -46,11 +51,18 @@ typedef struct bt_simulation_options {
     bool progress;            ///< print progress and the table at the end
     int threads;              ///< of each rank; 0 = run.threads of the case, or all cores
     const char *command_line; ///< for the provenance of the result; NULL = none
+    const char *from;         ///< bt_simulation_resume: this checkpoint instead of the last one in dir; or NULL
 } bt_simulation_options;
 
 /// Read the case, make or read its ice, open the folder. *s is NULL after an error: BT_ERR_CASE, BT_ERR_IO,
 /// BT_ERR_USAGE.
 bt_status bt_simulation_create(bt_simulation **s, const bt_simulation_options *o);
+
+/// Go on with a run in its folder (dir; `bergtow run`, `bergtow ensemble` or a program made it) from its last
+/// checkpoint, or from its case where it was killed before the first. What the program adds (laws, applied forces) has
+/// to be there as it was. path, text, set and replace are left out; the rest is as for a new simulation. Errors:
+/// BT_ERR_USAGE for a run that is finished, BT_ERR_IO, BT_ERR_CASE for a checkpoint that is refused.
+bt_status bt_simulation_resume(bt_simulation **s, const bt_simulation_options *o);
 
 /// n steps, or as many as are left. Errors: BT_ERR_NUMERIC (a guard, or a force that failed), BT_ERR_IO,
 /// BT_ERR_SIGNAL: asked to stop, as by the file `stop` in the folder; end the simulation then.
@@ -62,6 +74,10 @@ bt_status bt_simulation_end(bt_simulation *s);
 
 /// Free s without summary and checkpoint; what the folder holds by now stays. NULL is let through.
 void bt_simulation_drop(bt_simulation *s);
+
+/// A frame of the bodies as they are now, beside those of output.frame_interval; nothing where this state has one.
+/// Errors: BT_ERR_USAGE without a folder, BT_ERR_IO.
+bt_status bt_simulation_frame(bt_simulation *s);
 
 int64_t bt_simulation_steps(const bt_simulation *s);
 int64_t bt_simulation_steps_left(const bt_simulation *s);
@@ -146,5 +162,9 @@ void bt_release(char *text);
 
 /// "0.1.0"
 const char *bt_version(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

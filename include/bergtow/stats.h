@@ -5,6 +5,10 @@
 
 #include "bergtow/base.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct bt_mean {
     double mean, sd;    ///< of the samples
     double se;          ///< standard error of the mean, from the slowest waves of the series; NaN when n < 2
@@ -46,5 +50,9 @@ int64_t bt_stats_start_step(int64_t n);
 /// variance of the mean of batches of 5, searched over the first half in steps of bt_stats_start_step(n - first).
 /// Returns an index in [first, n/2 or first].
 int64_t bt_stats_steady_start(const double *x, int64_t n, int64_t first);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

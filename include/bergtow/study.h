@@ -37,6 +37,10 @@
 
 #include "bergtow/case.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum { BT_SAMPLING_GRID, BT_SAMPLING_LATIN_HYPERCUBE } bt_sampling;
 typedef enum { BT_UNIFORM, BT_TRIANGULAR, BT_NORMAL } bt_distribution;
 
@@ -127,5 +131,9 @@ bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
 /// case resolved. Two studies with the same text have the same members. Caller frees. NULL with a message when the base
 /// cannot be read.
 char *bt_study_resolved(const bt_study *s, bt_errors *err);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

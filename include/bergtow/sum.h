@@ -12,6 +12,10 @@
 #include <math.h>
 #include <stdbool.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 __extension__ typedef __int128 bt_int128;
 __extension__ typedef unsigned __int128 bt_uint128;
 
@@ -37,5 +41,9 @@ static inline void bt_sum_join(bt_sum *s, const bt_sum *more)
 }
 
 static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

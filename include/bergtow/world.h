@@ -21,6 +21,10 @@
 #include "bergtow/outline.h"
 #include "bergtow/shape.h"
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef enum {
     BT_DYNAMIC,   ///< moved by forces and contacts
     BT_KINEMATIC, ///< velocity prescribed, infinite mass in contacts
@@ -255,5 +259,9 @@ double bt_world_overlap(bt_world *w);
 
 /// 64-bit hash of all poses and velocities by gid: equal for equal states, however stored or distributed.
 uint64_t bt_world_hash(const bt_world *w);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

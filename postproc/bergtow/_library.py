@@ -32,7 +32,7 @@ class Options(ctypes.Structure):
     """bt_simulation_options"""
     _fields_ = [("path", c_char_p), ("text", c_char_p), ("set", POINTER(c_char_p)), ("n_set", c_int),
                 ("dir", c_char_p), ("replace", c_bool), ("signals", c_bool), ("progress", c_bool),
-                ("threads", c_int), ("command_line", c_char_p)]
+                ("threads", c_int), ("command_line", c_char_p), ("from_", c_char_p)]
 
 
 class Errors(ctypes.Structure):
@@ -54,6 +54,7 @@ _SIGNATURES = {
     "bt_version": (c_char_p,),
     "bt_last_error": (c_char_p,),
     "bt_simulation_create": (c_int, POINTER(c_void_p), POINTER(Options)),
+    "bt_simulation_resume": (c_int, POINTER(c_void_p), POINTER(Options)),
     "bt_simulation_step": (c_int, c_void_p, c_int64),
     "bt_simulation_end": (c_int, c_void_p),
     "bt_simulation_drop": (None, c_void_p),
@@ -63,6 +64,7 @@ _SIGNATURES = {
     "bt_simulation_dt": (c_double, c_void_p),
     "bt_simulation_hash": (c_uint64, c_void_p),
     "bt_simulation_checkpoint": (c_int, c_void_p),
+    "bt_simulation_frame": (c_int, c_void_p),
     "bt_simulation_bodies": (c_int64, c_void_p),
     "bt_simulation_towed": (c_int64, c_void_p),
     "bt_simulation_read": (c_int, c_void_p, c_int, POINTER(c_double)),
@@ -153,10 +155,12 @@ def start_mpi():
 
 
 def options(case, **more):
-    """bt_simulation_options of a Case."""
+    """bt_simulation_options of a Case, or None."""
+    texts = {k: os.fsencode(v) if v is not None else None for k, v in more.items()
+             if k in ("dir", "command_line", "from_")}
+    if case is None:
+        return Options(**(more | texts))
     overrides = [f"{key}={value}".encode() for key, value in case.overrides.items()]
-    texts = {k: os.fsencode(v) if v is not None else None for k, v in more.items() if k in ("dir", "command_line")}
-    o = Options(path=os.fsencode(case.path) if case.path is not None else None,
-                text=case.text.encode() if case.text is not None else None,
-                set=(c_char_p * len(overrides))(*overrides), n_set=len(overrides), **(more | texts))
-    return o
+    return Options(path=os.fsencode(case.path) if case.path is not None else None,
+                   text=case.text.encode() if case.text is not None else None,
+                   set=(c_char_p * len(overrides))(*overrides), n_set=len(overrides), **(more | texts))

@@ -38,23 +38,39 @@ class Simulation:
     """
 
     def __init__(self, case, out=None, *, forces=None, threads=0, replace=False, progress=False):
+        case = case if isinstance(case, Case) else Case(case)
+        self._begin("bt_simulation_create", case, out, forces, threads=threads, replace=replace, progress=progress)
+
+    @classmethod
+    def resume(cls, folder, *, checkpoint=None, forces=None, threads=0, progress=False):
+        """Go on with a run in its folder, from its last checkpoint or the one that is named.
+
+            with Simulation.resume("out/my-run", forces={"my_drag": my_drag}) as sim: ...
+
+        The run may be one of `bergtow run`, of an ensemble or of this class. forces: as they were, for the checkpoint
+        does not hold them. Errors: BergtowError for a run that is finished, CaseError for a checkpoint that is refused.
+        """
+        self = cls.__new__(cls)
+        self._begin("bt_simulation_resume", None, folder, forces, threads=threads, progress=progress, from_=checkpoint)
+        return self
+
+    def _begin(self, function, case, out, forces, **more):
         self._address = None
         self._library = _library.library()
-        self.case = case if isinstance(case, Case) else Case(case)
         self._forces = Forces(forces)
+        self.folder = None if out is None else os.fspath(out)
         try:
-            if forces:
-                self.case = self.case.copy()
+            if case is not None and forces:
+                case = case.copy()
             address = c_void_p()
-            o = _library.options(self.case, dir=None if out is None else os.fspath(out), replace=replace,
-                                 progress=progress, threads=threads,
-                                 command_line=" ".join(["python", *map(os.path.basename, sys.argv[:1])]))
-            _library.check(self._library.bt_simulation_create(ctypes.byref(address), ctypes.byref(o)))
+            o = _library.options(case, dir=self.folder,
+                                 command_line=" ".join(["python", *map(os.path.basename, sys.argv[:1])]), **more)
+            _library.check(getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o)))
         except BaseException:
             self._forces.release()
             raise
         self._address = address
-        self.folder = None if out is None else os.fspath(out)
+        self.case = Case(os.path.join(self.folder, "case.resolved.yml")) if case is None else case
         #: id of the towed body, None without
         self.towed = None if (towed := self._library.bt_simulation_towed(address)) < 0 else towed
         self.n_bodies = self._library.bt_simulation_bodies(address)
@@ -112,6 +128,10 @@ class Simulation:
     def checkpoint(self):
         """Write a checkpoint into the folder, from which `bergtow resume` goes on."""
         _library.check(self._library.bt_simulation_checkpoint(self._s))
+
+    def frame(self):
+        """Write a frame of the bodies as they are, beside those by output.frame_interval."""
+        _library.check(self._library.bt_simulation_frame(self._s))
 
     @property
     def steps(self):

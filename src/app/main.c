@@ -34,6 +34,8 @@ static const struct {
     {"capability", "find out how fast a vessel tows in which ice, and the ice that stops it", bt_cmd_script, false},
     {"design", "from a case or a study to the report of the design tow force, as a page and as PDF", bt_cmd_script,
      false},
+    {"outlines", "from a map of the ice, outlines or an image of labels, to floes for ice.outlines", bt_cmd_script,
+     false},
     {"resume", "go on with a run from its last checkpoint", bt_cmd_resume, true},
     {"diff", "name the first difference between two checkpoints, or print one", bt_cmd_diff, false},
     {"estimate", "print published estimates of the resistance for a case", bt_cmd_estimate, false},

@@ -103,7 +103,7 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
 {
     if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", bt_history_columns[k].name);
-    else snprintf(name, BT_HISTORY_NAME, "history/added_%s", bt_added(k - BT_N_COLUMNS)->name);
+    else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", bt_added(k - BT_N_COLUMNS)->name);
     return name;
 }
 

@@ -63,6 +63,7 @@ typedef struct bt_total {
 extern const bt_total bt_history_totals[BT_N_TOTALS];
 
 /// Name of a column in the checkpoint; returns name.
+#define BT_HISTORY_ADDED "history/added_"
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME]);
 
 /// The larger of the two, and NaN when one of them is: a maximum must not hide it.

@@ -62,6 +62,42 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 
 // --- going on --------------------------------------------------------------------------------------------------------
 
+/// A force that the run had not: it was 0.
+static bool was_zero(const bt_quantity *q) { return q->role == BT_ROLE_BALANCE; }
+
+static bool all_zero(const bt_item *i)
+{
+    for (int64_t k = 0; k < i->n; k++)
+        if (i->type != BT_ITEM_F64 || ((const double *)i->data)[k] != 0) return false;
+    return true;
+}
+
+/// What programs add (forces, quantities) goes on as it was, or not at all: a run without one of its forces would be
+/// another run.
+static void check_added(bt_snapshot *s)
+{
+    const char *missing = NULL, *left_over = NULL;
+    char name[BT_HISTORY_NAME];
+    for (int k = 0; k < bt_n_added() && !missing; k++)
+        if (!bt_snapshot_find(s, bt_history_name(BT_N_COLUMNS + k, name)) && !was_zero(bt_added(k)))
+            missing = bt_added(k)->name;
+    for (int i = 0; i < s->n && !left_over; i++) {
+        if (strncmp(s->item[i].name, BT_HISTORY_ADDED, strlen(BT_HISTORY_ADDED)) || all_zero(&s->item[i])) continue;
+        left_over = s->item[i].name + strlen(BT_HISTORY_ADDED);
+        for (int k = 0; k < bt_n_added() && left_over; k++)
+            if (!strcmp(bt_added(k)->name, left_over)) left_over = NULL;
+    }
+    if (missing && !s->faulty)
+        bt_errors_add(s->err,
+                      "%s: the run had no %s, which this program has added; go on in one that adds no other quantities",
+                      s->path, missing);
+    else if (left_over && !s->faulty)
+        bt_errors_add(
+            s->err, "%s: the run had %s, which a program had added (a force or a quantity); go on in one that adds it",
+            s->path, left_over);
+    s->faulty |= missing || left_over;
+}
+
 /// n: steps done; each has a value.
 static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
 {
@@ -71,23 +107,30 @@ static void load_history(bt_history *h, bt_snapshot *s, int64_t n)
         snprintf(name, sizeof name, "history/%s", t->at.name);
         if (!t->later || bt_snapshot_find(s, name)) bt_snapshot_take_rows(s, "history", &t->at, 1, h);
     }
+    check_added(s);
     h->n = h->cap = n;
     char name[BT_HISTORY_NAME];
     for (int k = 0; k < h->n_columns; k++) {
         free(h->column[k]);
+        if (k >= BT_N_COLUMNS && !bt_snapshot_find(s, bt_history_name(k, name))) {
+            h->column[k] = bt_alloc((size_t)n, sizeof *h->column[k]);
+            continue;
+        }
         h->column[k] = bt_snapshot_copy(s, bt_history_name(k, name), BT_ITEM_F64, 1, &n);
         bt_snapshot_want(s, n == h->n, name, -1, "has not a value for each step");
     }
     if (s->faulty) h->n = 0;
 }
 
-/// Entries 0 up to n of all series. before: of a program whose floes did not raft; series that it had not are 0.
+/// Entries 0 up to n of all series. before: of a program whose floes did not raft; series that it had not are 0, as are
+/// those of forces that the run had not.
 static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
 {
     double *x = bt_alloc((size_t)n, sizeof *x);
     for (int k = 0; k < bt_n_series() && old->status == BT_OK; k++) {
         char *name = bt_file_join("/series", bt_series(k)->name);
-        if (before && !bt_h5_there(old, name)) memset(x, 0, (size_t)n * sizeof *x);
+        const bool maybe = before || (k >= bt_n_own_series && was_zero(bt_series(k)));
+        if (maybe && !bt_h5_there(old, name)) memset(x, 0, (size_t)n * sizeof *x);
         else bt_h5_read(old, name, H5T_NATIVE_DOUBLE, 0, n, 1, x);
         if (old->status == BT_OK) bt_h5_append(&r->h5, r->series[k], H5T_NATIVE_DOUBLE, 0, (hsize_t)n, x);
         free(name);

@@ -64,6 +64,10 @@ bt_status bt_running_step(bt_running *r, bt_errors *err);
 /// Collective. The run ends here, before bt_running_end, as it does after --steps.
 bt_status bt_running_stop(bt_running *r, bt_errors *err);
 
+/// Collective, between steps. A frame of the bodies as they are, beside those by the interval; nothing where one was
+/// taken after this step.
+bt_status bt_running_frame(bt_running *r, bt_errors *err);
+
 /// Collective. status: of the last step. Summary and last checkpoint of a run whose steps were sound; closes and frees
 /// everything but the lock. Returns the status of the run.
 bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err);
@@ -85,5 +89,21 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
 
 /// Collective. State of the world and counters of the run, into a world that was set up; deals it to the ranks.
 bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
+
+// --- going on --------------------------------------------------------------------------------------------------------
+
+typedef struct bt_resume {
+    bt_snapshot s; ///< the checkpoint; empty where fresh
+    bt_case c;
+    char *path;    ///< of the checkpoint
+    int lock;      ///< on the folder, on rank 0; the caller drops it, whatever the status was
+    bool fresh;    ///< killed before its first checkpoint: begins at time zero
+    bool finished; ///< all its steps are done, and its summary is written
+} bt_resume;
+
+/// Collective. What o->dir (or o->from) holds to go on from. bt_resume_end follows whatever the status is. Errors:
+/// BT_ERR_IO, BT_ERR_CASE.
+bt_status bt_resume_begin(bt_resume *k, const bt_comm *comm, const bt_run_options *o, bt_errors *err);
+void bt_resume_end(bt_resume *k);
 
 #endif

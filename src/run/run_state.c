@@ -119,19 +119,20 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
     return s->faulty ? BT_ERR_CASE : BT_OK;
 }
 
+/// Frames are by the interval, and a program may ask for others (bt_simulation_frame): one at most after each step.
 static void check_frames(const bt_running *r, bt_snapshot *s)
 {
-    if (!bt_running_draws(r->c)) {
+    const int64_t step = bt_snapshot_int(s, "world/step"), first = bt_running_draws(r->c);
+    bt_snapshot_want(s, r->frames >= first && r->frames <= step + 1, "record/frames", -1,
+                     "is no number of frames up to here");
+    if (!first) {
         bt_snapshot_want(s, r->frames_due == 1, "run/frames_due", -1, "is not that of a run without frames");
-        bt_snapshot_want(s, r->frames == 0, "record/frames", -1, "is not that of a run without frames");
         return;
     }
-    const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12),
-                 time = (double)bt_snapshot_int(s, "world/step") * r->c->run.dt, due = (double)r->frames_due;
+    const double interval = bt_running_frame_interval(r->c) * (1 - 1e-12), time = (double)step * r->c->run.dt,
+                 due = (double)r->frames_due;
     bt_snapshot_want(s, r->frames_due >= 1 && (due - 1) * interval <= time && time < due * interval, "run/frames_due",
                      -1, "is not the number of the next frame");
-    bt_snapshot_want(s, r->frames >= 1 && r->frames <= r->frames_due + 1, "record/frames", -1,
-                     "is no number of frames up to here");
 }
 
 /// What the loop of the run goes by.

@@ -423,6 +423,13 @@ bt_status bt_running_stop(bt_running *r, bt_errors *err)
     return frame_if_due(r, (double)r->w->step * r->w->par.dt, err);
 }
 
+bt_status bt_running_frame(bt_running *r, bt_errors *err)
+{
+    if (r->framed == r->w->step) return BT_OK;
+    r->frames++;
+    return record_frame(r, err);
+}
+
 bt_status bt_running_end(bt_running *r, bt_status status, bt_errors *err)
 {
     if (r->begun) status = close_steps(r, status, err);

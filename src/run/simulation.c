@@ -20,7 +20,7 @@
 struct bt_simulation {
     bt_case c;
     bt_run_options o;
-    char *dir, *command_line; ///< what o points to
+    char *dir, *from, *command_line; ///< what o points to
     bt_running r;
     bt_run_manner m;
     bt_status status;         ///< of the last step
@@ -79,35 +79,80 @@ static void release(bt_simulation *s)
     bt_lock_drop(s->dir, s->m.lock);
     bt_case_free(&s->c);
     free(s->dir);
+    free(s->from);
     free(s->command_line);
     free(s);
+}
+
+static bt_simulation *simulation_of(const bt_simulation_options *o)
+{
+    bt_simulation *s = bt_alloc(1, sizeof *s);
+    s->dir = copy_of(o->dir);
+    s->from = copy_of(o->from);
+    s->command_line = copy_of(o->command_line);
+    s->o = (bt_run_options){.dir = s->dir,
+                            .from = s->from,
+                            .threads = o->threads,
+                            .quiet = !o->progress || bt_comm_world()->rank != 0,
+                            .dump_step = -1,
+                            .command_line = s->command_line,
+                            .leave_signals = !o->signals};
+    s->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
+    return s;
+}
+
+static bt_status begin(bt_simulation *s, bt_errors *err)
+{
+    const bt_status status = bt_running_begin(&s->r, bt_comm_world(), &s->c, &s->o, &s->m, err);
+    if (status != BT_OK) bt_running_end(&s->r, status, err);
+    return status;
+}
+
+/// The end of create and resume.
+static bt_status hand_out(bt_simulation **out, bt_simulation *s, bt_status status, bt_errors *err)
+{
+    *out = status == BT_OK ? s : NULL;
+    if (status != BT_OK) release(s);
+    return told(status, err);
 }
 
 bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *o)
 {
     const bt_comm *comm = bt_comm_world();
     bt_errors err = {0};
-    bt_simulation *s = bt_alloc(1, sizeof *s);
-    *out = NULL;
-    s->dir = copy_of(o->dir);
-    s->command_line = copy_of(o->command_line);
-    s->o = (bt_run_options){.dir = s->dir,
-                            .threads = o->threads,
-                            .quiet = !o->progress || comm->rank != 0,
-                            .dump_step = -1,
-                            .command_line = s->command_line,
-                            .leave_signals = !o->signals};
-    s->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
+    bt_simulation *s = simulation_of(o);
     bt_status status = read_case(&s->c, o, &err);
     if (status == BT_OK && s->dir && comm->rank == 0) status = bt_folder_may_take(s->dir, o->replace, &err);
     status = bt_comm_agree(comm, status);
-    if (status == BT_OK) {
-        status = bt_running_begin(&s->r, comm, &s->c, &s->o, &s->m, &err);
-        if (status != BT_OK) bt_running_end(&s->r, status, &err);
+    if (status == BT_OK) status = begin(s, &err);
+    return hand_out(out, s, status, &err);
+}
+
+bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options *o)
+{
+    bt_errors err = {0};
+    bt_simulation *s = simulation_of(o);
+    bt_resume k = {.lock = -1};
+    bt_status status = BT_ERR_USAGE;
+    if (!o->dir) bt_errors_add(&err, "no folder to go on in; name that of the run in the options (dir)");
+    else if (o->path || o->text || o->n_set > 0)
+        bt_errors_add(&err, "%s holds the case that goes on; path, text and set are for another simulation", o->dir);
+    else status = bt_resume_begin(&k, bt_comm_world(), &s->o, &err);
+    if (status == BT_OK && k.finished) {
+        bt_errors_add(&err, "%s is finished: all %lld steps are done", o->dir, (long long)bt_case_steps(&k.c));
+        status = BT_ERR_USAGE;
     }
-    if (status == BT_OK) *out = s;
-    else release(s);
-    return told(status, &err);
+    s->m.lock = k.lock;
+    s->m.held = true;
+    s->c = k.c; // ours from here on
+    k.c = (bt_case){0};
+    if (status == BT_OK) {
+        s->m.kept = k.fresh ? NULL : &k.s;
+        status = begin(s, &err);
+        s->m.kept = NULL;
+    }
+    bt_resume_end(&k);
+    return hand_out(out, s, status, &err);
 }
 
 bt_status bt_simulation_step(bt_simulation *s, int64_t n)
@@ -147,6 +192,14 @@ bt_status bt_simulation_checkpoint(bt_simulation *s)
     if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
     return told(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
+}
+
+bt_status bt_simulation_frame(bt_simulation *s)
+{
+    bt_errors err = {0};
+    if (!s->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
+    if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
+    return told(bt_running_frame(&s->r, &err), &err);
 }
 
 int64_t bt_simulation_steps(const bt_simulation *s) { return s->r.w->step; }

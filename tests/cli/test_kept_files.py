@@ -24,6 +24,7 @@ import command  # noqa: E402
 import converge  # noqa: E402
 import design  # noqa: E402
 import ensemble  # noqa: E402
+import outlines  # noqa: E402
 import plot_chains  # noqa: E402
 import plot_ensemble  # noqa: E402
 import plot_field  # noqa: E402
@@ -54,6 +55,8 @@ CALLS = [
     (converge, ["case.yml", "-o", "."], ["converge.json"]),
     (budget, ["study.yml", "-o", "."], ["budget.json", "budget.png"]),
     (capability, ["line.yml", "-o", "."], ["capability.json", "capability.png"]),
+    (outlines, ["map.geojson", "-o", "a.geojson", "--record", "a.json", "--picture", "a.png"],
+     ["a.geojson", "a.json", "a.png"]),
     (design, ["case.yml", "-o", "."], ["design.yml", "report.html", "report.pdf", "replay.html"]),
 ]
 WRITE_NOTHING = {"contents"}
@@ -81,6 +84,7 @@ def quick(places, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(places / "case.yml", tmp_path)
     shutil.copy(places / "contacts.h5", tmp_path)
+    shutil.copy(POSTPROC.parent / "cases/outlines/made_up.geojson", tmp_path / "map.geojson")
     (tmp_path / "study.yml").write_text("base: case.yml\n")
     write_case(tmp_path, changed(TOW, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000, body__x=4,
                                  tow__line__breaking_load=1e5), "line.yml")

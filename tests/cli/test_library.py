@@ -4,12 +4,14 @@ import os
 import re
 import subprocess
 
+import h5py
+import numpy as np
 import pytest
-from harness import BERGTOW, DONE, ROOT, TOW, call, changed, environment, run, write_case
+from harness import BERGTOW, DONE, ROOT, TOW, Run, call, changed, differing, environment, run, write_case
 
 EXAMPLES = ROOT / "tests/examples"
 EXTENDED = os.path.join(os.path.dirname(BERGTOW), "tests/examples/extended")
-CASE = changed(TOW, run__duration=10)
+CASE = changed(TOW, run__duration=10, output__frame_interval=1.7)
 WAVES = {"amplitude": 0.02, "period": 2, "direction": 30}
 
 
@@ -97,6 +99,101 @@ def test_the_library_exports_what_public_headers_name(prefix):
     declared = set(re.findall(r"\b(bt_\w+)\(", (prefix / "include/bergtow/simulation.h").read_text()))
     assert declared - {"bt_on_out_of_memory", "bt_comm_start"} <= exported
     assert {"bt_on_out_of_memory", "bt_comm_start", "bt_force_apply", "bt_quantity_register"} <= exported
+
+
+@pytest.mark.parametrize("compiler", ["gcc -std=c17", "g++ -std=c++17"])
+def test_each_header_stands_alone(prefix, tmp_path, compiler):
+    names = sorted(h.name for h in (prefix / "include/bergtow").glob("*.h"))
+    assert "simulation.h" in names and len(names) > 20
+    shown = subprocess.run(["mpicc", "-show"], capture_output=True, text=True, check=True).stdout.split()
+    mpi = [f"-isystem{word[2:]}" for word in shown if word.startswith("-I")]  # comm.h is for programs with MPI
+    for name in names:
+        source = tmp_path / ("x.c" if compiler.startswith("gcc") else "x.cpp")
+        # twice, for the guard; and the functions have to have the names of C
+        source.write_text(f'#include "bergtow/{name}"\n' * 2)
+        result = subprocess.run([*compiler.split(), "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fsyntax-only",
+                                 *flags(prefix, "--cflags"), *mpi, source], capture_output=True, text=True)
+        assert result.returncode == 0, f"{name}: {result.stderr}"
+
+
+CPP = """
+#include "bergtow/simulation.h"
+#include <cstdio>
+#include <string>
+// PROGRAM DIR CASE STEPS: so many steps, a frame and a checkpoint, and no end; PROGRAM DIR: on from there
+int main(int argc, char **argv)
+{
+    bt_simulation_options o = {};
+    bt_simulation *s = nullptr;
+    o.dir = argv[1];
+    o.path = argc > 2 ? argv[2] : nullptr;
+    o.threads = 1;
+    auto fail = [] { std::fprintf(stderr, "%s\\n", bt_last_error()); return 1; };
+    if ((argc > 2 ? bt_simulation_create : bt_simulation_resume)(&s, &o) != BT_OK) return fail();
+    if (bt_simulation_step(s, argc > 3 ? std::stoi(argv[3]) : 1 << 30) != BT_OK) return fail();
+    if (argc > 3) {
+        for (int i = 0; i < 2; i++)
+            if (bt_simulation_frame(s) != BT_OK) return fail();
+        if (bt_simulation_checkpoint(s) != BT_OK) return fail();
+        bt_simulation_drop(s);
+        return 0;
+    }
+    return bt_simulation_end(s) == BT_OK ? 0 : fail();
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def going_on(prefix, tmp_path_factory):
+    """A program in C++ that begins simulations and goes on with them."""
+    folder = tmp_path_factory.mktemp("cpp")
+    (folder / "x.cpp").write_text(CPP)
+    subprocess.run(["g++", "-std=c++17", "-Wall", "-Werror", "x.cpp", *flags(prefix, "--cflags", "--libs"),
+                    f"-Wl,-rpath,{prefix / 'lib'}", "-o", "x"], cwd=folder, check=True)
+
+    def call_it(*arguments, code=0):
+        result = subprocess.run([folder / "x", *map(str, arguments)], capture_output=True, text=True, timeout=60,
+                                env=environment(OMP_NUM_THREADS=1))
+        assert result.returncode == code, result.stderr
+        return result.stderr
+    return call_it
+
+
+def frame_times(folder):
+    with h5py.File(folder / "result.h5") as f:
+        return f["frames/time"][:]
+
+
+@pytest.mark.parametrize("steps", [1, 33, 50])
+def test_a_program_goes_on_where_it_was(going_on, tmp_path, steps):
+    """As the run that was never stopped; what was asked for in between, a frame, is there, once."""
+    path = write_case(tmp_path, CASE)
+    whole = run(tmp_path, path)
+    going_on(tmp_path / "cpp", path, steps)
+    going_on(tmp_path / "cpp")
+    assert Run(tmp_path / "cpp", None).hash == whole.hash
+    dt, times = CASE["run"]["dt"], frame_times(whole.dir)
+    assert np.array_equal(frame_times(tmp_path / "cpp"), np.union1d(times, [steps * dt]))
+    assert set(differing(whole.dir / "result.h5", tmp_path / "cpp/result.h5")) <= {
+        "/case_as_given", *(f"/{group}" for group in ("xdmf", "frames")), "/frame"} | {
+        n for n in differing(whole.dir / "result.h5", tmp_path / "cpp/result.h5") if n.startswith(("/frames", "/xdmf"))}
+    assert "is finished" in going_on(tmp_path / "cpp", code=1)
+
+
+def test_programs_and_commands_take_up_each_other(going_on, tmp_path):
+    path = write_case(tmp_path, CASE)
+    whole = run(tmp_path, path)
+    going_on(tmp_path / "cpp", path, 40)
+    assert call("resume", tmp_path / "cpp", "--threads", 2).returncode == DONE
+    assert call("run", path, "-o", tmp_path / "ours", "--steps", 40).returncode == DONE
+    going_on(tmp_path / "ours")
+    assert {Run(tmp_path / name, None).hash for name in ("cpp", "ours")} == {whole.hash}
+
+
+def test_what_cannot_go_on_is_a_message(going_on, tmp_path):
+    assert "there is no such folder" in going_on(tmp_path / "none", code=1)
+    (tmp_path / "empty").mkdir()
+    assert "holds no" in going_on(tmp_path / "empty", code=1)
 
 
 def test_man_page_and_completions_know_every_option(prefix):

@@ -12,7 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import ROOT, TOW, call, changed, environment, run, write_case
+from harness import CASE, ROOT, TOW, call, changed, environment, run, write_case
 
 LIBRARY = ROOT / "build/release/libbergtow.so"
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -98,6 +98,60 @@ def test_resume_goes_on_from_a_checkpoint_of_the_library(tmp_path):
     assert not (tmp_path / "python/summary.json").exists()
     assert call("resume", tmp_path / "python").returncode == 0
     assert bergtow.Result(tmp_path / "python").summary["state_hash"] == run(tmp_path, SHORT).hash
+
+
+def test_a_run_is_taken_up_here(tmp_path):
+    """One of the command, and its end; with a force, which has to be there as it was; at another checkpoint. In a
+    process of its own, for forces belong to the process."""
+    whole = run(tmp_path, LINE)
+    run(tmp_path, LINE, "--steps", 20, name="part")
+    script = tmp_path / "resume.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow, shutil
+def push(bodies): bodies.force[bodies.towed] += 5, 5
+def refused(*words, **more):
+    try:
+        bergtow.Simulation.resume(*words, **more)
+    except bergtow.BergtowError as error:
+        print(error)
+shutil.copytree("part", "later")
+with bergtow.Simulation.resume("part", threads=1) as sim:
+    assert sim.steps == 20 and sim.case["tow.speed"] == bergtow.Case("case.yml")["tow.speed"]
+    while sim.steps_left: sim.step(7)
+refused("part")
+refused("none")
+with bergtow.Simulation("case.yml", "pushed", forces=dict(push=push), threads=1) as sim:
+    sim.step(15)
+    sim.checkpoint()
+    shutil.copy("pushed/checkpoint.h5", "early.h5")
+    sim.step(15)
+    sim.checkpoint()
+    shutil.copytree("pushed", "copy")
+    sim.step(10**6)
+    pushed = sim.state_hash
+for checkpoint in None, "early.h5":
+    with bergtow.Simulation.resume("copy", checkpoint=checkpoint, forces=dict(push=push), threads=1) as sim:
+        assert sim.steps == (15 if checkpoint else 30)
+        sim.step(10**6)
+        assert sim.state_hash == pushed
+        if not checkpoint: sim.drop()
+with bergtow.Simulation.resume("later", forces=dict(push=push), threads=1) as sim:
+    sim.step(10**6)
+""")
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    finished, missing = result.stdout.strip().splitlines()
+    assert "is finished" in finished and "no such folder" in missing
+    hashes = [bergtow.Result(tmp_path / name).summary["state_hash"] for name in ("part", "copy", "later")]
+    assert hashes[0] == whole.hash and len(set(hashes)) == 3
+    with h5py.File(tmp_path / "later/result.h5") as f:  # a force that has come later was 0 before
+        assert [(x == 0).all() for x in np.split(f["series/push_force"][:], [20])] == [True, False]
+    shutil.rmtree(tmp_path / "copy")
+    shutil.copytree(tmp_path / "part", tmp_path / "copy")
+    shutil.copy(tmp_path / "early.h5", tmp_path / "copy")
+    result = call("resume", tmp_path / "copy/early.h5")
+    assert result.returncode == CASE and "the run had push_force, which a program had added" in result.stderr
 
 
 def test_two_ranks_have_the_state_of_one(tmp_path):

@@ -47,7 +47,7 @@ def field(tmp_path_factory):
 
 
 def test_a_result_beyond_four_gigabytes(tmp_path, field):
-    """Killed when more than that is written, taken up by one rank: as the run that was never stopped, which one rank
+    """Killed when more than that is written, taken up: as the run that was never stopped, which one rank
     has written and packed."""
     write_case(tmp_path, changed(LOOSE, run__duration=200, output__checkpoint_steps=40, ice__field=str(field)))
     p = started(2, "run", "case.yml", "-o", "killed", "--quiet", "--threads", 1, cwd=tmp_path)
@@ -59,7 +59,7 @@ def test_a_result_beyond_four_gigabytes(tmp_path, field):
         os.kill(process, signal.SIGKILL)
     p.communicate()
     check_readable(tmp_path / "killed")
-    done(1, "resume", "killed", "--quiet", "--threads", 2, cwd=tmp_path, timeout=3000)
+    done(2, "resume", "killed", "--quiet", "--threads", 1, cwd=tmp_path, timeout=3000)
     print(f"result.h5: {(tmp_path / 'killed/result.h5').stat().st_size / FOUR:.2f} of 4 GiB")
     assert (tmp_path / "killed/result.h5").stat().st_size > FOUR
     done(1, "run", "case.yml", "-o", "whole", "--quiet", "--threads", 2, cwd=tmp_path, timeout=3000)

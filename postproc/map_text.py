@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: MIT
+"""What bergtow outlines says: the map, the plane, every change, the floes; as lines and as a record."""
+import math
+
+import numpy as np
+
+from map_plane import name_of
+from map_repair import KINDS
+
+CLASSES = 8     # of the size distribution, each sqrt(2) wide or wider
+
+
+def area(value):
+    return f"{value / 1e6:.4g} km²" if value >= 1e6 else f"{value:.4g} m²"
+
+
+def length(value):
+    return f"{value / 1e3:.4g} km" if value >= 1e3 else f"{value:.4g} m"
+
+
+def map_lines(found, crs):
+    lines = [f"map: {len(found.shapes)} shapes in {name_of(crs)}"]
+    if found.about:
+        lines.append(f"the file says of itself: {found.about}")
+    return lines
+
+
+def plane_lines(plane, told, bend):
+    """told: Plane.distortion; bend: how far edges that are straight on the map are not so in the plane, m."""
+    if "length_error" not in told:
+        x, y = plane.centre
+        return [f"plane: metres as they are, about {x:.10g}, {y:.10g}; farthest vertex {length(told['farthest_m'])}"]
+    lon, lat = plane.centre
+    lines = [f"plane: azimuthal equidistant about longitude {lon:.7g}, latitude {lat:.7g}; farthest vertex "
+             f"{length(told['farthest_m'])}",
+             f"distortion at most: lengths {told['length_error']:.1e}, areas {told['area_error']:.1e}, north turns by "
+             f"{told['north_turns_deg']:.2g}°, edges straight on the map bend by {length(bend)}"]
+    if told["map_scale"]:
+        least, most = told["map_scale"]
+        lines.append(f"a metre of the map is {1 / most:.6f} to {1 / least:.6f} m on the ground; the outlines are "
+                     "corrected for it")
+    if plane.accuracy:
+        lines.append("the map's datum is tied to WGS 84 " + (
+            f"within {plane.accuracy:g} m" if math.isfinite(plane.accuracy) else
+            "by no known relation: places may be off by some hundred metres, all alike"))
+    if plane.heading is not None:
+        lines.append(f"first axis towards {plane.heading:g}°, second to its left (frame: basin)")
+    return lines
+
+
+def change_lines(book):
+    """A line for each kind of change."""
+    lines = []
+    for kind in (k for k in KINDS if k in book):
+        c = book[kind]
+        text = f"{c.count:6d}  {KINDS[kind]}"
+        if c.before and c.after and c.before != c.after:
+            ratio = c.after / c.before - 1
+            text += f": {area(c.before)} to {area(c.after)}" + (f" ({100 * ratio:+.3g} %" + (
+                f", one by {100 * c.largest:.3g} %)" if c.count > 1 else ")") if abs(ratio) < 10 else "")
+        elif c.before:
+            text += f": {area(c.before)}"
+        lines.append(text)
+    return ["changes:", *lines] if lines else ["changes: none"]
+
+
+def numbers(floes, rectangle, imaged):
+    """What the floes are together. rectangle: (x0, x1, y0, y1) along the axes; imaged: its part that was seen, m²."""
+    areas = np.array([f.polygon.area for f in floes])
+    size, within = np.sqrt(4 * areas / np.pi), (rectangle[1] - rectangle[0]) * (rectangle[3] - rectangle[2])
+    convex = sum(f.polygon.convex_hull.area <= f.polygon.area * (1 + 1e-9) for f in floes)
+    thick = np.array([f.thickness for f in floes if f.thickness is not None])
+    out = {
+        "floes": len(floes), "area_m2": areas.sum(), "mean_size_m": size.mean(), "sizes_m": dict(zip(
+            ("least", "q10", "q25", "median", "q75", "q90", "largest"),
+            np.quantile(size, (0, .1, .25, .5, .75, .9, 1)))),
+        "size_spread": size.std() / size.mean(), "rectangle_m": list(rectangle), "imaged_share": imaged / within,
+        "concentration": areas.sum() / imaged, "convex": convex, "with_thickness": len(thick),
+        "mean_thickness_m": thick.mean() if len(thick) else None, "distribution": distribution(size, areas),
+    }
+    return out
+
+
+def distribution(size, areas):
+    """[(from, to, floes, share of the ice)] in classes of equal ratio."""
+    low, high = size.min(), size.max() * (1 + 1e-12)
+    n = int(min(CLASSES, max(1, math.ceil(2 * math.log2(high / low)))))
+    edges = low * (high / low) ** (np.arange(n + 1) / n)
+    place = np.clip(np.searchsorted(edges, size, side="right") - 1, 0, n - 1)
+    return [{"from_m": edges[k], "to_m": edges[k + 1], "floes": int(np.sum(place == k)),
+             "share_of_area": areas[place == k].sum() / areas.sum()} for k in range(n)]
+
+
+def floe_lines(told):
+    q, (x0, x1, y0, y1) = told["sizes_m"], told["rectangle_m"]
+    lines = [f"floes: {told['floes']}, {told['convex']} of them convex, {area(told['area_m2'])}; mean size "
+             f"{length(told['mean_size_m'])}, spread {told['size_spread']:.2f}, median {length(q['median'])}, "
+             f"{length(q['least'])} to {length(q['largest'])}",
+             f"concentration: {told['concentration']:.3f} of what was imaged of {length(x1 - x0)} by {length(y1 - y0)}"]
+    if told["imaged_share"] < 0.97:
+        lines.append(f"only {100 * told['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the "
+                     "rest for water: choose a smaller one with --box")
+    if told["with_thickness"]:
+        lines.append(f"thickness: {told['with_thickness']} floes have one, {told['mean_thickness_m']:.3g} m in the "
+                     "mean")
+    lines.append("       size, m          floes   share of the ice")
+    return lines + [f"{row['from_m']:9.4g} to {row['to_m']:<9.4g} {row['floes']:6d} {100 * row['share_of_area']:8.1f} %"
+                    for row in told["distribution"]]
+
+
+def case_lines(path, told, heading, margin):
+    """Lines for a case that reads the file: in the geographic frame x is north."""
+    x0, x1, y0, y1 = told["rectangle_m"]
+    low = np.minimum(told["reach_m"][:2], (x0, y0)) - margin
+    high = np.maximum(told["reach_m"][2:], (x1, y1)) + margin
+    if heading is None:
+        low, high, x0, x1, y0, y1 = low[::-1], high[::-1], y0, y1, x0, x1
+    low, size = np.floor(low), np.ceil(high) - np.floor(low)
+    frame, bays = "geographic" if heading is None else "basin", told["convex"] < told["floes"]
+    return ["in a case beside it:",
+            f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
+            f"width: {size[1]:.0f} m}}",
+            f"  ice: {{outlines: {path.name}, x_min: {x0:.1f} m, x_max: {x1:.1f} m, y_min: {y0:.1f} m, "
+            f"y_max: {y1:.1f} m" + (", nonconvex: split}" if bays else "}")]
+
+
+def record(found, plane, crs, told, bend, book, rules, floes):
+    """Everything as one dict for JSON."""
+    return {
+        "map": {"file": str(found.path), "crs": name_of(crs), "says_of_itself": found.about or None,
+                "shapes": len(found.shapes)},
+        "plane": {"centre": list(plane.centre), "heading_deg": plane.heading, "edges_bend_m": bend,
+                  "accuracy_m": plane.accuracy if math.isfinite(plane.accuracy) else None, **told},
+        "rules": {"tolerance_m": rules.tolerance, "least_m2": rules.least, "box_m": rules.box,
+                  "clear_m": rules.clear, "keep_cut": rules.keep_cut},
+        "changes": {kind: {"what": KINDS[kind], "count": c.count, "area_before_m2": c.before,
+                           "area_after_m2": c.after, "largest_relative": c.largest, "first": c.names}
+                    for kind, c in book.items()},
+        "floes": floes,
+    }

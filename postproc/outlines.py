@@ -1,0 +1,285 @@
+# SPDX-License-Identifier: MIT
+"""From a map of the ice to floe outlines that bergtow reads: any vector format that GDAL knows, or an image of labels.
+
+    outlines.py MAP -o FILE.geojson --centre LON,LAT        FILE.geojson, and what was done to the map a line each
+
+The outlines are put into a plane at the towed body (map_plane.py), made sound floes, with every change counted
+(map_repair.py), and written in degrees, or in metres where the map is of no place on the earth or a heading is asked
+for. ice.outlines of a case reads the file.
+"""
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+
+import command
+import map_plane
+import map_read
+import map_repair
+import map_text
+from bergtow_read import RunError
+
+import numpy as np
+
+PIXEL = 0.55            # tolerance, of a pixel: half of one, as steps along a straight shore have, would be a tie
+MARGIN = 1.0            # m, of the domain around all floes
+LEAST_SIZE = 0.01       # m, mean; below it metres are degrees
+EDGE = 64               # pieces of an edge of the image, which is bent in the plane
+
+
+def pair(text):
+    numbers = [float(part) for part in text.split(",")]
+    if len(numbers) != 2 or not all(map(math.isfinite, numbers)):
+        raise ValueError
+    return tuple(numbers)
+
+
+def place(text):
+    """LON,LAT"""
+    try:
+        return pair(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: is no place; write two numbers, LON,LAT") from None
+
+
+def metres(text):
+    """A number above zero, with m, km or nothing behind it."""
+    word = text.strip()
+    scale = 1e3 if word.endswith("km") else 1.0
+    try:
+        value = float(word.removesuffix("km").removesuffix("m")) * scale
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: is no length; write for example 500 m")
+    return value
+
+
+def extent(text):
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise argparse.ArgumentTypeError(f"{text}: is no extent; write for example 2km,800m")
+    return tuple(map(metres, parts))
+
+
+def square_metres(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: is no area in square metres")
+    return value
+
+
+def integers(text):
+    try:
+        return tuple(int(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text}: are no labels; write whole numbers, 0,3") from None
+
+
+def angle(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not -360 <= value <= 360:
+        raise argparse.ArgumentTypeError(f"{text}: is no direction in degrees")
+    return value
+
+
+def arguments(argv):
+    p = argparse.ArgumentParser(description="Make floe outlines for ice.outlines of a map: shapefile, GeoPackage, "
+                                "GeoJSON, ..., or an image of labels (GeoTIFF, PNG with a world file, .npy).")
+    p.add_argument("map", metavar="MAP", type=Path)
+    p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")
+    p.add_argument("--centre", "--center", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
+                   "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
+    p.add_argument("--heading", metavar="DEG", type=angle, help="direction of x, clockwise from north: metres for the "
+                   "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
+    p.add_argument("--crs", help="what the coordinates are where the file does not say it: EPSG:..., any other name "
+                   "that PROJ knows, or local: metres east and north of no place on the earth")
+    p.add_argument("--layer", metavar="NAME", help="which layer, of several")
+    p.add_argument("--where", metavar="SQL", help="only features for which this holds, e.g. \"kind = 'ice'\"")
+    p.add_argument("--thickness", metavar="COLUMN", help="the column with the thickness, m (default: thickness); of an "
+                   "image the thickness by label: 1=0.5,2=1.2")
+    p.add_argument("--water", metavar="N,...", type=integers, default=(0,), help="labels of an image that are no ice "
+                   "(default 0); each connected region of another one is a floe")
+    p.add_argument("--band", metavar="N", type=int, help="band of the image that has the labels, from 1")
+    p.add_argument("--pixel", metavar="LENGTH", type=metres, help="size of a pixel, of an image without place")
+    p.add_argument("--box", metavar="LENGTH,WIDTH", type=extent, help="only floes whose middle lies in this rectangle "
+                   "about the centre, along x and y of the case")
+    p.add_argument("--clear", metavar="RADIUS", type=metres, default=0.0, help="leave out what reaches into this "
+                   "circle about the centre: room for the towed body, which may be on the map itself")
+    p.add_argument("--cut", choices=("keep", "drop"), default="keep", help="floes that the image's edge cut")
+    p.add_argument("--tolerance", metavar="LENGTH", type=metres, help="how far an outline may move when it is "
+                   "simplified, and the width of a sliver (default: 0.55 pixels; a thousandth of the mean floe size)")
+    p.add_argument("--least", metavar="AREA", type=square_metres, help="smallest floe, m² (default: four pixels; 0)")
+    p.add_argument("--record", metavar="FILE", type=Path, help="write all of this as JSON, too")
+    p.add_argument("--picture", metavar="FILE", type=Path, help="draw the map and what became of it (.png, .pdf, .svg)")
+    command.add_force(p)
+    words = list(argv)
+    for k, word in enumerate(words[:-1]):  # a western longitude is no option
+        if word in ("--centre", "--center", "--heading") and words[k + 1][:1] == "-":
+            words[k:k + 2] = [f"{word}={words[k + 1]}", ""]
+    return p, p.parse_args([word for word in words if word])
+
+
+def check_files(p, a):
+    """Before any work: names, and whether they may be written."""
+    if a.output.suffix.lower() not in (".geojson", ".json"):
+        p.error(f"{a.output}: unknown kind of file; end the name in .geojson")
+    if a.record and a.record.suffix.lower() != ".json":
+        p.error(f"{a.record}: unknown kind of file; end the name in .json")
+    if a.picture and a.picture.suffix.lower() not in command.PICTURES:
+        p.error(f"{a.picture}: unknown kind of file; end the name in {', '.join(command.PICTURES)}")
+    written = [f for f in (a.output, a.record, a.picture) if f]
+    if len({f.resolve() for f in [a.map, *written]}) <= len(written):
+        p.error("the map and the files to write need names of their own")
+    for file in written:
+        command.may_write(file, a.force)
+
+
+def in_plane(found, plane):
+    """Shapes in metres of the plane; and how far edges that are straight on the map bend there, m."""
+    bend = 0.0
+    for shape in found.shapes:
+        there = moved(shape.geometry, plane.onto)
+        if there.distance(map_repair.Point(0, 0)) < map_plane.FARTHEST:  # others are not for this plane
+            bend = max(bend, bent(shape.geometry, plane))
+        shape.geometry = there
+    if found.seen is not None:
+        found.seen = moved(found.seen, lambda xy: plane.onto(divided(xy, EDGE)))
+    return bend
+
+
+def moved(geometry, onto):
+    """A polygon or several with all rings moved."""
+    Polygon, MultiPolygon = map_read.Polygon, map_read.MultiPolygon
+    parts = [Polygon(onto(np.asarray(p.exterior.coords)), [onto(np.asarray(r.coords)) for r in p.interiors])
+             for p in getattr(geometry, "geoms", [geometry])]
+    return parts[0] if len(parts) == 1 else MultiPolygon(parts)
+
+
+def divided(ring, n):
+    """A closed ring with n pieces to each edge."""
+    t = np.arange(n)[:, None, None] / n
+    between = ring[:-1] + t * np.diff(ring, axis=0)
+    return np.r_[between.swapaxes(0, 1).reshape(-1, 2), ring[:1]]
+
+
+def bent(geometry, plane):
+    worst = 0.0
+    for p in getattr(geometry, "geoms", [geometry]):
+        ring = np.asarray(p.exterior.coords)
+        if not isinstance(plane.crs, str) and plane.crs.is_geographic:  # an edge over the 180th meridian is a short one
+            ring = ring.copy()
+            ring[:, 0] = np.unwrap(ring[:, 0], period=360)
+        xy, between = plane.onto(ring), plane.onto((ring[:-1] + ring[1:]) / 2)
+        worst = max(worst, float(np.hypot(*(between - (xy[:-1] + xy[1:]) / 2).T).max()))
+    return worst
+
+
+def rules_of(a, found):
+    """Lengths of the repair: of an image they follow from its pixels."""
+    pixel = math.sqrt(found.seen.area / found.pixels) if found.pixels else None
+    along = a.box if a.heading is not None or not a.box else a.box[::-1]  # x of the geographic frame is north
+    return map_repair.Rules(tolerance=a.tolerance or (PIXEL * pixel if pixel else None),
+                            least=a.least if a.least is not None else 4 * pixel ** 2 if pixel else 0.0,
+                            keep_cut=a.cut == "keep", box=along, clear=a.clear)
+
+
+def summed_up(floes, found, rules):
+    """The numbers of the floes, over the box or the rectangle around them."""
+    bounds = np.array([f.polygon.bounds for f in floes])
+    reach = (*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0))
+    half = [v / 2 for v in rules.box] if rules.box else None
+    x0, y0, x1, y1 = (-half[0], -half[1], *half) if half else reach
+    rectangle = map_read.Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+    imaged = rectangle if found.seen is None else rectangle.intersection(found.seen.buffer(0))
+    if rules.clear:
+        imaged = imaged.difference(map_repair.Point(0, 0).buffer(rules.clear, 64))
+    if not imaged.area > 0:
+        raise RunError(found.path, "has nothing of the box in its image", "set --centre, or --box")
+    return map_text.numbers(floes, (x0, x1, y0, y1), imaged.area) | {"reach_m": list(reach)}
+
+
+def geojson(floes, found, plane):
+    """The text. A file in degrees carries its centre where the reader looks for it."""
+    local = isinstance(plane.crs, str) or plane.heading is not None
+    mark = {"frame": "basin"} if plane.heading is not None else {} if local else {"origin": list(plane.centre)}
+    head = {"type": "FeatureCollection", "made_by": command.MARK, "bergtow": mark}
+    if found.about:
+        head["description"] = found.about
+    if local:
+        head["crs"] = {"type": "name", "properties": {"name": map_read.LOCAL}}
+    lines = []
+    for k, floe in enumerate(floes):
+        ring = np.asarray(floe.polygon.exterior.coords)
+        ring = ring if floe.polygon.exterior.is_ccw else ring[::-1]
+        ring = ring if local else plane.degrees(ring)
+        ring[-1] = ring[0]
+        properties = {"source": floe.name}
+        if floe.thickness is not None:
+            properties["thickness"] = floe.thickness
+        if floe.cut:
+            properties["cut_by_edge"] = True
+        lines.append(json.dumps({"type": "Feature", "id": k, "properties": properties, "geometry": {
+            "type": "Polygon", "coordinates": [ring.tolist()]}}, allow_nan=False))
+    return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
+
+
+def plain(value):
+    """Numbers of numpy as those of Python."""
+    if isinstance(value, dict):
+        return {key: plain(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def main(argv=None):
+    p, a = arguments(sys.argv[1:] if argv is None else argv)
+    check_files(p, a)
+    how = map_read.Reading(a.layer, a.where, a.thickness, a.water, a.band, a.pixel)
+    found = map_read.read(a.map, how)
+    crs = map_plane.system(found.path, found.crs, a.crs)
+    plane = map_plane.Plane.of(found, crs, a.centre, a.heading)
+    book = map_repair.Ledger()
+    for why, names in found.skipped.items():
+        for name in names:
+            book.note(why, name)
+    bend = in_plane(found, plane)
+    rules = rules_of(a, found)
+    floes = map_repair.repaired(found.shapes, rules, book)
+    print("\n".join(map_text.map_lines(found, crs)))
+    if not floes:
+        print("\n".join(map_text.change_lines(book)))
+        raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
+    told, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
+    if told["farthest_m"] > map_plane.FARTHEST:
+        raise RunError(found.path, f"has floes {told['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes 100 km",
+                       "choose a part with --box or --where, or set --centre")
+    if numbers["mean_size_m"] < LEAST_SIZE:
+        raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
+                       "metres",
+                       "say its crs: --crs EPSG:4326")
+    print("\n".join(map_text.plane_lines(plane, told, bend)))
+    print(f"tolerance: {map_text.length(rules.tolerance)}")
+    print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
+    command.write_text(geojson(floes, found, plane), a.output, a.force)
+    print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN)))
+    print(a.output)
+    if a.record:
+        record = map_text.record(found, plane, crs, told, bend, book, rules, numbers)
+        command.write_json(plain(record), a.record, a.force)
+        print(a.record)
+    if a.picture:
+        import map_picture
+        map_picture.draw(found, floes, rules, plane, a.picture, a.force)
+
+
+if __name__ == "__main__":
+    command.guarded(main)

@@ -1,0 +1,519 @@
+# SPDX-License-Identifier: MIT
+"""bergtow outlines: maps in any system and format as floes.
+
+Places are known by geodesics (pyproj.Geod), which the command does not use; maps are put into other systems and formats
+by GDAL's own ogr2ogr; what comes out is read by the program's C reader, which has a projection of its own.
+"""
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import yaml
+from osgeo import gdal, ogr, osr
+from pyproj import Geod
+from shapely.geometry import Polygon
+from shapely.ops import unary_union
+
+import tutorial
+from harness import DONE, IO, ROOT, USAGE, call, changed, environment, run
+from test_map import FRAMES
+from test_outlines import field, same_ring
+
+sys.path.insert(0, str(ROOT / "postproc"))
+
+import map_read  # noqa: E402
+import outlines as command_line  # noqa: E402
+from bergtow_read import RunError  # noqa: E402
+
+gdal.UseExceptions()
+GEOD = Geod(ellps="WGS84")
+LON, LAT = 14.0, 80.0
+
+
+def regular(x, y, radius, corners=6, turn=0.0):
+    angle = turn + 2 * np.pi * np.arange(corners) / corners
+    return np.c_[x + radius * np.cos(angle), y + radius * np.sin(angle)]
+
+
+def places(xy, lon=LON, lat=LAT):
+    """Longitude and latitude of metres east and north of a place: along geodesics from it."""
+    xy = np.asarray(xy, float)
+    n = len(xy)
+    a, b, _ = GEOD.fwd([lon] * n, [lat] * n, np.degrees(np.arctan2(xy[:, 0], xy[:, 1])), np.hypot(*xy.T))
+    return np.c_[a, b]
+
+
+#: metres east and north; no two of a kind, none near another
+RINGS = [regular(700 * i, 600 * j, 60 + 7 * i + 3 * j, 5 + (i + j) % 3, 0.3 * i) for i in (-2, -1, 0, 1, 2)
+         for j in (-2, -1, 0, 1, 2)]
+
+
+def write(path, rings, crs=None, **more):
+    """GeoJSON of rings, or of whole geometries."""
+    def geometry(r):
+        if isinstance(r, dict):
+            return r
+        ring = np.asarray(r).tolist()
+        return {"type": "Polygon", "coordinates": [ring + ring[:1]]}
+    features = [{"type": "Feature", "properties": {}, "geometry": geometry(r)} for r in rings]
+    named = {"crs": {"type": "name", "properties": {"name": crs}}} if crs else {}
+    path.write_text(json.dumps({"type": "FeatureCollection", **named, "features": features} | more))
+    return path
+
+
+def ogr2ogr(*words):
+    subprocess.run(["ogr2ogr", *map(str, words)], check=True, capture_output=True)
+
+
+def outlines(map_, *words, code=DONE, name="out.geojson"):
+    """The rings that were written (open, as arrays) and the record; or what is said where it fails. Within this
+    process, which saves a second a call; test_the_program_reads_it starts the program."""
+    out = map_.parent / name
+    words = [str(w) for w in (map_, "-o", out, "--record", out.with_suffix(".json"), "--force", *words)]
+    if code != DONE:
+        with pytest.raises(RunError) as error:
+            command_line.main(words)
+        assert not out.exists()
+        return str(error.value)
+    command_line.main(words)
+    root = json.loads(out.read_text())
+    rings = [np.array(f["geometry"]["coordinates"][0][:-1]) for f in root["features"]]
+    return rings, json.loads(out.with_suffix(".json").read_text())
+
+
+def counted(record):
+    return {kind: c["count"] for kind, c in record["changes"].items()}
+
+
+def geodesic_area(lonlat):
+    return abs(GEOD.polygon_area_perimeter(*np.asarray(lonlat).T)[0])
+
+
+def plane_area(ring):
+    return Polygon(ring).area
+
+
+# ---- systems
+
+
+@pytest.mark.parametrize("crs, lon, lat", [
+    ("EPSG:4326", LON, LAT), ("EPSG:32633", LON, LAT), ("EPSG:3413", LON, LAT), ("EPSG:3413", -45.0, 89.999),
+    ("EPSG:4326", 180.0, 71.0), ("EPSG:3413", -179.999, 71.0), ("EPSG:3976", -30.0, -69.5), ("EPSG:32733", 15.3, -70.0),
+    ("EPSG:6931", 100.0, 77.0)])
+def test_places_on_the_ellipsoid(tmp_path, crs, lon, lat):
+    """Degrees, UTM, polar stereographic north and south, at the pole and over the 180th meridian: every vertex comes to
+    lie at its geodesic distance and azimuth from the centre, and every floe has its area on the ellipsoid."""
+    map_ = write(tmp_path / "degrees.geojson", [places(r, lon, lat) for r in RINGS])
+    if crs != "EPSG:4326":
+        ogr2ogr("-f", "GPKG", "-t_srs", crs, tmp_path / "map.gpkg", map_)
+        map_ = tmp_path / "map.gpkg"
+    rings, record = outlines(map_, "--centre", f"{lon},{lat}", "--heading", 90)  # x to the east, y to the north
+    assert counted(record) == {}
+    near = 2e-4 if crs == "EPSG:6931" else 1e-5  # PROJ's own round trip over authalic latitudes is off by 7e-5 m
+    for ring, drawn in zip(rings, RINGS):
+        assert same_ring(ring, drawn, near)
+    for ring, drawn in zip(rings, RINGS):
+        np.testing.assert_allclose(plane_area(ring), geodesic_area(places(drawn, lon, lat)), rtol=3e-7,
+                                   atol=0.1)  # as good as geodesic areas are
+    told = record["plane"]
+    farthest = max(np.hypot(*r.T).max() for r in RINGS)
+    np.testing.assert_allclose(told["farthest_m"], farthest, atol=near)
+    assert told["length_error"] < 5e-8 and told["area_error"] < 5e-8  # PROJ differentiates numerically
+    degrees, _ = outlines(map_, "--centre", f"{lon},{lat}", name="degrees-out.geojson")
+    for ring, drawn in zip(degrees, RINGS):
+        azimuth, _, d = GEOD.inv(*np.array([[lon, lat]] * len(ring)).T, *ring.T)
+        azimuth = np.radians(azimuth)
+        assert same_ring(np.c_[d * np.sin(azimuth), d * np.cos(azimuth)], drawn, near)
+
+
+def test_distortion_of_a_wide_map(tmp_path):
+    """At the distance d lengths across the line of sight are too great by (d/R)²/6, and so are areas."""
+    map_ = write(tmp_path / "map.geojson", [places(regular(x, 0, 200, 8)) for x in (-60e3, 0, 60e3)])
+    rings, record = outlines(map_, "--centre", f"{LON},{LAT}", "--heading", 90)
+    wanted = (60.2e3 / 6.39e6) ** 2 / 6
+    for kind in ("length_error", "area_error"):
+        assert record["plane"][kind] == pytest.approx(wanted, rel=0.02), kind
+    far = geodesic_area(places(regular(60e3, 0, 200, 8)))
+    assert max(map(plane_area, rings)) / far - 1 == pytest.approx((60e3 / 6.39e6) ** 2 / 6, rel=0.05)
+    assert record["plane"]["north_turns_deg"] == pytest.approx(np.degrees(60.2e3 / 6.39e6 * np.tan(np.radians(LAT))),
+                                                               rel=0.06)
+
+
+def test_metres_of_a_projection_are_corrected(tmp_path):
+    """UTM at the middle of its zone is short by 0.9996, polar stereographic at 80° N by what its scale there is:
+    against areas on the ellipsoid."""
+    write(tmp_path / "map.geojson", [places(r, 15.0) for r in RINGS])
+    for crs, scale in (("EPSG:32633", 0.9996), ("EPSG:3413", (1 + np.sin(np.radians(70))) / (1 + np.sin(
+            np.radians(80))))):
+        ogr2ogr("-f", "GeoJSON", "-t_srs", crs, "-lco", "RFC7946=NO", tmp_path / f"{scale:.4f}.geojson",
+            tmp_path / "map.geojson")
+        rings, record = outlines(tmp_path / f"{scale:.4f}.geojson", "--centre", "15,80", "--heading", 0)
+        drawn = json.loads((tmp_path / f"{scale:.4f}.geojson").read_text())["features"]
+        flat = sum(plane_area(f["geometry"]["coordinates"][0]) for f in drawn)
+        round_ = sum(geodesic_area(places(r, 15.0)) for r in RINGS)
+        assert abs(flat / round_ - scale ** 2) < 1e-3 and abs(flat / round_ - 1) > 7e-4
+        assert abs(sum(map(plane_area, rings)) / round_ - 1) < 1e-6
+        least, most = record["plane"]["map_scale"]
+        assert least - 2e-4 < np.sqrt(flat / round_) < most + 2e-4
+
+
+@pytest.mark.parametrize("heading", [0, 30, 211.5])
+def test_heading(tmp_path, heading):
+    """x along the heading, y to its left; the basin's frame takes it, the geographic one refuses it."""
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS])
+    rings, _ = outlines(map_, "--centre", f"{LON},{LAT}", "--heading", heading, name="map2.geojson")
+    h = np.radians(heading)
+    along, left = np.array([np.sin(h), np.cos(h)]), np.array([-np.cos(h), np.sin(h)])
+    for ring, drawn in zip(rings, RINGS):
+        assert same_ring(ring, np.c_[drawn @ along, drawn @ left], 1e-5)
+    case = changed(FRAMES["basin"], domain={"frame": "basin", "x0": -2500, "y0": -2500, "length": 5000, "width": 5000},
+                   ice__outlines="map2.geojson")
+    got, *_ = field(tmp_path, case)
+    for ring, drawn in zip(got, RINGS):
+        assert same_ring(ring, np.c_[drawn @ along, drawn @ left], 1e-5)
+    assert "frame" in field(tmp_path, changed(case, domain__frame="geographic"), code=3)
+
+
+def test_the_program_reads_it(tmp_path):
+    """Its own projection puts the degrees where PROJ had them, without a warning; and the numbers that were told are
+    those of the case whose lines were printed."""
+    write(tmp_path / "map.geojson", [places(r, -135.0, 74.0) for r in RINGS])
+    r = call("outlines", "map.geojson", "-o", "floes.geojson", "--record", "floes.json", "--box", "1km,3.6km",
+             "--centre", "-135,74", cwd=tmp_path)
+    assert r.returncode == DONE, r.stderr
+    told = json.loads((tmp_path / "floes.json").read_text())["floes"]
+    _, domain, ice = r.stdout[r.stdout.index("in a case beside it:"):].splitlines()[:3]
+    (tmp_path / "case.yml").write_text(f"run: {{dt: 1 s, duration: 3 s}}\n{domain.strip()}\n{ice.strip()}\n"
+                                       "body: {shape: none}\n")
+    done = run(tmp_path, tmp_path / "case.yml")
+    assert done.summary["warnings"] == [] and done.summary["outlines"]["read"] == 5 == told["floes"]
+    np.testing.assert_allclose(done.summary["concentration"], told["concentration"], rtol=1e-6)
+    np.testing.assert_allclose(done.summary["mean_size_m"], told["mean_size_m"], rtol=1e-6)
+    got, *_ = field(tmp_path, yaml.safe_load((tmp_path / "case.yml").read_text()))
+    for ring, drawn in zip(got, RINGS[2::5], strict=True):  # the row in the middle, from west to east
+        assert same_ring(ring, drawn[::-1, ::-1], 1e-3)
+
+
+def test_what_the_program_wrote_comes_back(tmp_path):
+    """A field in degrees, and one in metres of no place."""
+    made = changed(FRAMES["geographic"], ice={"concentration": 0.3, "size": 20, "thickness": 0.5})
+    for more in ({"ice__origin_lon": LON, "ice__origin_lat": LAT}, {}):
+        rings, thickness, *_ = field(tmp_path, changed(made, **more))
+        field(tmp_path, changed(made, **more), name="field.geojson")
+        centre = f"{LON},{LAT}" if more else "0,0"
+        back, record = outlines(tmp_path / "field.geojson", "--centre", centre, "--heading", 90)
+        assert set(counted(record)) <= {"simplified", "touching", "cut kept"} and len(back) == len(rings) > 50
+        for a, b in zip(rings, back):
+            assert abs(plane_area(a) - plane_area(b)) < 1e-3 * plane_area(a)
+            assert np.abs(a.mean(axis=0) - b.mean(axis=0)[::-1]).max() < 2
+        told = record["floes"]
+        assert told["with_thickness"] == len(rings) and told["mean_thickness_m"] == thickness.mean()
+
+
+def test_halves_at_the_180th_meridian_are_joined(tmp_path):
+    """RFC 7946 cuts outlines there."""
+    east, west = [[179.99, 70], [180, 70], [180, 70.01], [179.99, 70.01]], [[-180, 70], [-179.99, 70], [-179.99, 70.01],
+                                                                            [-180, 70.01]]
+    both = {"type": "MultiPolygon", "coordinates": [[r + r[:1]] for r in (east, west)]}
+    rings, record = outlines(write(tmp_path / "map.geojson", [both]), "--heading", 90)
+    assert counted(record) == {"joined": 1, "simplified": 1} and len(rings) == 1 and len(rings[0]) == 4
+    whole = geodesic_area([[179.99, 70], [180.01, 70], [180.01, 70.01], [179.99, 70.01]])
+    np.testing.assert_allclose(plane_area(rings[0]), whole, rtol=1e-6)
+    assert abs(abs(record["plane"]["centre"][0]) - 180) < 1e-6
+
+
+def test_a_part_of_a_large_map(tmp_path):
+    """What lies beyond the plane's reach is no hindrance when the box leaves it out."""
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS] + [places(regular(0, 0, 30e3), 60.0, 74.0)])
+    rings, record = outlines(map_, "--centre", f"{LON},{LAT}", "--box", "3km,4km", "--heading", 90)
+    assert counted(record) == {"outside": 1} and len(rings) == len(RINGS)
+    assert record["plane"]["farthest_m"] < 2e3 and record["plane"]["edges_bend_m"] < 0.01
+
+
+# ---- formats
+
+
+def test_formats_and_layers(tmp_path):
+    """Shapefile and GeoPackage give what GeoJSON gives; a file of several layers is asked which."""
+    map_ = write(tmp_path / "map.geojson", [places(r) for r in RINGS])
+    wanted, _ = outlines(map_)
+    ogr2ogr("-t_srs", "EPSG:32633", tmp_path / "map.shp", map_)
+    ogr2ogr("-f", "GPKG", "-nln", "floes", tmp_path / "map.gpkg", map_)
+    write(tmp_path / "other.geojson", [places(r) for r in RINGS[:2]])
+    ogr2ogr("-f", "GPKG", "-update", "-nln", "other", "-sql", "SELECT *, 2.5 AS hi, 'ice' AS kind FROM other",
+        tmp_path / "map.gpkg", tmp_path / "other.geojson")
+    for file, words in (("map.shp", ()), ("map.gpkg", ("--layer", "floes"))):
+        got, _ = outlines(tmp_path / file, *words)
+        for a, b in zip(got, wanted):
+            np.testing.assert_allclose(a, b, atol=1e-9)
+    said = outlines(tmp_path / "map.gpkg", code=IO, name="no.geojson")
+    assert "floes, other" in said and "--layer" in said
+    _, record = outlines(tmp_path / "map.gpkg", "--layer", "other", "--thickness", "hi", "--where", "kind = 'ice'")
+    assert record["floes"]["with_thickness"] == 2 and record["floes"]["mean_thickness_m"] == 2.5
+    (tmp_path / "map.prj").unlink()
+    said = outlines(tmp_path / "map.shp", code=IO, name="no.geojson")
+    assert "no coordinate reference system" in said and "--crs" in said
+    got, _ = outlines(tmp_path / "map.shp", "--crs", "EPSG:32633")
+    for a, b in zip(got, wanted):
+        np.testing.assert_allclose(a, b, atol=1e-9)
+
+
+def image(path, labels, crs=None, corner=(0.0, 0.0), pixel=2.0, nodata=None, driver="GTiff"):
+    file = gdal.GetDriverByName("MEM").Create("", labels.shape[1], labels.shape[0], 1, gdal.GDT_Byte)
+    file.SetGeoTransform((corner[0], pixel, 0, corner[1], 0, -pixel))
+    if crs:
+        system = osr.SpatialReference()
+        system.ImportFromEPSG(crs)
+        file.SetProjection(system.ExportToWkt())
+    if nodata is not None:
+        file.GetRasterBand(1).SetNoDataValue(nodata)
+    file.GetRasterBand(1).WriteArray(labels)
+    gdal.GetDriverByName(driver).CreateCopy(str(path), file, options=["WORLDFILE=YES"] if driver == "PNG" else [])
+    return path
+
+
+def discs(labels, *floes):
+    """Discs of pixels: (row, column, radius, label)."""
+    rows, columns = np.indices(labels.shape)
+    for row, column, radius, label in floes:
+        labels[np.hypot(rows - row, columns - column) < radius] = label
+    return labels
+
+
+def test_label_images(tmp_path):
+    """GeoTIFF, PNG with a world file, numpy: the same floes, whose areas are those of their pixels; one at the image's
+    edge, one beside what was not seen, a pond, two labels that touch."""
+    labels = discs(np.zeros((200, 240), np.uint8), (50, 60, 25, 1), (50, 140, 20, 2), (140, 120, 30, 3),
+                   (150, 4, 12, 1), (120, 195, 14, 7))
+    labels[50:53, 60:63] = 0
+    labels[:, 160:180][140:160] = 5    # touches none
+    labels[140:160, 180:200] = 6       # touches 5 along an edge
+    labels[:, 205:] = 255
+    tif = image(tmp_path / "map.tif", labels, 32633, (500000.0, 8900000.0), nodata=255)
+    rings, record = outlines(tif, "--heading", 90)
+    sizes = {k: np.count_nonzero(labels == k) for k in (2, 3, 5, 6, 7)}
+    counts = counted(record)
+    assert counts["holes"] == 1 and counts["cut kept"] == 2 and len(rings) == 7
+    got = sorted(plane_area(r) / (4 / 0.9996 ** 2) for r in rings)
+    # of discs the tolerance, about half a pixel, takes as much as it adds; of a square it may tilt every side by that
+    for label, n in sizes.items():
+        assert min(abs(g - n) for g in got) < (20 if label in (5, 6) else 0.012 * n)
+    discs_ = np.count_nonzero((labels > 0) & (labels < 255)) + 9 - 2 * 400
+    assert abs(sum(g for g in got if abs(g - 400) > 20) / discs_ - 1) < 3e-3
+    _, record = outlines(tif, "--cut", "drop", "--water", "0,7")
+    assert counted(record)["cut"] == 1 and record["floes"]["floes"] == 5
+    np.testing.assert_allclose(record["floes"]["imaged_share"], 1, atol=0.2)
+    png = image(tmp_path / "map.png", labels, None, (500000.0, 8900000.0), driver="PNG")
+    assert "--crs" in outlines(png, code=IO, name="no.geojson")
+    again, _ = outlines(png, "--crs", "EPSG:32633", "--water", "0,255", "--heading", 90)
+    assert sorted(plane_area(r) for r in again) == pytest.approx(sorted(plane_area(r) for r in rings), rel=1e-6)
+    np.save(tmp_path / "map.npy", labels)
+    assert "--pixel" in outlines(tmp_path / "map.npy", code=IO, name="no.geojson")
+    plain, record = outlines(tmp_path / "map.npy", "--pixel", "2 m", "--water", "0,255", "--thickness", "1=0.5,2=1.5")
+    # where two vertices are equally far from a line, rounding decides which stays
+    assert len(plain) == 7 and sum(plane_area(r) for r in plain) == pytest.approx(4 * sum(got), rel=3e-3)
+    assert record["floes"]["with_thickness"] == 3 and record["map"]["crs"] == "local metres"
+
+
+def test_middles_of_steps_keep_the_area():
+    """Of a region of pixels all but half of one, however long its shore is, and another half for each pond."""
+    labels = discs(np.zeros((90, 90), np.int32), (45, 45, 40, 1), (45, 45, 12, 0), (20, 45, 5, 0))
+    (region, value), = map_read.regions(labels, labels > 0)
+    assert value == 1 and region.area == np.count_nonzero(labels)
+    assert map_read.bevelled(region).area == np.count_nonzero(labels) - 0.5 + 2 * 0.5
+    assert map_read.bevelled(region).is_valid
+
+
+def test_an_image_is_not_mirrored(tmp_path):
+    """A floe in the upper left corner lies in the north-west; and a shore is where the pixels say, to half a pixel."""
+    labels = np.zeros((60, 80), np.uint8)
+    labels[5:15, 4:30] = 1
+    labels[40:50, 60:70] = 1
+    np.save(tmp_path / "map.npy", labels)
+    rings, _ = outlines(tmp_path / "map.npy", "--pixel", "1", "--centre", "0,0")
+    boxes = sorted((*r.min(axis=0), *r.max(axis=0)) for r in rings)
+    np.testing.assert_allclose(boxes, [(-36, 15, -10, 25), (20, -20, 30, -10)], atol=0.51)
+
+
+# ---- repairs
+
+
+def test_every_change_is_counted(tmp_path):
+    """Each fault once, with what it does to the area; and read plus changes is what was written."""
+    def box(x, y, a, b):
+        y += x / 1000  # edges on one line, at the side of all, are the edge of an image
+        return [[x, y], [x + a, y], [x + a, y + b], [x, y + b]]
+
+    def closed(*rings):
+        return [[*map(list, r), list(r[0])] for r in rings]
+    shapes = {
+        "crossing": [[0, 0], [20, 20], [20, 0], [0, 20]],
+        "holes": {"type": "Polygon", "coordinates": closed(box(50, 0, 20, 20), box(55, 5, 5, 4))},
+        "several": {"type": "MultiPolygon", "coordinates": [closed(box(100, 0, 10, 10)), closed(box(120, 0, 10, 12))]},
+        "twice": box(150, 0, 20, 20), "twin": box(150, 0, 20, 20.2),
+        "within": box(200, 0, 30, 30), "inner": box(205, 5, 8, 8),
+        "large": box(250, 0, 20, 30), "small": box(265, 10, 10, 10),
+        "sliver": box(300, 0, 30, 0.05), "crumb": box(350, 0, 1, 1),
+        "far": box(900, 0, 20, 20), "berg": box(190, 95, 20, 20),
+        "many": regular(50, 100, 20, 400), "detail": [[100, 100], [110, 100.05], [120, 100], [120, 120], [100, 120]],
+        "neighbour": box(130, 100, 10, 10), "touches": box(140, 100, 10, 12),
+    }
+    map_ = write(tmp_path / "map.geojson", shapes.values(), "urn:x-bergtow:crs:local-metres-east-north")
+    rings, record = outlines(map_, "--centre", "200,105", "--box", "600,600", "--clear", "15", "--tolerance", "0.1",
+                             "--least", "4", "--heading", "90")
+    found = record["changes"]
+    assert counted(record) == {"crossing": 1, "several": 2, "holes": 1, "outside": 1, "clear": 1, "simplified": 2,
+                               "slivers": 1, "small": 1, "twice": 1, "within": 1, "overlaps": 1, "touching": 2}
+    change = {k: c["area_after_m2"] - c["area_before_m2"] for k, c in found.items()}
+    for kind, want in (("holes", 20), ("outside", -400), ("clear", -400), ("slivers", -1.5), ("small", -1),
+                       ("twice", -404), ("within", -64), ("overlaps", -50), ("several", 0), ("touching", 0)):
+        assert change[kind] == pytest.approx(want, abs=0.02), kind
+    # what was read, crossing rings as they are when mended, less what changed
+    area = {k: plane_area(s) for k, s in shapes.items() if isinstance(s, list) or isinstance(s, np.ndarray)}
+    read = sum(v for k, v in area.items() if k != "crossing") + 200 + (400 - 20) + (100 + 120)
+    assert sum(map(plane_area, rings)) == pytest.approx(read + sum(v for k, v in change.items() if k != "crossing"),
+                                                        abs=1e-6)
+    assert record["floes"]["area_m2"] == pytest.approx(sum(map(plane_area, rings)), rel=1e-12)
+    polygons = [Polygon(r) for r in rings]
+    assert all(p.is_valid and len(p.exterior.coords) <= 129 for p in polygons)
+    assert max(a.intersection(b).area for k, a in enumerate(polygons) for b in polygons[:k]) == 0
+    # by name, also of the other of two
+    assert found["overlaps"]["first"] == ["feature 7 (feature 8)"] and found["clear"]["first"] == [
+        "feature 12"]
+
+
+def test_too_many_vertices(tmp_path):
+    """A shore of 700 vertices, each of which matters at the tolerance, is made simpler still, and that is told."""
+    angle = 2 * np.pi * np.arange(700) / 700
+    star = np.c_[np.cos(angle), np.sin(angle)] * (100 + 8 * (np.arange(700) % 2))[:, None]
+    rings, record = outlines(write(tmp_path / "map.geojson", [star], "urn:x-bergtow:crs:local-metres-east-north"),
+                             "--tolerance", "0.1")
+    assert counted(record) == {"vertices": 1} and len(rings[0]) <= 128
+    assert abs(plane_area(rings[0]) / plane_area(star) - 1) < 0.1
+
+
+def test_a_crowd_of_overlapping_floes(tmp_path):
+    """200 polygons thrown over each other: the program takes what is left, in a case of its own, and it is their union
+    but for the gaps."""
+    rng = np.random.default_rng(5)
+    rings = [regular(*rng.uniform(-200, 200, 2), rng.uniform(10, 30), rng.integers(3, 9), rng.uniform(0, 6))
+             for _ in range(200)]
+    write(tmp_path / "map.geojson", rings, "urn:x-bergtow:crs:local-metres-east-north")
+    got, record = outlines(tmp_path / "map.geojson", "--centre", "0,0", name="floes.geojson")
+    union = unary_union([Polygon(r) for r in rings])
+    lost = sum(c["area_before_m2"] for k, c in record["changes"].items() if k == "slivers")
+    written = sum(map(plane_area, got))
+    assert written == pytest.approx(union.area - lost, rel=0.01)
+    changes = sum(c["area_after_m2"] - c["area_before_m2"] for c in record["changes"].values())
+    assert written == pytest.approx(sum(map(plane_area, rings)) + changes, rel=1e-9)
+    case = changed(FRAMES["geographic"], domain={"frame": "geographic", "length": 480, "width": 480},
+                   ice={"outlines": "floes.geojson", "nonconvex": "split", "thickness": 1})
+    done = run(tmp_path, case)
+    assert done.summary["outlines"]["read"] == len(got) and done.summary["warnings"] == []
+
+
+# ---- what is refused
+
+UTM = [r + [500000, 8900000] for r in RINGS]
+POINT = {"type": "Point", "coordinates": [10, 80]}
+BAD = {
+    "no such file": (lambda p: p / "none.shp", (), "no such file"),
+    "nothing in it": (lambda p: write(p / "map.geojson", []), (), "holds no features"),
+    "points": (lambda p: write(p / "map.geojson", [POINT, POINT]), (), "holds no polygons (2 features"),
+    "no map": (lambda p: text(p / "map.gpkg", "hello"), (), "no map that GDAL can read"),
+    "degrees as metres": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS], "EPSG:32633"), (),
+                          "as degrees do"),
+    "degrees as local": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS],
+                                         "urn:x-bergtow:crs:local-metres-east-north"), (), "degrees look in metres"),
+    "metres as degrees": (lambda p: write(p / "map.geojson", UTM), (), "look like metres"),
+    "latitude first": (lambda p: write(p / "map.geojson", [places(r, 140.0)[:, ::-1] for r in RINGS]), (),
+                       "latitude seems to come first"),
+    "the equator": (lambda p: write(p / "map.geojson", [places(r, 80.0, 14.0) for r in RINGS]), (), "no sea ice"),
+    "unknown crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:99999"), (), "unknown to PROJ"),
+    "two crs": (lambda p: write(p / "map.geojson", UTM, "EPSG:32633"), ("--crs", "EPSG:3413"), "and --crs says"),
+    "far": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--centre", "20,80"), "100 km"),
+    "nothing left": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--least", "1e9"),
+                     "leaves no floe"),
+    "column": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--thickness", "hi"), "no column hi"),
+    "where": (lambda p: write(p / "map.geojson", [places(r) for r in RINGS]), ("--where", "none = 2"), "--where"),
+    "not finite": (lambda p: not_finite(p / "map.gpkg"), ("--crs", "local"), "no finite number"),
+    "float labels": (lambda p: array(p / "map.npy", np.full((3, 3), 0.5)), ("--pixel", "1"), "no labels"),
+    "only water": (lambda p: array(p / "map.npy", np.zeros((3, 3))), ("--pixel", "1"), "no label of ice"),
+    "cube": (lambda p: array(p / "map.npy", np.ones((3, 3, 3))), ("--pixel", "1"), "one label a pixel"),
+    "not for it": (lambda p: array(p / "map.npy", np.ones((3, 3))), ("--layer", "a"), "there is no --layer"),
+}
+
+
+def text(path, words):
+    path.write_text(words)
+    return path
+
+
+def not_finite(path):
+    file = gdal.GetDriverByName("GPKG").Create(str(path), 0, 0, 0, gdal.GDT_Unknown)
+    layer = file.CreateLayer("floes", None, ogr.wkbPolygon)
+    feature, ring, polygon = (ogr.Feature(layer.GetLayerDefn()), ogr.Geometry(ogr.wkbLinearRing),
+                              ogr.Geometry(ogr.wkbPolygon))
+    for x, y in ((0, 0), (10, 0), (np.nan, 10), (0, 0)):
+        ring.AddPoint_2D(x, y)
+    polygon.AddGeometry(ring)
+    feature.SetGeometryDirectly(polygon)
+    layer.CreateFeature(feature)
+    return path
+
+
+def array(path, values):
+    np.save(path, values)
+    return path
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_maps(tmp_path, name):
+    """One line that names the file, the reason and the remedy; nothing written."""
+    make, words, reason = BAD[name]
+    map_ = make(tmp_path)
+    said = outlines(map_, *words, code=IO, name="no.geojson")
+    assert "\n" not in said and str(map_.name) in said and reason in said and "; " in said, said
+
+
+@pytest.mark.parametrize("words, says", [
+    (("--centre", "80"), "LON,LAT"), (("--box", "3"), "2km,800m"), (("--tolerance", "-1"), "no length"),
+    (("--crs",), "expected"), (("--water", "a"), "whole numbers"), (("--record", "a.txt"), ".json"),
+    (("--picture", "a.gif"), ".png"), (("-o", "a.shp"), ".geojson"), (("-o", "map.geojson"), "names of their own")])
+def test_usage(tmp_path, words, says, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "map.geojson", [places(RINGS[0])])
+    with pytest.raises(SystemExit) as end:
+        command_line.main(["map.geojson", *([] if "-o" in words else ["-o", "out.geojson"]), *words, "--force"])
+    assert end.value.code == USAGE and says in capsys.readouterr().err
+    assert [p.name for p in tmp_path.iterdir()] == ["map.geojson"]
+
+
+def test_exit_code_of_a_bad_map(tmp_path):
+    write(tmp_path / "map.geojson", UTM)
+    r = call("outlines", "map.geojson", "-o", "out.geojson", cwd=tmp_path)
+    assert r.returncode == IO and r.stderr.count("\n") == 1 and "look like metres" in r.stderr
+
+
+def test_a_missing_library_is_named(tmp_path):
+    """In place of a traceback, with the packages to install."""
+    (tmp_path / "shapely").mkdir()
+    (tmp_path / "shapely/__init__.py").write_text("raise ImportError('No module named shapely')")
+    write(tmp_path / "map.geojson", [places(RINGS[0])])
+    r = call("outlines", "map.geojson", "-o", "out.geojson", cwd=tmp_path, env=environment(PYTHONPATH=tmp_path))
+    assert r.returncode == IO and "apt-get install python3-gdal" in r.stderr and "Traceback" not in r.stderr
+
+
+# ---- the page
+
+
+def test_the_how_to(tmp_path):
+    """From a labelled mosaic to a run, word for word; what is synthetic says so to the end."""
+    reader = tutorial.follow("../ice-from-an-image.md", tmp_path)
+    out = reader.folder / "out"
+    assert "SYNTHETIC" in json.loads((out / "floes.geojson").read_text())["description"]
+    summary = json.loads((out / "mosaic-tow/summary.json").read_text())
+    assert summary["warnings"] == [] and "SYNTHETIC" in summary["title"] and summary["n_floes"] > 200
+    assert (out / "floes.png").exists() and (out / "mosaic-tow/field.png").exists()
