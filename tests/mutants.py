@@ -306,7 +306,7 @@ MUTANTS = {
          "speed = bt_tow_speed(t, t->time);\n    t->way += dt * speed;", "way of the old speed"),
         ("if (t->branch[k].broken) h = mix(h, k + 1);", ";", "a broken line is not of the state"),
     ]),
-    "src/step/step.c": (["unit/test_cells", "physics/test_motion",
+    "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment",
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
         ("b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;", "", "shifted floes are taken for quiet"),
@@ -445,7 +445,7 @@ MUTANTS = {
         ("d->water + wind + push + drawn", "d->water + wind + push", "a law that draws floes"),
         (".overlap = c->guard.overlap * mean_size", ".overlap = c->guard.overlap", "overlap in metres"),
     ]),
-    "src/base/fileio.c": (SYNC, [
+    "src/base/fileio.c": (["unit/test_h5driver", *SYNC], [
         ("    if (!reason) reason = bt_file_sync(fd);\n    const int closed", "    const int closed",
          "text is not synced"),
         ("const int reason = rename(from, to) != 0 ? errno : sync_folder_of(to);",

@@ -200,6 +200,7 @@ static void added_mass_takes_no_part(void **state)
     CHECK_CLOSE(free_of_drag->y, across, 1e-5);
     CHECK_CLOSE(w->window->vel.x, floe->x, 1e-14);
     CHECK_CLOSE(w->window->vel.y, floe->y, 1e-14);
+    CHECK_CLOSE(w->window->inertia, w->bodies.inertia[bt_world_index(w, 1)], 1e-12); // all alike
     bt_world_free(w);
 }
 

@@ -236,6 +236,60 @@ static void a_floe_at_rest_follows_a_new_current(void **state)
     bt_case_free(&c);
 }
 
+/// One square of 4 kg at rest at the middle of the upper side of a wall.
+static bt_world *on_a_wall(void)
+{
+    bt_params p = scene_params(0.5, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(2, v);
+    bt_body_def d = scene_prism(4, v, 1);
+    d.drag = (bt_drag){.water_skin = 50, .air_skin = 1}, d.y = 1;
+    bt_world_add(w, &d);
+    scene_wall(w, -4, -1, 4, 0, 0);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
+    return w;
+}
+
+/// Velocity zero is not rest where the wall alone holds a floe against wind or slope: it stays active, and the wall
+/// bears the force in each step.
+static void what_a_wall_holds_does_not_rest(void **state)
+{
+    (void)state;
+    for (int kind = 0; kind < 3; kind++) {
+        bt_world *w = on_a_wall();
+        if (kind == 1) w->par.air_v = -4;
+        if (kind == 2) w->par.tilt_ay = -0.25;
+        for (int s = 0; s < 10; s++) {
+            bt_world_step(w);
+            const bt_idx i = bt_world_index(w, 0);
+            const bt_vel *v = &w->bodies.vel[i], *free = &w->bodies.vel_free[i];
+            assert_true(v->x == 0 && v->y == 0 && v->w == 0);
+            assert_true(kind ? free->y < -1e-2 : free->y == 0);
+            if (s > 0) CHECK_CLOSE((double)w->stats.n_active, kind > 0, 0);
+        }
+        bt_world_free(w);
+    }
+}
+
+/// With the water's velocity and no drag, a floe that turns goes on turning.
+static void what_turns_does_not_rest(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.5, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(2, v);
+    bt_body_def d = scene_prism(4, v, 1);
+    d.yaw_rate = 0.125;
+    bt_world_add(w, &d);
+    memset(w->bodies.disturbed, 0, (size_t)w->bodies.n);
+    for (int s = 0; s < 8; s++) bt_world_step(w);
+    const bt_pose *q = &w->bodies.pose[bt_world_index(w, 0)];
+    CHECK_CLOSE(atan2(q->s, q->c), 0.5, 1e-12);
+    bt_world_free(w);
+}
+
 /// Cells go with the water: floes that do the same stay in theirs however far the tide carries them (here 7 km, cells
 /// of some metres).
 static void cells_go_with_the_tide(void **state)
@@ -277,6 +331,8 @@ int main(void)
         cmocka_unit_test(dynamic_tilt_carries_a_body),
         cmocka_unit_test(rest_ends_when_the_water_or_the_wind_moves),
         cmocka_unit_test(a_floe_at_rest_follows_a_new_current),
+        cmocka_unit_test(what_a_wall_holds_does_not_rest),
+        cmocka_unit_test(what_turns_does_not_rest),
         cmocka_unit_test(cells_go_with_the_tide),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,6 +4,7 @@
 #include <hdf5.h>
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -13,6 +14,7 @@
 
 #include <cmocka.h>
 
+#include "base/fileio.h"
 #include "base/h5driver.h"
 #include "base/h5util.h"
 #include "scene.h"
@@ -21,6 +23,7 @@
 enum { SERIES = 2, CHUNK = 8, ROWS = 4 * CHUNK, FLUSHES = 40, WIDTH = 5 };
 
 static long writes_left = -1; // until the writer dies; −1: it lives
+static size_t most_at_once = SIZE_MAX;
 
 typedef struct {
     size_t begin, end;
@@ -35,6 +38,7 @@ ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
 {
     if (writes_left == 0) _exit(9);
     if (writes_left > 0) writes_left--;
+    if (n > most_at_once) n = most_at_once;
     if (n_written < MOST_SPANS) written[n_written++] = (span){(size_t)at, (size_t)at + n};
     return syscall(SYS_pwrite64, fd, data, n, at);
 }
@@ -350,9 +354,46 @@ static void every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte(void 
     unlink(path);
 }
 
+/// The system may write less than it was given: what is left follows, at its place.
+static void a_write_cut_short_goes_on(void **state)
+{
+    (void)state;
+    char bytes[1000], back[1016] = {0}, name[] = "/tmp/bergtow-short-XXXXXX";
+    for (size_t k = 0; k < sizeof bytes; k++) bytes[k] = (char)(k % 251);
+    const int fd = mkstemp(name);
+    assert_true(fd >= 0 && unlink(name) == 0);
+    most_at_once = 300;
+    const int reason = bt_file_put(fd, 16, bytes, sizeof bytes);
+    most_at_once = SIZE_MAX;
+    assert_int_equal(reason, 0);
+    assert_int_equal(pread(fd, back, sizeof back, 0), sizeof back);
+    assert_memory_equal(back + 16, bytes, sizeof bytes);
+    assert_int_equal(bt_file_close(fd), 0);
+    assert_int_equal(bt_file_close(fd), EBADF); // what the system says of a close is passed on
+}
+
+/// Where a text cannot have its name, because a folder has it, nothing is left under the temporary one.
+static void a_text_that_fails_leaves_nothing(void **state)
+{
+    (void)state;
+    char folder[] = "/tmp/bergtow-text-XXXXXX", path[64], part[80];
+    bt_errors err = {0};
+    assert_non_null(mkdtemp(folder));
+    snprintf(path, sizeof path, "%s/text", folder);
+    snprintf(part, sizeof part, "%s.tmp", path);
+    assert_int_equal(mkdir(path, 0700), 0);
+    assert_int_equal(bt_file_write(path, "words", &err), BT_ERR_IO);
+    assert_int_equal(access(part, F_OK), -1);
+    assert_int_equal(rmdir(path), 0);
+    assert_int_equal(rmdir(folder), 0);
+    bt_errors_free(&err);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(killed_at_any_write_it_holds_whole_rows),
+                                       cmocka_unit_test(a_write_cut_short_goes_on),
+                                       cmocka_unit_test(a_text_that_fails_leaves_nothing),
                                        cmocka_unit_test(a_file_of_many_changes_is_whole),
                                        cmocka_unit_test(
                                            every_byte_and_every_write_is_that_of_a_file_held_byte_by_byte)};
