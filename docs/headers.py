@@ -7,6 +7,7 @@ import re
 from tables import plain, write
 
 ATTRIBUTE = re.compile(r"\s*__attribute__\s*\(\(.*?\)\)(?=\s*[;,])", re.S)
+FOR_CPP = re.compile(r"^#ifdef __cplusplus\n.*?^#endif\n", re.S | re.M)
 NAME = re.compile(r"\b(bt_\w+|BT_\w+)\s*\(")
 
 
@@ -63,7 +64,7 @@ def beside(declaration):
 
 
 def page(path):
-    text = path.read_text(encoding="utf-8").split("*/")[-1]
+    text = FOR_CPP.sub("", path.read_text(encoding="utf-8").split("*/")[-1])
     text = re.sub(r"^// SPDX.*\n", "", text)
     out = [f"# bergtow/{path.name}", ""]
     for comment, declaration in parts(text):

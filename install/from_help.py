@@ -43,7 +43,7 @@ class Command:
         text = said(program, name, "--help")
         usage, _, rest = text.partition("\n" if text.startswith("Usage") else "\n\n")
         usage = re.sub(r"\s+", " ", usage)
-        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|A)\b\S*(?: \[B\])?)$", usage)
+        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|MAP|A)\b\S*(?: \[B\])?)$", usage)
         self.operands = self.operands[0] if self.operands else ""
         for line in rest.splitlines():
             match = OPTION.match(line)

@@ -95,7 +95,7 @@ def arguments(argv):
                                 "GeoJSON, ..., or an image of labels (GeoTIFF, PNG with a world file, .npy).")
     p.add_argument("map", metavar="MAP", type=Path)
     p.add_argument("-o", "--output", metavar="FILE", type=Path, required=True, help="GeoJSON to write")
-    p.add_argument("--centre", "--center", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
+    p.add_argument("--centre", metavar="LON,LAT", type=place, help="where the towed body is, x = y = 0: "
                    "degrees on WGS 84; east and north of a local map (default: the middle of the map)")
     p.add_argument("--heading", metavar="DEG", type=angle, help="direction of x, clockwise from north: metres for the "
                    "basin's frame are written (default: degrees for the geographic frame, or metres of a local map)")
@@ -122,7 +122,7 @@ def arguments(argv):
     command.add_force(p)
     words = list(argv)
     for k, word in enumerate(words[:-1]):  # a western longitude is no option
-        if word in ("--centre", "--center", "--heading") and words[k + 1][:1] == "-":
+        if word in ("--centre", "--heading") and words[k + 1][:1] == "-":
             words[k:k + 2] = [f"{word}={words[k + 1]}", ""]
     return p, p.parse_args([word for word in words if word])
 

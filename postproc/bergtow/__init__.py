@@ -13,10 +13,11 @@ What computes is libbergtow; see docs/library.md.
 """
 from ._library import BergtowError, CaseError, library_path, start_mpi
 from .case import Case, quantities
+from .ensemble import Ensemble
 from .force import Bodies
 from .results import Result, open_result
 from .simulation import Simulation, run
 
 __version__ = "0.1.0"
-__all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Result", "Simulation", "library_path", "open_result",
-           "quantities", "run", "start_mpi"]
+__all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Result", "Simulation", "library_path",
+           "open_result", "quantities", "run", "start_mpi"]

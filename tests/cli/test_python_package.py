@@ -5,6 +5,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -12,7 +13,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import CASE, ROOT, TOW, call, changed, environment, run, write_case
+from harness import CASE, ROOT, TOW, call, changed, differing, environment, run, write_case
 
 LIBRARY = ROOT / "build/release/libbergtow.so"
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -474,11 +475,76 @@ def test_a_large_result_opens_without_being_read(tmp_path):
 
 # --- the page, and the contract ---------------------------------------------------------------------------------------
 
+STUDY = {"base": "base.yml", "repeats": 2, "parameters": {"tow.speed": [0.1, 0.2]}}
+
+
+def study(folder, **more):
+    write_case(folder, changed(SHORT, run__duration=2), "base.yml")
+    (folder / "study.yml").write_text(json.dumps(STUDY | more))
+    return folder / "study.yml"
+
+
+def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
+    """What the program has written, number by number, and the same folder as the command's."""
+    path = study(tmp_path)
+    e = bergtow.Ensemble.run(path, tmp_path / "ours", overrides={"ice.friction": 0.1})
+    assert "4 members finished" in capfd.readouterr().out
+    assert call("ensemble", path, "-o", tmp_path / "theirs", "--set", "ice.friction=0.1").returncode == 0
+    assert differing(tmp_path / "ours/ensemble.h5", tmp_path / "theirs/ensemble.h5") == []
+    assert e.counts == {"finished": 4, "failed": 0, "waiting": 0} and "4 finished" in repr(e)
+    table = e.dataframe
+    assert list(table.index) == ["c001-r001", "c001-r002", "c002-r001", "c002-r002"]
+    assert list(table["tow.speed"]) == [0.1, 0.1, 0.2, 0.2]
+    with e.dataset as d:
+        assert dict(d.sizes)["member"] == 4 and d["tow.speed"].units == "m/s"
+        for k, name in enumerate(table.index):
+            r = e.result(name)
+            for key in "mean_ice_resistance_n", "mean_tow_force_n", "n_steps":
+                assert d[key].sel(member=k).item() == table[key][name] == r.summary[key]
+            assert d.state_hash[k].item() == r.summary["state_hash"]
+            with r.open() as one:
+                np.testing.assert_array_equal(d.ice_resistance[k], one.ice_resistance)
+        assert all(v.attrs["long_name"] for n, v in d.variables.items())
+    assert "<table" in e._repr_html_() and "&lt;bergtow.Ensemble" in e._repr_html_()
+
+
+def test_an_ensemble_with_a_hole(tmp_path):
+    """A member that fails is told, its numbers are NaN, and the others are there."""
+    path = study(tmp_path, parameters={"output.window_start": [0.5, 9]})
+    with pytest.raises(bergtow.BergtowError, match="c002-r001.*output.window_start"):
+        bergtow.Ensemble.run(path, tmp_path / "out", progress=False)
+    e = bergtow.Ensemble(tmp_path / "out")
+    assert e.counts == {"finished": 2, "failed": 2, "waiting": 0}
+    table = e.dataframe
+    assert list(table["mean_ice_resistance_n"].isna()) == [False, False, True, True]
+    assert "output.window_start" in table["reason"]["c002-r001"]
+    with pytest.raises(bergtow.BergtowError, match="holds no ensemble.h5"):
+        bergtow.Ensemble(tmp_path)
+    with pytest.raises(bergtow.BergtowError, match="no member"):
+        e.result("c009-r001")
+    with pytest.raises(bergtow.BergtowError, match="none.yml"):
+        bergtow.Ensemble.run(tmp_path / "none.yml", tmp_path / "none", progress=False)
+
+
+def test_ctrl_c_stops_an_ensemble_that_goes_on(tmp_path):
+    path = study(tmp_path, set={"run.duration": 80, "output.window_start": 20})
+    script = (f"import sys; sys.path.insert(0, {str(ROOT / 'postproc')!r}); import bergtow; "
+              f"bergtow.Ensemble.run({str(path)!r}, {str(tmp_path / 'out')!r})")
+    p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 60
+    while not list(tmp_path.glob("out/members/*/result.part.h5")) and time.monotonic() < end:
+        time.sleep(0.02)
+    p.send_signal(signal.SIGINT)
+    _, err = p.communicate(timeout=60)
+    assert "KeyboardInterrupt" in err and list(tmp_path.glob("out/members/*/checkpoint.h5"))
+    assert bergtow.Ensemble(tmp_path / "out").counts["finished"] < 4
+
+
 def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
     shutil.copy(ROOT / "cases/basin/basin-80.yml", tmp_path)
     monkeypatch.chdir(tmp_path)
     examples = re.findall(r"```python\n(.*?)```", (ROOT / "docs/library.md").read_text(), re.DOTALL)
-    assert len(examples) == 2
+    assert len(examples) == 3
     for example in examples:
         exec(compile(example, "docs/library.md", "exec"), {})
 

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: MIT
+"""Ensembles: many runs of a study in one folder, as a Dataset and as a table."""
+import html
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from pathlib import Path
+
+from . import _library
+from ._library import IO, OK, BergtowError
+from .results import Result, _imported, _text, _wrapper
+
+#: status of a member
+STATUS = {1: "finished", 2: "failed", 0: "waiting"}
+
+
+def program_path():
+    """The program `bergtow`: BERGTOW, or the one beside the library that is in use, or that of PATH."""
+    if os.environ.get("BERGTOW"):
+        return os.environ["BERGTOW"]
+    here = Path(_library.library_path()).resolve().parent  # build/release, or PREFIX/lib
+    for path in (here / "bergtow", here.parent / "bin/bergtow"):
+        if os.access(path, os.X_OK) and path.is_file():
+            return str(path)
+    found = shutil.which("bergtow")
+    if not found:
+        raise BergtowError("the program bergtow, which runs ensembles, is not beside libbergtow and not in PATH; build "
+                           "it with `make`, install it with `make install`, or name its file in BERGTOW", IO)
+    return found
+
+
+class Ensemble:
+    """The folder of an ensemble.
+
+        ensemble = bergtow.Ensemble.run("study.yml", "out/study")     # the same call goes on where one was stopped
+        ensemble.dataframe.groupby("tow.speed")["mean_ice_resistance_n"].agg(["mean", "sem", "count"])
+        ensemble.dataset.ice_resistance.sel(member=0)                 # the series of a member, N
+
+    Members that have failed or wait are in it, too; their numbers are NaN.
+    """
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        if not (self.folder / "ensemble.h5").is_file():
+            raise BergtowError(f"{self.folder}: holds no ensemble.h5; give the folder that `bergtow ensemble` has left",
+                               IO)
+
+    @classmethod
+    def run(cls, study, out, *, overrides=None, threads=0, retry_failed=False, progress=True):
+        """Run the members of a study that are open, one process for all cores, and return the Ensemble.
+
+        out: the folder, made or gone on with. overrides: {key: value} for all members. progress: print a line for each
+        member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with. Errors: BergtowError
+        with the messages of the program; also where a member has failed, and the others are finished.
+        """
+        command = [program_path(), "ensemble", os.fspath(study), "-o", os.fspath(out)]
+        command += [word for key, value in (overrides or {}).items() for word in ("--set", f"{key}={value}")]
+        command += ["--threads", str(threads)] if threads else []
+        command += ["--retry-failed"] if retry_failed else []
+        # a group of its own: a Ctrl-C comes here, and reaches the program once
+        with tempfile.TemporaryFile("w+") as errors:
+            with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True,
+                                  start_new_session=True) as process:
+                try:
+                    for line in process.stdout:
+                        if progress:
+                            print(line, end="", flush=True)
+                except KeyboardInterrupt:
+                    process.send_signal(signal.SIGINT)
+                    process.communicate()
+                    raise
+            errors.seek(0)
+            if process.returncode != OK:
+                raise BergtowError(errors.read().strip() or f"bergtow ensemble ended with {process.returncode}",
+                                   process.returncode)
+        return cls(out)
+
+    def _open(self):
+        h5py = _imported("h5py")
+        path = self.folder / "ensemble.h5"
+        try:
+            return h5py.File(path)
+        except OSError as error:
+            raise BergtowError(f"{path}: cannot be read ({error})", IO) from None
+
+    @property
+    def counts(self):
+        """How many members there are of each status: {"finished": 8, "failed": 0, "waiting": 0}."""
+        with self._open() as file:
+            status = file["members/status"][()].tolist()
+        return {word: status.count(code) for code, word in STATUS.items()}
+
+    def result(self, name):
+        """The Result of a member by its name, as "c001-r001"."""
+        folder = self.folder / "members" / name
+        if not folder.is_dir():
+            raise BergtowError(f"{self.folder}: has no member {name}", IO)
+        return Result(folder)
+
+    @property
+    def dataset(self):
+        """An xarray.Dataset, read when it is used: close it as any.
+
+        Dimensions: member, and sample (entries of the series). Coordinates: name, condition, repeat, seed of each
+        member, and what the study varies. Variables: the numbers of summary.json, the series, state_hash, status and
+        reason. All have units and a long_name.
+        """
+        xarray, file = _imported("xarray"), self._open()
+        stored = _wrapper(xarray)
+        variables, coordinates = {}, []
+        for group in ("members", "parameters", "summary", "series"):
+            for name, dataset in file.get(group, {}).items():
+                if name == "id":
+                    continue
+                attributes = {k: _text(dataset.attrs[k]) for k in ("units", "long_name") if k in dataset.attrs}
+                name = f"series_{name}" if name in variables else name
+                dims = ("member", "sample")[:dataset.ndim]
+                values = [_text(v) for v in dataset[()]] if dataset.dtype.kind == "O" else stored(dataset)
+                variables[name] = xarray.Variable(dims, values, attributes)
+                if group == "parameters" or name in ("name", "condition", "repeat", "seed"):
+                    coordinates.append(name)
+        attributes = {name: _text(value) for name, value in file.attrs.items()}
+        attributes["study"] = _text(file["study"][()])
+        dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
+        dataset.set_close(file.close)
+        return dataset
+
+    @property
+    def dataframe(self):
+        """A pandas.DataFrame: a row for each member, by its name; what varies, then the numbers of summary.json."""
+        pandas = _imported("pandas")
+        with self.dataset as d:
+            flat = {name: v.values for name, v in d.variables.items() if v.dims == ("member",)}
+            first = [name for name in d.coords if name in flat and name != "name"]
+        rest = [name for name in flat if name not in first and name != "name"]
+        return pandas.DataFrame({n: flat[n] for n in first + rest}, index=pandas.Index(flat["name"], name="member"))
+
+    def __repr__(self):
+        said = ", ".join(f"{n} {word}" for word, n in self.counts.items())
+        return f"<bergtow.Ensemble {self.folder}: {said}>"
+
+    def _repr_html_(self):
+        with self.dataset as d:
+            varied = [name for name in d.coords if name not in ("name", "condition", "repeat")]
+        shown = "mean_ice_resistance_n", "mean_tow_force_n", "peak_tow_force_n", "unconverged_steps"
+        table = self.dataframe
+        columns = varied + [name for name in shown if name in table]
+        return f"<p>{html.escape(repr(self))}</p>" + table[columns].to_html(max_rows=12)
