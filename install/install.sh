@@ -71,6 +71,7 @@ put_link() {
 major=${version%%.*}
 [ -z "$dest" ] || mkdir -p "$dest"
 put_file 755 "$build/bergtow" "$prefix/bin/bergtow"
+put_file 755 install/bergtow-report "$prefix/bin/bergtow-report"
 put_file 644 "$build/libbergtow.a" "$prefix/lib/libbergtow.a"
 put_file 755 "$build/libbergtow.so.$version" "$prefix/lib/libbergtow.so.$version"
 put_link "libbergtow.so.$version" "$prefix/lib/libbergtow.so.$major"

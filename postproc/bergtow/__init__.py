@@ -15,9 +15,12 @@ from ._library import BergtowError, CaseError, library_path, start_mpi
 from .case import Case, quantities
 from .ensemble import Ensemble
 from .force import Bodies
+from .pictures import (Picture, plot_chains, plot_ensemble, plot_field, plot_force, plot_impacts, plot_resistance,
+                       report, statistics)
 from .results import Result, open_result
 from .simulation import Simulation, run
 
 __version__ = "0.1.0"
-__all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Result", "Simulation", "library_path",
-           "open_result", "quantities", "run", "start_mpi"]
+__all__ = ["BergtowError", "Bodies", "Case", "CaseError", "Ensemble", "Picture", "Result", "Simulation", "library_path",
+           "open_result", "plot_chains", "plot_ensemble", "plot_field", "plot_force", "plot_impacts", "plot_resistance",
+           "quantities", "report", "run", "start_mpi", "statistics"]

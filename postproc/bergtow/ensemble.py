@@ -10,6 +10,7 @@ from pathlib import Path
 
 from . import _library
 from ._library import IO, OK, BergtowError
+from .pictures import plot_ensemble, report, statistics
 from .results import Result, _imported, _text, _wrapper
 
 #: status of a member
@@ -18,8 +19,12 @@ STATUS = {1: "finished", 2: "failed", 0: "waiting"}
 
 def program_path():
     """The program `bergtow`: BERGTOW, or the one beside the library that is in use, or that of PATH."""
-    if os.environ.get("BERGTOW"):
-        return os.environ["BERGTOW"]
+    named = os.environ.get("BERGTOW")
+    if named:
+        found = shutil.which(named)
+        if not found:
+            raise BergtowError(f"{named}: is no program; name bergtow by its whole path in BERGTOW", IO)
+        return found
     here = Path(_library.library_path()).resolve().parent  # build/release, or PREFIX/lib
     for path in (here / "bergtow", here.parent / "bin/bergtow"):
         if os.access(path, os.X_OK) and path.is_file():
@@ -136,6 +141,18 @@ class Ensemble:
             first = [name for name in d.coords if name in flat and name != "name"]
         rest = [name for name in flat if name not in first and name != "name"]
         return pandas.DataFrame({n: flat[n] for n in first + rest}, index=pandas.Index(flat["name"], name="member"))
+
+    def statistics(self, **options):
+        """bergtow.statistics(self, ...)"""
+        return statistics(self, **options)
+
+    def plot(self, **options):
+        """bergtow.plot_ensemble(self, ...)"""
+        return plot_ensemble(self, **options)
+
+    def report(self, file=None, **options):
+        """bergtow.report(self, file, ...)"""
+        return report(self, file, **options)
 
     def __repr__(self):
         said = ", ".join(f"{n} {word}" for word, n in self.counts.items())

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read when it is used."""
+import html
 import json
 from pathlib import Path
 
 import numpy as np
 
 from ._library import IO, BergtowError
+from .pictures import report
 
 
 class Result:
@@ -28,8 +30,34 @@ class Result:
         """open_result(folder)"""
         return open_result(self.folder)
 
+    def report(self, file=None, **options):
+        """bergtow.report(self, file, ...)"""
+        return report(self, file, **options)
+
     def __repr__(self):
         return f"<bergtow.Result {self.folder}>"
+
+    def _repr_html_(self):
+        rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in _shown(self.summary))
+        return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
+
+
+#: what a notebook shows of a run, where it is in the summary
+_SHOWN = ("title", "n_floes", "concentration", "sim_time_s", "mean_ice_resistance_n", "mean_tow_force_n",
+          "peak_tow_force_n", "mean_line_tension_n", "unconverged_steps", "state_hash")
+
+
+def _shown(summary):
+    """(name, text) of what a notebook shows; ± is one standard error, as in the report."""
+    for name in _SHOWN:
+        value = summary.get(name)
+        if value is None:
+            continue
+        error = summary.get(name.removesuffix("_n") + "_se_n")
+        text = f"{value:.4g}" if isinstance(value, float) else str(value)
+        yield html.escape(name), html.escape(text + (f" ± {error:.2g}" if error else ""))
+    for warning in summary.get("warnings", []):
+        yield "warning", html.escape(str(warning))
 
 
 def _imported(name):
@@ -41,14 +69,15 @@ def _imported(name):
 
 
 def _wrapper(xarray):
-    """A class of arrays that read an HDF5 dataset when they are indexed."""
+    """A function that makes arrays which read an HDF5 dataset when they are indexed."""
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
     class Stored(BackendArray):
-        def __init__(self, dataset, column=None):
-            self.dataset, self.column = dataset, column
-            self.shape = dataset.shape if column is None else dataset.shape[:-1]
+        def __init__(self, dataset, column, part):
+            self.dataset, self.column, self.part = dataset, column, part
+            shape = dataset.shape if column is None else dataset.shape[:-1]
+            self.shape = shape if part is None else (*shape[:-1], part.stop - part.start)
             self.dtype = dataset.dtype
 
         def __getitem__(self, key):
@@ -56,9 +85,19 @@ def _wrapper(xarray):
                                                       self._get)
 
         def _get(self, key):
+            if self.part is not None:
+                *first, last = key
+                key = (*first, self._moved(last))
             return self.dataset[key if self.column is None else (*key, self.column)]
 
-    return lambda dataset, column=None: indexing.LazilyIndexedArray(Stored(dataset, column))
+        def _moved(self, key):
+            """An index into the part, as one into the dataset."""
+            if isinstance(key, slice):
+                start, stop, step = key.indices(self.shape[-1])
+                return slice(start + self.part.start, max(stop, 0) + self.part.start, step)
+            return key + self.part.start
+
+    return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(Stored(dataset, column, part))
 
 
 def _text(value):
@@ -66,13 +105,39 @@ def _text(value):
     return value.item() if isinstance(value, np.generic) else value
 
 
+#: groups of result.h5, and how the names of their variables begin
+_GROUPS = {"series": "", "floes": "floe_", "bodies": "other_body_", "impacts": "collision_", "panels": "panel_",
+           "events": "event_"}
+#: dimensions by their scales in the file
+_DIMENSIONS = {"/series/time": "time", "/sample": "time", "/frames/time": "frame", "/impacts/time": "collision",
+               "/events/time": "event", "/body": "other_body", "/body_end": "other_body_end",
+               "/body_vertex": "other_body_vertex", "/event_kind": "kind_of_event"}
+#: the first dimension in files of earlier versions, which have no scales
+_FIRST = {"series": "time", "floes": "floe", "bodies": "other_body", "impacts": "collision", "panels": "panel",
+          "events": "event"}
+_POSE = (("x", "m", "x of the centroid"), ("y", "m", "y of the centroid"), ("yaw", "rad", "angle from the x axis"))
+
+
+def _dims(group, dataset):
+    """Names of the dimensions of a dataset, None for one that has none in a file of an earlier version."""
+    if all(len(axis) for axis in dataset.dims):
+        scales = [axis[0].name for axis in dataset.dims]
+        return tuple(_DIMENSIONS.get(name, name.lstrip("/")) for name in scales)
+    if dataset.ndim == 1 and dataset.name in _DIMENSIONS:
+        return (_DIMENSIONS[dataset.name],)
+    first = _FIRST[group]
+    return (first,) if dataset.ndim == 1 and not dataset.name.endswith(("offsets", "names", "towed")) else None
+
+
 def open_result(folder):
     """The result of a run as an xarray.Dataset.
 
-    Dimensions: time (entries of the series), frame, floe, and other_body (the towed body, walls). Series have their
-    names, frames are floe_x, floe_y, floe_yaw, floe_contact_force and other_body_x and so on. Every variable has units,
-    long_name and, where it has one, a label. Values are read from the file when they are used; close it as any Dataset.
-    The text of summary.json is the attribute `summary`. Errors: BergtowError.
+    Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event,
+    and panel of the hull where the case has them. Series have their names; frames are floe_x, floe_y, floe_yaw,
+    floe_speed, floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices are
+    what the groups of result.h5 hold. Every variable has units, long_name and, where it has one, a label. Values are
+    read from the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`.
+    Errors: BergtowError.
     """
     xarray, h5py = _imported("xarray"), _imported("h5py")
     path = Path(folder)
@@ -84,35 +149,40 @@ def open_result(folder):
     stored = _wrapper(xarray)
     variables = {}
 
-    def put(name, dims, dataset, column=None, units=None, long_name=None):
+    def put(name, dims, dataset, column=None, part=None, units=None, long_name=None):
         a = dict(dataset.attrs)
         attributes = {"units": units or _text(a.get("units", "1")),
                       "long_name": long_name or _text(a.get("description", name.replace("_", " ")))}
         if "label" in a:
             attributes["label"] = _text(a["label"])
         assert name not in variables, name
-        variables[name] = xarray.Variable(dims, stored(dataset, column), attributes)
+        texts = dataset.dtype.kind == "O"
+        values = [_text(v) for v in dataset[()]] if texts else stored(dataset, column, part)
+        if texts:
+            del attributes["units"]
+        variables[name] = xarray.Variable(dims, values, attributes)
 
-    for name, dataset in file["series"].items():
-        put(name, ("time",), dataset)
-    for name in ("thickness", "area"):
-        put(f"floe_{name}", ("floe",), file[f"floes/{name}"], long_name=f"{name} of the floe")
-    for name in ("height", "area"):
-        put(f"other_body_{name}", ("other_body",), file[f"bodies/{name}"])
-    variables["other_body_name"] = xarray.Variable(("other_body",), [_text(n) for n in file["bodies/names"][()]])
+    for group, prefix in _GROUPS.items():
+        for name, dataset in file.get(group, {}).items():
+            if (dims := _dims(group, dataset)) is not None:
+                put({"bodies/names": "other_body_name"}.get(f"{group}/{name}", prefix + name), dims, dataset)
     if "frames" in file:
-        frames = file["frames"]
+        frames, n = file["frames"], len(file["floes/area"])
         put("frame_time", ("frame",), frames["time"], long_name="time of the frame")
         for of, data in (("floe", "pose"), ("other_body", "body_pose")):
-            for k, (axis, units) in enumerate((("x", "m"), ("y", "m"), ("yaw", "rad"))):
-                put(f"{of}_{axis}", ("frame", of), frames[data], k, units,
-                    "angle from the x axis" if axis == "yaw" else f"{axis} of the centroid")
+            for k, (axis, units, words) in enumerate(_POSE):
+                put(f"{of}_{axis}", ("frame", of), frames[data], k, None, units, words)
         put("floe_contact_force", ("frame", "floe"), frames["contact_force"])
+        if "speed" in frames:
+            for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames["speed"].shape[1]))):
+                put(f"{of}_speed", ("frame", of), frames["speed"], None, part, long_name="speed of the centroid")
+    if any("xy" in v.dims for v in variables.values()):
+        variables["xy"] = xarray.Variable(("xy",), ["x", "y"])
     attributes = {name: _text(value) for name, value in file.attrs.items()}
     summary = path.with_name("summary.json")
     if summary.exists():
         attributes["summary"] = summary.read_text()
-    coordinates = [n for n in ("time", "frame_time", "other_body_name") if n in variables]
+    coordinates = [n for n in ("time", "frame_time", "collision_time", "event_time", "other_body_name") if n in variables]
     dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
     dataset.set_close(file.close)
     return dataset

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Simulations that are stepped, and runs from case to result folder."""
 import ctypes
+import math
 import os
 import sys
+import time
 from ctypes import POINTER, c_double, c_void_p
 
 import numpy as np
@@ -215,8 +217,29 @@ class Simulation:
 
 
 def run(case, out, *, forces=None, threads=0, replace=False, progress=False):
-    """Run a case to its end and return its Result. out: the result folder. It can be interrupted between steps."""
-    with Simulation(case, out, forces=forces, threads=threads, replace=replace, progress=progress) as sim:
+    """Run a case to its end and return its Result. out: the result folder. It can be interrupted between steps.
+
+    progress: True for a line that the run renews a few times a second, in notebooks too; or a function, called as
+    often with the Simulation.
+    """
+    with Simulation(case, out, forces=forces, threads=threads, replace=replace) as sim:
+        show = _line if progress is True else progress
+        last = 0.0
         while sim.steps_left:
             sim.step(10)
+            now = time.monotonic()
+            if show and (now - last > 0.25 or not sim.steps_left):
+                last = now
+                show(sim)
+        if progress is True:
+            print()
         return sim.end()
+
+
+def _line(sim):
+    """Standard output of Python, which a notebook shows; that of the library goes past it."""
+    share = sim.steps / (sim.steps + sim.steps_left)
+    load = sim["ice_resistance"]
+    said = "" if math.isnan(load) else f", ice resistance {load:.4g} N"
+    print(f"\r{share:4.0%}  {sim.time:.4g} s of {sim.time + sim.steps_left * sim.dt:.4g} s{said}".ljust(72), end="",
+          flush=True)

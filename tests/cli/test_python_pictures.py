@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""Pictures, statistics and reports as functions of the Python package, and the command bergtow-report."""
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from harness import ROOT, TOW, call, changed, environment, run, write_case
+
+LIBRARY = ROOT / "build/release/libbergtow.so"
+sys.path.insert(0, str(ROOT / "postproc"))
+import bergtow  # noqa: E402
+
+TOWED = changed(TOW, run__duration=6, output={"panels": True, "window_start": 2})
+
+
+@pytest.fixture(scope="module", autouse=True)
+def library():
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    made = subprocess.run(["make", "--no-print-directory", "lib"], cwd=ROOT, capture_output=True, text=True, env=own)
+    assert made.returncode == 0, made.stdout + made.stderr
+
+
+@pytest.fixture(scope="module")
+def towed(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("towed"), TOWED).dir
+
+
+@pytest.fixture(scope="module")
+def speeds(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("speeds")
+    write_case(folder, TOWED, "base.yml")
+    study = {"base": "base.yml", "repeats": 3, "parameters": {"tow.speed": [0.1, 0.2]}}
+    (folder / "study.yml").write_text(json.dumps(study))
+    assert call("ensemble", "study.yml", "-o", "out", cwd=folder).returncode == 0
+    return folder / "out"
+
+
+def drawn_by(script, *arguments):
+    subprocess.run([sys.executable, ROOT / f"postproc/{script}", *arguments], check=True, capture_output=True)
+
+
+# --- of a run ---------------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("name, words, options", [
+    ("force", [], {}),
+    ("force", ["--max", "50"], {"max": 50}),
+    ("field", ["--colour", "force", "--times", "1", "3"], {"colour": "force", "times": [1, 3]}),
+    ("impacts", [], {}),
+    ("resistance", ["--linear"], {"linear": True}),
+])
+def test_a_picture_is_that_of_the_script(towed, tmp_path, name, words, options):
+    picture = getattr(bergtow, f"plot_{name}")(bergtow.Result(towed), **options)
+    drawn_by(f"plot_{name}.py", towed, "-o", tmp_path / "theirs.png", *words)
+    assert picture._repr_png_() == (tmp_path / "theirs.png").read_bytes()
+    assert picture.save(tmp_path / "ours.svg").read_text().startswith("<?xml")
+
+
+def test_what_cannot_be_drawn_is_said(towed, tmp_path):
+    with pytest.raises(bergtow.BergtowError, match="holds neither summary.json nor result.h5"):
+        bergtow.plot_field(tmp_path)
+    with pytest.raises(bergtow.BergtowError, match="invalid choice: 'red'"):
+        bergtow.plot_field(towed, colour="red")
+    with pytest.raises(bergtow.BergtowError, match="unknown kind of file"):
+        bergtow.plot_force(towed).save(tmp_path / "x.gif")
+
+
+def test_the_callers_matplotlib_is_left_alone(towed):
+    """Neither its backend nor a module of the caller with the name of a script is touched."""
+    script = (f"import sys, types; sys.path.insert(0, {str(ROOT / 'postproc')!r}); sys.modules['style'] = None\n"
+              f"import bergtow; bergtow.plot_force({str(towed)!r})\n"
+              "print('matplotlib' in sys.modules, sys.modules['style'])")
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment())
+    assert said.stdout.split() == ["False", "None"], said.stderr
+
+
+def test_a_package_that_is_missing_is_named(towed, tmp_path):
+    (tmp_path / "jinja2.py").write_text("raise ModuleNotFoundError(\"No module named 'jinja2'\", name='jinja2')")
+    script = (f"import sys; sys.path.insert(0, {str(ROOT / 'postproc')!r})\n"
+              f"import bergtow; bergtow.report({str(towed)!r}, 'x.html')")
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
+                          env=environment(PYTHONPATH=str(tmp_path)))
+    assert "jinja2 is missing" in said.stderr and "install python3-jinja2" in said.stderr
+    assert not (tmp_path / "x.html").exists()
+
+
+def test_a_result_in_a_notebook(towed):
+    shown = bergtow.Result(towed)._repr_html_()
+    summary = json.loads((towed / "summary.json").read_text())
+    assert summary["state_hash"] in shown and f"{summary['mean_ice_resistance_n']:.4g} ± " in shown
+
+
+def test_all_of_the_file_is_in_the_dataset(towed):
+    with bergtow.open_result(towed) as d, h5py.File(towed / "result.h5") as f:
+        n = len(f["floes/area"])
+        np.testing.assert_array_equal(d.floe_speed, f["frames/speed"][:, :n])
+        np.testing.assert_array_equal(d.other_body_speed, f["frames/speed"][:, n:])
+        np.testing.assert_array_equal(d.other_body_speed[3, -2:], f["frames/speed"][3, -2:])
+        np.testing.assert_array_equal(d.floe_speed[[1, 4], 2:9:3], f["frames/speed"][[1, 4], 2:9:3])
+        for group, prefix in (("impacts", "collision"), ("panels", "panel"), ("events", "event"), ("floes", "floe"),
+                              ("bodies", "other_body")):
+            for name, values in f[group].items():
+                if values.dtype.kind != "O":
+                    np.testing.assert_array_equal(d[f"{prefix}_{name}"], values)
+        assert d.panel_load.dims == ("time", "panel") and d.collision_peak.dims == ("collision",)
+        assert d.panel_force.sel(xy="y").dims == ("time", "panel")
+        assert len(f["impacts/peak"]) > 0 and d.event_kind_names.values[0] == "line_broken"
+
+
+def test_progress(tmp_path, capsys):
+    seen = []
+    bergtow.run(TOWED, tmp_path / "one", progress=True)
+    line = capsys.readouterr().out.split("\r")[-1]
+    assert line.startswith("100%  6 s of 6 s, ice resistance ") and line.endswith("\n")
+    bergtow.run(TOWED, tmp_path / "two", progress=lambda sim: seen.append(sim.steps_left))
+    assert seen[-1] == 0 and capsys.readouterr().out == ""
+
+
+# --- of an ensemble ---------------------------------------------------------------------------------------------------
+
+def test_statistics_of_an_ensemble(speeds, tmp_path):
+    found = bergtow.Ensemble(speeds).statistics(resamples=99, time_scale=1)
+    drawn_by("ensemble.py", speeds, "-o", tmp_path, "--resamples", "99", "--time-scale", "1")
+    assert found == json.loads((tmp_path / "statistics.json").read_text())
+    table = bergtow.Ensemble(speeds).dataframe
+    means = table.groupby("tow.speed")["mean_ice_resistance_n"].mean()
+    np.testing.assert_allclose([c["resistance"]["mean"] for c in found["conditions"]], means, rtol=1e-12)
+
+
+def test_pictures_of_an_ensemble(speeds, tmp_path):
+    pictures = bergtow.plot_ensemble(speeds)
+    drawn_by("plot_ensemble.py", speeds, "-o", tmp_path)
+    theirs = {p.stem: p.read_bytes() for p in tmp_path.glob("*.png")}
+    assert {name: p._repr_png_() for name, p in pictures.items()} == theirs and "sweep-tow-speed" in theirs
+    assert pictures["sweep-tow-speed"].save(tmp_path / "x.svg").read_text().startswith("<?xml")
+
+
+# --- reports ----------------------------------------------------------------------------------------------------------
+
+def test_reports(towed, speeds, tmp_path):
+    path = bergtow.Result(towed).report(tmp_path / "run.html", client="Nordic & Sons")
+    assert "Nordic &amp; Sons" in path.read_text()
+    path = bergtow.Ensemble(speeds).report(tmp_path / "ensemble.html")
+    assert "design" in path.read_text().lower()
+    (tmp_path / "mine.html").write_text("a page of my own")
+    with pytest.raises(bergtow.BergtowError, match="is there already"):
+        bergtow.report(towed, tmp_path / "mine.html")
+    assert bergtow.report(towed, tmp_path / "mine.html", replace=True).stat().st_size > 1e5
+
+
+def test_the_wheel_has_the_command(towed, tmp_path):
+    """Installed by pip, with nothing of the source tree in reach."""
+    shutil.copytree(ROOT / "postproc", tmp_path / "postproc", ignore=shutil.ignore_patterns("__pycache__"))
+    made = subprocess.run([sys.executable, "-m", "pip", "install", "--no-deps", "--no-build-isolation", "--quiet",
+                           "--no-index", "--target", tmp_path / "site", tmp_path / "postproc"],
+                          capture_output=True, text=True, timeout=120)
+    assert made.returncode == 0, made.stderr
+    shutil.rmtree(tmp_path / "postproc")
+    env = environment(PYTHONPATH=str(tmp_path / "site"), BERGTOW_LIB=str(LIBRARY))
+    command = tmp_path / "site/bin/bergtow-report"
+    said = subprocess.run([command, towed, "-o", tmp_path / "x.html"], capture_output=True, text=True, env=env)
+    assert said.returncode == 0 and (tmp_path / "x.html").stat().st_size > 1e5, said.stderr
+    said = subprocess.run([command, tmp_path / "none"], capture_output=True, text=True, env=env)
+    assert said.returncode == 4 and said.stderr.startswith("bergtow-report: ") and "Traceback" not in said.stderr
+
+
+def test_make_install_has_the_command(towed, tmp_path):
+    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
+    made = subprocess.run(["make", "--no-print-directory", "install", f"PREFIX={tmp_path / 'usr'}"], cwd=ROOT,
+                          capture_output=True, text=True, env=own)
+    assert made.returncode == 0, made.stderr
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/bergtow-report").symlink_to(tmp_path / "usr/bin/bergtow-report")
+    said = subprocess.run([tmp_path / "bin/bergtow-report", towed, "-o", tmp_path / "x.html"], capture_output=True,
+                          text=True, env=environment())
+    assert said.returncode == 0 and "x.html" in said.stdout, said.stderr
+    said = subprocess.run([tmp_path / "bin/bergtow-report", "--help"], capture_output=True, text=True,
+                          env=environment())
+    assert said.stdout.startswith("usage: bergtow-report ")
