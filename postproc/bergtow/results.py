@@ -132,12 +132,12 @@ def _dims(group, dataset):
 def open_result(folder):
     """The result of a run as an xarray.Dataset.
 
-    Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event,
-    and panel of the hull where the case has them. Series have their names; frames are floe_x, floe_y, floe_yaw,
-    floe_speed, floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices are
-    what the groups of result.h5 hold. Every variable has units, long_name and, where it has one, a label. Values are
-    read from the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`.
-    Errors: BergtowError.
+    Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event, and
+    panel of the hull where the case has them. Series have their names; frames are floe_x, floe_y, floe_yaw, floe_speed,
+    floe_contact_force, other_body_x and so on; collision_peak, event_value, panel_load and floe_vertices are what the
+    groups of result.h5 hold. Every variable has units, long_name and, where it has one, a label. Values are read from
+    the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
+    BergtowError.
     """
     xarray, h5py = _imported("xarray"), _imported("h5py")
     path = Path(folder)
@@ -182,7 +182,7 @@ def open_result(folder):
     summary = path.with_name("summary.json")
     if summary.exists():
         attributes["summary"] = summary.read_text()
-    coordinates = [n for n in ("time", "frame_time", "collision_time", "event_time", "other_body_name") if n in variables]
-    dataset = xarray.Dataset(variables, attrs=attributes).set_coords(coordinates)
+    coordinates = "time", "frame_time", "collision_time", "event_time", "other_body_name"
+    dataset = xarray.Dataset(variables, attrs=attributes).set_coords([n for n in coordinates if n in variables])
     dataset.set_close(file.close)
     return dataset
