@@ -49,10 +49,10 @@ void *bt_alloc(size_t n, size_t size);             ///< zeroed
 void *bt_realloc(void *p, size_t n, size_t size);  ///< not zeroed beyond the old size
 void *bt_alloc_aligned(size_t n, size_t size);     ///< zeroed, 64-byte aligned, release with free()
 
-/// Called before memory that has run out ends the program, with what is told on stderr otherwise: for a program that
-/// wants to say so itself, or to save what is its own. It cannot be averted: told must not call this library.
+/// Called before memory that has run out ends the program, with a message on stderr otherwise: for a program that
+/// wants to say so itself, or to save what is its own. It cannot be averted: report must not call this library.
 /// NULL = the message goes to stderr.
-void bt_on_out_of_memory(void (*told)(const char *message, void *user), void *user);
+void bt_on_out_of_memory(void (*report)(const char *message, void *user), void *user);
 
 /// A text of any length that is written as a file is; without memory for it the program ends as in bt_alloc.
 typedef struct bt_text {

@@ -11,20 +11,20 @@
 // Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest
 // (src/run/ensemble_record.h). Each call reads them all and compares them, shared among its ranks, before it begins (as
 // fast as the disk is: an hour of the study concentration.yml at full scale leaves 4 MB a member), and each maker of
-// ensemble.h5 what others have finished since. What is missing or damaged is told, taken away and run again; what the
-// system does not let us read is left as it is, told, and a hole. A call ends with 0 only when every member is finished
-// and sound.
+// ensemble.h5 what others have finished since. What is missing or damaged is reported, removed and run again; what the
+// system does not let us read is reported, left as it is, and is a hole. A call ends with 0 only when every member is
+// finished and sound.
 //
-// Dealing. Who works on a member holds a lock on members/NAME/lock, which the system takes back when the process ends,
-// however it ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed one need no word
-// between them: each takes the next member that is neither finished, failed nor locked, the longest first by an
-// estimate. (Tried in thought and left: a counter in shared MPI memory; it knows nothing of other jobs, and a rank that
-// computes does not serve it on every network.) A member that was stopped goes on from its checkpoint; when it is
-// finished its checkpoints are removed. One whose process died is tried again after all others, and given up after some
-// attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies takes all
-// others with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members are run
-// one at a time, so that only the one at fault goes on to the limit. (Not from the first on: a job that ends with its
-// time limit leaves as many such members as it had groups.)
+// Who does what. Whoever works on a member holds a lock on members/NAME/lock, which the system releases when the
+// process ends, however it ends. So groups of ranks, jobs of an array on a cluster, and a call that resumes a killed
+// one need no word between them: each takes the next member that is neither finished, failed nor locked, the longest
+// first by an estimate. (Tried in thought and left: a counter in shared MPI memory; it knows nothing of other jobs, and
+// a rank that computes does not serve it on every network.) A member that was stopped goes on from its checkpoint; when
+// it is finished its checkpoints are removed. One whose process died is tried again after all others, and given up
+// after some attempts without a checkpoint between them, so that it cannot stop the rest. Under mpirun a rank that dies
+// takes all others with it, and their members have one more attempt without an end: from BT_SUSPECT_ATTEMPTS on members
+// are run one at a time, so that only the one at fault goes on to the limit. (Not from the first on: a job that ends
+// with its time limit leaves as many such members as it had groups.)
 #ifndef BERGTOW_ENSEMBLE_H
 #define BERGTOW_ENSEMBLE_H
 

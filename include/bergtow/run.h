@@ -25,7 +25,7 @@ typedef struct bt_run_options {
     const char *command_line; ///< for the provenance
     /// a stop signal of the caller's, looked at as one of the run's own, and set to one that the run was too late for;
     /// or NULL
-    volatile sig_atomic_t *told;
+    volatile sig_atomic_t *stop_signal;
     bool leave_signals;       ///< catch no signal: they are the caller's
     const char *from;         ///< resume: this checkpoint file instead of the last one in dir, or NULL
 } bt_run_options;
@@ -36,7 +36,7 @@ typedef struct bt_run_options {
 bt_status bt_run(const bt_comm *comm, const bt_case *c, const bt_run_options *o, bt_errors *err);
 
 /// Collective. Go on with the run in o->dir from its last checkpoint (bergtow/checkpoint.h), or from its case if it was
-/// killed before the first. A finished run is told to be so. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is
+/// killed before the first. That a run is finished is said. Errors as bt_run, and BT_ERR_CASE for a checkpoint that is
 /// refused.
 bt_status bt_run_resume(const bt_comm *comm, const bt_run_options *o, bt_errors *err);
 

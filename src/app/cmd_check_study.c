@@ -58,7 +58,7 @@ bool bt_check_is_study(const char *path)
     return found;
 }
 
-// --- faults: what is wrong with many conditions is told once ---------------------------------------------------------
+// --- faults: what is wrong with many conditions is said once ---------------------------------------------------------
 
 static void take_faults(faults *f, int64_t condition, bt_errors *err)
 {

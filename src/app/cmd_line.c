@@ -62,7 +62,7 @@ void bt_cmd_parse(const struct argp *argp, int argc, char **argv, void *input)
         parse_aloud(argp, argc, argv, input);
         return;
     }
-    // getopt writes to stderr whatever argp is told.
+    // getopt writes to stderr whatever flags argp is given.
     int kept[2] = {dup(STDOUT_FILENO), dup(STDERR_FILENO)}, nowhere = open("/dev/null", O_WRONLY);
     for (int k = 0; k < 2; k++) dup2(nowhere, STDOUT_FILENO + k);
     parse_aloud(argp, argc, argv, input);

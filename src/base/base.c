@@ -11,9 +11,9 @@ static void (*on_out_of_memory)(const char *message, void *user);
 static void *on_out_of_memory_user;
 static void (*leave)(int code) = _Exit;
 
-void bt_on_out_of_memory(void (*told)(const char *message, void *user), void *user)
+void bt_on_out_of_memory(void (*report)(const char *message, void *user), void *user)
 {
-    on_out_of_memory = told;
+    on_out_of_memory = report;
     on_out_of_memory_user = user;
 }
 

@@ -11,7 +11,7 @@
 
 typedef struct { const char *path; bt_errors *err; } whole;
 
-/// 0: goes on; 1: refused and told; −1: HDF5 fails.
+/// 0: goes on; 1: refused and reported; −1: HDF5 fails.
 static herr_t look_at(hid_t group, const char *name, const H5L_info_t *info, void *data)
 {
     const whole *w = data;

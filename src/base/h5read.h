@@ -16,7 +16,7 @@ bt_status bt_h5_whole(hid_t file, const char *path, bt_errors *err);
 /// disk that reports errors is not taken for a file that is damaged. −1 where HDF5 cannot open it.
 hid_t bt_h5_open_file(const char *path, int *errnum);
 
-/// An open file; after a failure, which is told once, every function below does nothing.
+/// An open file; after a failure, which is reported once, every function below does nothing.
 typedef struct bt_h5_reader {
     hid_t file;
     const char *path;

@@ -34,7 +34,7 @@ void bt_largest_print(FILE *out)
         {"parameters of a study", BT_MAX_PARAMETERS, ""},
         {"values of one parameter", BT_MOST_VALUES, ""},
         {"members of a study", BT_MAX_MEMBERS, "members"},
-        {"errors of one case that are told", BT_MOST_COMPLAINTS, "errors"},
+        {"errors of one case that are reported", BT_MOST_COMPLAINTS, "errors"},
     };
     const struct {
         const char *what;

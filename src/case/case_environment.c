@@ -19,7 +19,7 @@ bt_status bt_case_load_tables(bt_case *c, bt_errors *err)
                                 : BT_OK;
     const bt_status air =
         c->air.wind_table && c->air.table.n == 0 ? bt_table_read(&c->air.table, c->air.wind_table, err) : BT_OK;
-    // What a table holds is told before what cannot be read: 3 before 4.
+    // What a table holds is reported before what cannot be read: 3 before 4.
     return water == BT_OK ? air : air == BT_OK || water == BT_ERR_CASE ? water : air;
 }
 

@@ -312,7 +312,7 @@ static void check_waypoints(const bt_check *k)
         return;
     }
     double start[2];
-    if (!bt_case_tow_start(c, start)) return; // told by bt_case_tow_check
+    if (!bt_case_tow_start(c, start)) return; // reported by bt_case_tow_check
     if (!has_line(c)) start[0] = c->body.x, start[1] = c->body.y;
     if (!((c->tow.waypoints[0] - start[0]) * bt_cos(course) + (c->tow.waypoints[1] - start[1]) * bt_sin(course) > 0)) {
         bt_check_fault(k, "tow.waypoints",

@@ -182,7 +182,7 @@ static void begin_places(place *p, bt_region *y, const bt_case *c, const bt_fiel
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;
-    bt_errors ignored = {0}; // no room for ice is told by the reader
+    bt_errors ignored = {0}; // no room for ice is reported by the reader
     bt_region_init(y, &whole, 0, &ignored);
     bt_errors_free(&ignored);
 
@@ -203,7 +203,7 @@ static void check_pairs(place *p, const bt_region *y)
 {
     bt_field_visit_pairs(y, p->f, p->outline, 1, visit, p);
     if (p->overlapping <= 1) return;
-    // A line of its own, whatever has been told one by one.
+    // A line of its own, whatever has been reported one by one.
     bt_errors_add(p->r->err, "%s: %lld pairs of %ss overlap, by %.3g m at most", p->r->path, (long long)p->overlapping,
                   p->noun, p->deepest);
 }

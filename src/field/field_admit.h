@@ -5,7 +5,7 @@
 
 #include "bergtow/field.h"
 
-enum { BT_MOST_MESSAGES = 10 }; ///< faults of one file that are told one by one
+enum { BT_MOST_MESSAGES = 10 }; ///< faults of one file that are reported one by one
 
 /// Faults of one file, the first few of them in words.
 typedef struct bt_refusals {

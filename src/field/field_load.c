@@ -25,7 +25,7 @@ bt_status bt_field_load(const bt_case *c, bt_field *f, bt_errors *err)
     return r.status;
 }
 
-// --- what is told ----------------------------------------------------------------------------------------------------
+// --- messages --------------------------------------------------------------------------------------------------------
 
 void bt_outline_warn(const bt_outline_counts *o, const bt_case *c, bt_errors *warnings)
 {

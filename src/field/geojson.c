@@ -148,7 +148,7 @@ static survey look_over(bt_features *features, double lon)
         const json_t *ring = read ? NULL : ring_of(bt_features_at(features, i), &why);
         for (size_t k = 0; ring && k < json_array_size(ring); k++) {
             const json_t *p = json_array_get(ring, k), *x = json_array_get(p, 0), *y = json_array_get(p, 1);
-            // others are told with their feature
+            // others are reported with their feature
             if (json_is_number(x) && json_is_number(y)) see(&b, i, json_number_value(x), json_number_value(y), lon);
         }
     }

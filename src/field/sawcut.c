@@ -15,7 +15,7 @@
 #include "base/elementary.h"
 #include "base/rng.h"
 
-static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order of dealing
+static const double DEAL_NOISE = 0.3; // standard deviation of ln d in the order in which sizes are assigned
 
 // In a rectangular cell, the largest rectangle with the proportions nearest to the aspect that the floe can have: a
 // floe of the area a becomes √(a aspect) long unless the cell is shorter, or narrower than a over that.

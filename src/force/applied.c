@@ -17,7 +17,7 @@
 
 enum { ACTS }; // own[]
 
-/// What a force has been told and has answered in the step at hand. The texts stay where they are to the end of the
+/// What a force was given and has answered in the step at hand. The texts stay where they are to the end of the
 /// program, as those of every law.
 typedef struct slot {
     char name[BT_MOST_LAW_NAME + 1];

@@ -165,7 +165,7 @@ static bt_status open_record(bt_record **out, const bt_comm *comm, const char *d
         create_series(r);
         create_events(r);
         bt_frames_create(&r->frames, &r->h5, comm, b);
-        status = bt_comm_agree(comm, r->h5.status); // what the others wrote is in the file: now it may be told
+        status = bt_comm_agree(comm, r->h5.status); // what the others wrote is in the file: now it may be announced
         if (status == BT_OK) {
             bt_h5_flush(&r->h5);
             status = bt_comm_agree(comm, r->h5.status);

@@ -225,7 +225,7 @@ bt_status bt_record_close(bt_record *r, const bt_run_totals *t, const bt_snapsho
 void bt_record_abandon(bt_record *r);
 
 /// Print the end-of-run table (summary and phases) on stdout. On rank 0, after the last sample and before the record is
-/// closed with the same t. What cannot be written or read back is told in err, and is the status of bt_record_close.
+/// closed with the same t. What cannot be written or read back is in err, and is the status of bt_record_close.
 void bt_record_print_summary(bt_record *r, const bt_run_totals *t, bt_errors *err);
 
 #endif

@@ -18,10 +18,10 @@
 
 #define CLOSURE_LIMIT 1e-6
 #define MOMENTUM_LIMIT 1e-9
-/// Overlap above this fraction of the mean floe size is told.
+/// Overlap above this fraction of the mean floe size is reported.
 #define OVERLAP_LIMIT 0.01
-/// Crush above this fraction of it is told: outlines stay as they were, and floes that have gone so far into each other
-/// part sideways.
+/// Crush above this fraction of it is reported: outlines stay as they were, and floes that have gone so far into each
+/// other part sideways.
 #define CRUSH_LIMIT 0.3
 
 static int ascending(const void *a, const void *b)

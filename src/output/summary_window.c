@@ -4,7 +4,7 @@
 
 #include <stdio.h>
 
-#define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is told
+#define SHARE_LIMIT 0.01 // of the floes that went round as they were, or are missing, above which it is reported
 
 void bt_summary_window_print(const bt_window *v)
 {

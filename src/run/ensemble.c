@@ -24,7 +24,7 @@
 // Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
 #define GATHER_SECONDS 1.0
 #define GATHER_SHARE 0.05
-enum { MOST_TOLD = 10 };    // failed members that are told one by one
+enum { MOST_REPORTED = 10 }; // failed members that are reported one by one
 
 typedef struct {
     bt_member m;
@@ -53,8 +53,8 @@ typedef struct {
 } ensemble;
 
 // A run has handlers of its own, which end it after a step; these are for the time between, and while it is set up.
-static volatile sig_atomic_t told;
-static void on_signal(int number) { told = number; }
+static volatile sig_atomic_t stop_signal;
+static void on_signal(int number) { stop_signal = number; }
 static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
 enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
@@ -133,7 +133,7 @@ static int check_member(ensemble *e, entry *x, bt_errors *told_of)
 
 static void print_warnings(bt_errors *list)
 {
-    const size_t more = list->n > MOST_TOLD ? list->n - MOST_TOLD : 0;
+    const size_t more = list->n > MOST_REPORTED ? list->n - MOST_REPORTED : 0;
     for (size_t k = 0; k < list->n - more; k++) fprintf(stderr, "bergtow: %s\n", list->text[k]);
     if (more) fprintf(stderr, "bergtow: warning: and %zu more members that are not sound; see journal.jsonl\n", more);
 }
@@ -238,7 +238,7 @@ static bt_status prepare_folder(const bt_study *s, const bt_ensemble_options *o,
     return status;
 }
 
-// --- dealing ---------------------------------------------------------------------------------------------------------
+// --- who does what ---------------------------------------------------------------------------------------------------
 
 static void say(const ensemble *e, const entry *x, bt_status status, double wall)
 {
@@ -266,13 +266,13 @@ static void say(const ensemble *e, const entry *x, bt_status status, double wall
     fflush(stdout);
 }
 
-/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is told of at the end,
+/// A member that has failed; where not even that can be recorded (a full disk) it stays open, is reported at the end,
 /// and is tried again by the next call.
 static void settle_failed(ensemble *e, entry *x, bt_status status, const bt_errors *why)
 {
     bt_errors unrecorded = {0};
     x->settled = true;
-    if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < MOST_TOLD)
+    if (bt_member_record_failure(x->folder, status, why, &unrecorded) != BT_OK && e->lost++ < MOST_REPORTED)
         bt_errors_add(e->err, "member %s failed (%d): %s; nor could that be recorded, so the next call tries it again",
                       x->m.name, (int)status, why->n ? why->text[0] : "no reason given");
     bt_errors_free(&unrecorded);
@@ -349,7 +349,7 @@ static bt_status run_or_go_on(const bt_comm *group, const bt_case *c, const bt_r
 }
 
 /// Make ensemble.h5. One process at a time does; wait: for its turn, or leave it to the one that is at it, as well as
-/// errors, which are told at the end.
+/// errors, which are reported at the end.
 static bt_status gather(ensemble *e, bool wait)
 {
     bt_status status = BT_OK;
@@ -396,7 +396,7 @@ static bt_status run_member(ensemble *e, entry *x)
                                   .dump_step = -1,
                                   .max_steps = e->o->max_steps,
                                   .max_wall = e->o->max_wall > 0 ? bt_max(1e-3, left_of_wall(e)) : 0,
-                                  .told = &told,
+                                  .stop_signal = &stop_signal,
                                   .command_line = e->o->command_line};
         if (status == BT_OK) status = run_or_go_on(e->group, &c, &o, &why);
         bt_case_free(&c);
@@ -426,7 +426,7 @@ static bt_status run_member(ensemble *e, entry *x)
 static bt_status work(ensemble *e)
 {
     for (;;) {
-        const bool stop = bt_comm_any(e->group, told != 0 || left_of_wall(e) <= 0);
+        const bool stop = bt_comm_any(e->group, stop_signal != 0 || left_of_wall(e) <= 0);
         if (stop) return BT_ERR_SIGNAL;
         int64_t i = e->group->rank == 0 ? claim(e) : 0;
         bt_comm_bcast(e->group, &i, sizeof i);
@@ -446,7 +446,7 @@ typedef struct {
     int64_t finished, failed, left, at_work, unsound;
 } counts;
 
-/// One member's part in the end: counted, and told where it is a hole.
+/// One member's part in the end: counted, and reported where it is a hole.
 static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *err)
 {
     int code;
@@ -458,7 +458,7 @@ static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *
                                 ? bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &damage)
                                 : BT_OK;
     if (sound != BT_OK) {
-        if (n->unsound++ < MOST_TOLD)
+        if (n->unsound++ < MOST_REPORTED)
             bt_errors_add(err, "member %s is not sound: %s; %s", x->m.name, damage.text[0],
                           sound == BT_ERR_IO ? "mend that, and call again" : "the same call runs it again");
         status = BT_ERR_IO;
@@ -467,7 +467,7 @@ static bt_status tell_member(ensemble *e, const entry *x, counts *n, bt_errors *
         if (bt_checkpoint_there(x->folder)) bt_checkpoint_remove(x->folder); // killed between the two
     } else if (state == BT_MEMBER_FAILED) {
         if (why) why[strcspn(why, "\n")] = 0;
-        if (n->failed++ < MOST_TOLD)
+        if (n->failed++ < MOST_REPORTED)
             bt_errors_add(err, "member %s failed (%d): %s", x->m.name, code, why ? why : "no reason recorded");
         status = code > 0 && code <= BT_ERR_NUMERIC ? (bt_status)code : BT_ERR_NUMERIC;
     } else {
@@ -495,11 +495,11 @@ static bt_status tell_end(ensemble *e, bt_status status, bt_errors *err)
         const bt_status of = tell_member(e, &e->list[i], &n, err);
         if (worst == BT_OK) worst = of;
     }
-    if (n.failed > MOST_TOLD)
-        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_TOLD,
+    if (n.failed > MOST_REPORTED)
+        bt_errors_add(err, "and %" PRId64 " more failed members; see %s/members/*/failed.txt", n.failed - MOST_REPORTED,
                       e->o->dir);
-    if (n.unsound > MOST_TOLD)
-        bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_TOLD);
+    if (n.unsound > MOST_REPORTED)
+        bt_errors_add(err, "and %" PRId64 " more members that are not sound", n.unsound - MOST_REPORTED);
     if (status == BT_ERR_SIGNAL)
         bt_errors_add(err, "stopped by %s; the same call goes on with the %" PRId64 " members that are left",
                       left_of_wall(e) <= 0 ? "the limit of wall time" : "a signal", n.left);
@@ -603,7 +603,7 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
     struct sigaction before[N_CAUGHT], act = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
     sigemptyset(&act.sa_mask);
-    told = 0;
+    stop_signal = 0;
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
     bool others = false;
     do {

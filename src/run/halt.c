@@ -40,7 +40,7 @@ void bt_halt_begin(bt_halt *h)
 
 void bt_halt_end(bt_halt *h)
 {
-    if (h->told && stop_signal) *h->told = stop_signal;
+    if (h->stop_signal && stop_signal) *h->stop_signal = stop_signal;
     for (int k = 0; k < BT_N_CAUGHT && !h->deaf; k++) sigaction(caught[k].number, &h->before[k], NULL);
 }
 
@@ -48,7 +48,7 @@ uint64_t bt_halt_look(bt_halt *h, int64_t step)
 {
     uint64_t bits = 0;
     if (stop_signal) bits |= UINT64_C(1) << stop_signal;
-    else if (h->told && *h->told) bits |= UINT64_C(1) << *h->told;
+    else if (h->stop_signal && *h->stop_signal) bits |= UINT64_C(1) << *h->stop_signal;
     if (save_signal) {
         save_signal = 0;
         bits |= save;

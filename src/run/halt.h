@@ -24,7 +24,7 @@ typedef struct bt_halt {
     double wall, max_wall;  ///< s between checkpoints, until the stop; 0 = none
     double started;         ///< bt_clock when the call began
     const char *dir;        ///< NULL = none
-    volatile sig_atomic_t *told; ///< of the caller (bergtow/run.h), or NULL
+    volatile sig_atomic_t *stop_signal; ///< of the caller (bergtow/run.h), or NULL
     bool deaf;              ///< signals are the caller's: none is caught
     bool first;             ///< this is rank 0
     // state

@@ -87,7 +87,7 @@ static inline bool bt_running_draws(const bt_case *c) { return c->output.frame_i
 bt_status bt_running_load_case(bt_case *c, bt_snapshot *s, bt_errors *err);
 bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s);
 
-/// Collective. State of the world and counters of the run, into a world that was set up; deals it to the ranks.
+/// Collective. State of the world and counters of the run, into a world that was set up; distributes it over the ranks.
 bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
 
 // --- going on --------------------------------------------------------------------------------------------------------

@@ -193,7 +193,7 @@ bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c,
                         .wall = c->output.checkpoint_wall,
                         .max_wall = o->max_wall,
                         .dir = o->dir,
-                        .told = o->told,
+                        .stop_signal = o->stop_signal,
                         .deaf = o->leave_signals,
                         .first = comm->rank == 0,
                         .started = m->start};
@@ -277,7 +277,7 @@ bt_status bt_running_step(bt_running *r, bt_errors *err)
     bt_observe(w, r->reference_speed, s);
     bt_stall_step(&r->totals.stall, w, r->roster.mean_size);
     const bt_status sound = w->forces->failed ? tell_failed(w->forces, err) : bt_guard_check(&r->guard, w, s, err);
-    // what is not has been told, and the series hold numbers only
+    // what is not has been reported, and the series hold numbers only
     const bool writable = !bt_sample_fault(s, bt_observe_applies(w));
     if (status == BT_OK && r->record && writable) status = bt_record_sample(r->record, s, err);
     if (status == BT_OK && r->record) status = bt_record_events(r->record, &w->events, err);

@@ -33,7 +33,7 @@ static char *last_error;
 const char *bt_last_error(void) { return last_error ? last_error : ""; }
 
 /// Keep and release the texts of a call; the status goes through.
-static bt_status told(bt_status status, bt_errors *err)
+static bt_status reported(bt_status status, bt_errors *err)
 {
     bt_comm_errors(bt_comm_world(), err);
     if (status != BT_OK || err->n > 0) {
@@ -51,7 +51,7 @@ static bt_status refuse(const char *why)
 {
     bt_errors err = {0};
     bt_errors_add(&err, "%s", why);
-    return told(BT_ERR_USAGE, &err);
+    return reported(BT_ERR_USAGE, &err);
 }
 
 // --- begin, steps, end -----------------------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ static bt_status hand_out(bt_simulation **out, bt_simulation *s, bt_status statu
 {
     *out = status == BT_OK ? s : NULL;
     if (status != BT_OK) release(s);
-    return told(status, err);
+    return reported(status, err);
 }
 
 bt_status bt_simulation_create(bt_simulation **out, const bt_simulation_options *o)
@@ -164,7 +164,7 @@ bt_status bt_simulation_step(bt_simulation *s, int64_t n)
         bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)s->r.w->step);
         s->status = BT_ERR_SIGNAL;
     }
-    return told(s->status, &err);
+    return reported(s->status, &err);
 }
 
 bt_status bt_simulation_end(bt_simulation *s)
@@ -174,7 +174,7 @@ bt_status bt_simulation_end(bt_simulation *s)
     if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
     status = bt_running_end(&s->r, status, &err);
     release(s);
-    return told(status, &err);
+    return reported(status, &err);
 }
 
 void bt_simulation_drop(bt_simulation *s)
@@ -191,7 +191,7 @@ bt_status bt_simulation_checkpoint(bt_simulation *s)
     bt_errors err = {0};
     if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    return told(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
+    return reported(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
 }
 
 bt_status bt_simulation_frame(bt_simulation *s)
@@ -199,7 +199,7 @@ bt_status bt_simulation_frame(bt_simulation *s)
     bt_errors err = {0};
     if (!s->dir) return refuse("there is no folder for a frame; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    return told(bt_running_frame(&s->r, &err), &err);
+    return reported(bt_running_frame(&s->r, &err), &err);
 }
 
 int64_t bt_simulation_steps(const bt_simulation *s) { return s->r.w->step; }
@@ -273,7 +273,7 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
 bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate)
 {
     bt_errors err = {0};
-    return told(bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
+    return reported(bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
 static bool is_outside(double x, double low, double length) { return x < low || x > low + length; }
@@ -286,9 +286,9 @@ bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double
     if (is_outside(x, p->x0, length) || is_outside(y, p->y0, width)) {
         bt_errors_add(&err, "body %lld: (%g, %g) m is outside of the domain, %g x %g m from (%g, %g)", (long long)id, x,
                       y, length, width, p->x0, p->y0);
-        return told(BT_ERR_USAGE, &err);
+        return reported(BT_ERR_USAGE, &err);
     }
-    return told(bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err), &err);
+    return reported(bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err), &err);
 }
 
 // --- numbers and contacts --------------------------------------------------------------------------------------------
@@ -300,7 +300,7 @@ bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, doubl
     if (!q) {
         bt_errors err = {0};
         bt_errors_add(&err, "%s: there is no series of this name; see bergtow --list-quantities", name);
-        return told(BT_ERR_USAGE, &err);
+        return reported(BT_ERR_USAGE, &err);
     }
     if (s->r.w->step > s->r.first_step) *value = bt_sample_value(&s->r.sample, q);
     return BT_OK;
@@ -344,7 +344,7 @@ bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved)
     const bt_status status = read_case(&c, o, &err);
     *resolved = status == BT_OK ? bt_case_resolved(&c) : NULL;
     bt_case_free(&c);
-    return told(status, &err);
+    return reported(status, &err);
 }
 
 char *bt_list_json(const char *what)

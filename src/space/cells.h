@@ -159,7 +159,7 @@ typedef struct bt_share {
 
 enum { BT_FEW_CELLS = 64 }; ///< fewer are done by one thread: a team costs microseconds
 
-enum { BT_AWAKE, BT_ASLEEP_NEW, BT_ASLEEP }; ///< at rest since the last step; and forces have been told
+enum { BT_AWAKE, BT_ASLEEP_NEW, BT_ASLEEP }; ///< at rest since the last step; and the forces have been informed
 
 typedef struct bt_cells {
     bool labelled;                  ///< labels and storage order are valid

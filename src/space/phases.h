@@ -50,7 +50,7 @@ typedef void bt_visit(bt_world *w, bt_idx cell, const void *context, bt_totals *
 /// been made.
 void bt_phases_order(bt_world *w);
 
-/// Deal the cells to threads by the contacts that are listed in them. No result depends on it.
+/// Assign the cells to threads by the contacts that are listed in them. No result depends on it.
 void bt_phases_distribute(bt_world *w);
 
 /// Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at

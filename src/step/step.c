@@ -101,7 +101,7 @@ static void advance(bt_world *w)
         if (!last) farthest = bt_max(farthest, path);
         if (!moves || last) continue;
         if (!calm || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
-        // where forces have been told, they would find what they found
+        // where forces have been informed, they would find what they found
         else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
     }
     ts->moved_any += farthest;
