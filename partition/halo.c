@@ -2,9 +2,9 @@
 // What ranks exchange: velocities of shared bodies after each phase, values of cells, and what only some of them know.
 //
 // Lists. A body of cell t is touched in phase p by one cell, T_p(t), whose rank sends its velocity to all others that
-// hold t. Both sides go through the cells they hold in the same order, so they make the same lists without a word. Of
-// these bodies few have a contact in a given step: after the detection the sender says which (one byte each), and only
-// those travel in the sweeps.
+// hold t. Both sides go through the cells they hold in the same order, so they make the same lists without
+// communication. Of these bodies few have a contact in a given step: after the detection the sender says which (one
+// byte each), and only those travel in the sweeps.
 #include <stdlib.h>
 #include <string.h>
 

@@ -7,7 +7,7 @@
 //     bt_simulation_end(s);
 //
 // The steps are those of `bergtow run`: the same begin, step and end, the same guards, and with a folder the same
-// files. A simulation that nobody interferes with has the state hash of the command.
+// files. A simulation that is only stepped has the state hash of the command.
 //
 // Errors. Whatever can fail returns a bt_status; bt_last_error has the texts, one a line, each with the reason and the
 // remedy. No call ends the program, with two exceptions that leave nothing to return to: memory that runs out
@@ -72,7 +72,7 @@ bt_status bt_simulation_step(bt_simulation *s, int64_t n);
 /// a step, and BT_ERR_SIGNAL for a simulation that was asked to stop and whose files are complete.
 bt_status bt_simulation_end(bt_simulation *s);
 
-/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is let through.
+/// Free s without summary and checkpoint; what the folder holds by now stays. NULL is ignored.
 void bt_simulation_drop(bt_simulation *s);
 
 /// A frame of the bodies as they are now, beside those of output.frame_interval; nothing where this state has one.
@@ -120,7 +120,7 @@ bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, doubl
 int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room);
 
 /// Give a body another velocity, m/s, rad/s. Errors: BT_ERR_USAGE for no such body, one whose velocity is prescribed or
-/// that never moves, a number that is none.
+/// that never moves, NaN or infinity.
 bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate);
 
 /// Put a body elsewhere, m, m, rad. Errors: BT_ERR_USAGE as above, for the towed body (its line or course would break),
@@ -131,7 +131,7 @@ bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double
 
 /// A number of the last step by the name of its series (bergtow --list-quantities): "ice_resistance", "drag_force",
 /// "line_tension", those that were added. NaN before the first step, and where it does not apply. Under MPI those of
-/// collisions are on rank 0. Errors: BT_ERR_USAGE for a name that is none.
+/// collisions are on rank 0. Errors: BT_ERR_USAGE for an unknown name.
 bt_status bt_simulation_quantity(const bt_simulation *s, const char *name, double *value);
 
 /// Columns of a contact: ids of the bodies; number of points, 1 or 2 (0: floes over each other, whose impulse along x

@@ -107,7 +107,7 @@ typedef struct bt_bodies {
     uint8_t *motion;      ///< [n] bt_motion
     uint8_t *large;       ///< [n] 1 = in no cell
     /// [n] 1 = new, or moved by the position projection in the last step: not at rest whatever its velocity. To be set
-    /// by whoever changes a pose or velocity by hand
+    /// by code that changes a pose or velocity itself
     uint8_t *disturbed;
     int32_t (*cell)[2];   ///< [n] coordinates of its cell, see cells.h
     bt_home *home;        ///< [n]

@@ -61,7 +61,7 @@ static const char *missing(void) { return NULL; }
 
 static void say(const char *text)
 {
-    if (write(STDERR_FILENO, text, strlen(text)) < 0) return; // nobody listens
+    if (write(STDERR_FILENO, text, strlen(text)) < 0) return; // stderr is closed
 }
 
 void bt_processor_check(void)

@@ -68,7 +68,7 @@ char *bt_file_join(const char *dir, const char *name)
     return bt_text_of("%s%s%s", dir, n && dir[n - 1] == '/' ? "" : "/", name);
 }
 
-/// A descriptor that this process was given, as the shell's pipes are: opening it waits for nobody.
+/// A descriptor that this process was given, as the shell's pipes are: opening it does not block.
 static bool is_own_descriptor(const char *path)
 {
     return !strcmp(path, "/dev/stdin") || !strncmp(path, "/dev/fd/", 8) || !strncmp(path, "/proc/self/fd/", 14);
@@ -81,7 +81,7 @@ static const char *kind_of(mode_t mode)
     return S_ISDIR(mode) ? "a folder" : S_ISFIFO(mode) ? "a pipe (FIFO)" : S_ISSOCK(mode) ? "a socket" : "a device";
 }
 
-/// text: as bt_file_read_to and bt_file_read word it; streams: pipes of one's own are let through.
+/// text: as bt_file_read_to and bt_file_read word it; streams: pipes that this process was given are accepted.
 static int open_input(const char *path, const char *what, bool text, bool streams, bt_errors *err)
 {
     // Looked at before it is opened, since to open some devices does something to them, and after, since the name may
@@ -169,7 +169,7 @@ bt_status bt_file_write(const char *path, const char *text, bt_errors *err)
     char *temporary = bt_alloc(size, 1);
     snprintf(temporary, size, "%s.tmp", path);
 
-    // A link of the temporary name, whoever made it, must not lead the text elsewhere; nor does one of the right name,
+    // A link of the temporary name must not lead the text elsewhere; nor does one of the right name,
     // which the rename replaces.
     unlink(temporary);
     const int fd = (int)TEMP_FAILURE_RETRY(open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));

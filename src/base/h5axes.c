@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a dataset holds, for programs that know nothing of this one.
+// What a dataset holds, for programs that do not know this one.
 #include "base/h5axes.h"
 
 #include <hdf5_hl.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What a dataset holds, for programs that know nothing of this one: units, a name to print, and the name of each axis.
+// What a dataset holds, for programs that do not know this one: units, a name to print, and the name of each axis.
 //
 // Axes are HDF5 dimension scales [HDF5 Dimension Scale Specification], as netCDF-4 writes and reads them: an axis is
 // the one-dimensional dataset of its name beside the dataset or in the root group (time, member), its coordinate; where

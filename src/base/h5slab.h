@@ -32,7 +32,7 @@ bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k);
 void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows);
 void bt_slab_close(bt_slab *s);
 
-/// Rows one after the other by way of a buffer of at most BT_SLAB_BYTES, so that nobody needs them all at once.
+/// Rows one after the other by way of a buffer of at most BT_SLAB_BYTES, so that no rank holds them all at once.
 #define BT_SLAB_BYTES ((size_t)1 << 20)
 
 typedef struct bt_rows {

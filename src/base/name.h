@@ -5,7 +5,7 @@
 
 #include <stdbool.h>
 
-enum { BT_MOST_LAW_NAME = 40 }; ///< characters: of its series, which go on with a word, 48 fit
+enum { BT_MOST_LAW_NAME = 40 }; ///< characters: the names of its series append a word to it, and 48 fit
 
 /// Lower-case letters, digits and _, beginning with no digit, at most `most` of them.
 bool bt_is_name(const char *s, int most);

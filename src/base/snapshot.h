@@ -3,7 +3,7 @@
 //
 // Saving, loading, comparing, sharing among ranks and the file all go through this one form, so that none of them knows
 // what the arrays mean. Names are "group/name". Groups `about` and `clock` say where a state comes from and how long it
-// took: they are no part of it, and are not compared.
+// took: they are not part of it, and are not compared.
 #ifndef BT_SNAPSHOT_H
 #define BT_SNAPSHOT_H
 

@@ -27,8 +27,8 @@ typedef enum {
 #define BT_WHY 320
 
 /// Read the whole text as a number with an optional unit of this kind, in SI (angles in radians). Refused: a unit of
-/// another kind, text after the number that is no unit, hexadecimal, NaN, infinity, overflow. On refusal why says the
-/// reason and the remedy.
+/// another kind, text after the number that is not a unit, hexadecimal, NaN, infinity, overflow. On refusal why says
+/// the reason and the remedy.
 bool bt_units_parse(const char *text, bt_unit kind, double *value, char why[BT_WHY]);
 
 /// Shortest decimal form, at most 17 digits, that reads back to the same bits, with the unit: "0.1 s", "nan" as "none".

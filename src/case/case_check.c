@@ -245,8 +245,8 @@ static void check_sizes(const check *k)
                        BT_MOST_FLOES);
 }
 
-// The defaults of ice and body are those of a model basin. At full scale a number that nobody gave would look like an
-// answer.
+// The defaults of ice and body are those of a model basin. At full scale a number that the user did not give would look
+// like an answer.
 static void check_geographic(const check *k)
 {
     const bt_case *c = k->c;

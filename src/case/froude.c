@@ -59,7 +59,7 @@ static void scale_real(const bt_case *c, const bt_key *k, double *v, double rati
 {
     // A negative start of the window means that it is looked for.
     const bool found = !strcmp(k->name, "output.window_start") || !strcmp(k->name, "output.frame_interval");
-    if (isnan(*v) || (found && *v < 0)) return; // no time, but a word for one
+    if (isnan(*v) || (found && *v < 0)) return; // a word such as auto, not a time
     *v *= factor(k, ratio);
     bt_range r;
     bt_value_range(k, &r);

@@ -382,12 +382,12 @@ bt_key bt_case_keys[] = {
          "approach below this speed has no restitution, assumed"),
 
     REAL("guard.overlap", guard.overlap, RATIO, "1", "[0, 100]",
-         "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = any is let through; assumed"),
+         "overlap of two bodies / mean floe size that ends the run with exit code 5, 0 = no limit; assumed"),
     REAL("guard.energy", guard.energy, NONE, "1e4", "[0, 1e12]",
          "kinetic energy of all bodies / that at the start and at the speeds that tow, walls, current, wind and slope "
-         "can drive them to, that ends the run; 0 = any is let through; assumed"),
+         "can drive them to, that ends the run; 0 = no limit; assumed"),
     INT("guard.unconverged", guard.unconverged, "10000", "[0, 1e9]",
-        "steps in a row without convergence that end the run, 0 = any number is let through; assumed"),
+        "steps in a row without convergence that end the run, 0 = no limit; assumed"),
     BOOL("guard.escape", guard.escape, "true", "a floe or the towed body beyond a wall of the domain ends the run"),
 
     CHOICE("impact.conversion", impact.conversion, conversions, "duration",

@@ -10,7 +10,7 @@
 //     /case             the resolved case the field was made from
 // A reader trusts nothing: the file may be cut off, damaged, or made by hand. What this program wrote carries a
 // checksum (checksum.h): of such a file any damage is refused before HDF5, which crashes on some, reads a byte. A file
-// without one, made by h5py say, is let through to the checks of its values; what damage does to HDF5 itself it cannot
+// without one, made by h5py say, is passed on to the checks of its values; what damage does to HDF5 itself it cannot
 // be kept from.
 #include <errno.h>
 #include <hdf5.h>

@@ -46,7 +46,7 @@ typedef enum { DEGREES, PLANE, FRAME } coordinates;
 /// All coordinates of a file, as they stand there.
 typedef struct survey {
     double low[3], high[3]; ///< first, second, first from 0° on
-    size_t feature;         ///< the first that is no place in degrees; SIZE_MAX: none
+    size_t feature;         ///< the first that is not a place in degrees; SIZE_MAX: none
     double odd[2];          ///< its vertex
 } survey;
 
@@ -95,7 +95,7 @@ static const json_t *ring_of(const json_t *feature, const char **why)
     }
     const json_t *ring = json_array_get(polygon, 0);
     if (!json_is_array(ring))
-        *why = "its coordinates are no list of rings; write [[[east, north], [east, north], ...]]";
+        *why = "its coordinates are not a list of rings; write [[[east, north], [east, north], ...]]";
     else if (json_array_size(ring) > BT_MOST_RING) *why = "it has more than 10000 vertices; simplify it";
     else return ring;
     return NULL;
@@ -166,7 +166,7 @@ static void take_origin(const json_t *mark, double origin[2])
     origin[1] = json_number_value(y);
 }
 
-/// Degrees that are none, or that are latitude before longitude; and the place of x = y = 0: the case's, that of the
+/// Degrees out of range, or latitude before longitude; and the place of x = y = 0: the case's, that of the
 /// file's mark, or the middle of all coordinates. Rings that lie on both sides of 180° would have it on the wrong side
 /// of the earth: they are taken with longitudes from 0° to 360° when that makes the box smaller.
 static void begin_degrees(reader *s, bt_features *features, const json_t *mark)

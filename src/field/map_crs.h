@@ -9,7 +9,7 @@ typedef enum {
     BT_MAP_DEGREES, ///< longitude, latitude
     BT_MAP_PLANE,   ///< metres east and north of a projection
     BT_MAP_LOCAL,   ///< metres east and north of x = y = 0 of a case: BT_MAP_LOCAL_NAME
-    BT_MAP_WARPED,  ///< metres that are none on the ground
+    BT_MAP_WARPED,  ///< metres of the projection, not of the ground
     BT_MAP_UNKNOWN,
 } bt_map_kind;
 

@@ -48,8 +48,9 @@ static bool add_keys(const bt_force_law *law, bt_errors *err)
     return bt_keys_add(law->name, law->keys, law->n_keys, err);
 }
 
-/// Keys and series of the laws of the program, before main: whoever looks at the tables finds them complete. The first
-/// of all constructors (the least priority that programs may have), so that one of another file can register its laws.
+/// Keys and series of the laws of the program, before main, so that every reader of the tables finds them complete. The
+/// first of all constructors (the least priority that programs may have), so that one of another file can register its
+/// laws.
 __attribute__((constructor(101))) static void begin(void)
 {
     bt_errors err = {0};

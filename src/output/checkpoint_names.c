@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What each array of a checkpoint is, for whoever opens the file.
+// What each array of a checkpoint is, for readers of the file.
 #include "output/checkpoint_names.h"
 
 #include <string.h>

@@ -101,7 +101,7 @@ static void write_bodies(bt_frames *f, const bt_record_bodies *b)
     const bool last = f->comm->rank == f->comm->size - 1;
     if (bt_slab_share(f->comm, all, N) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
-        // An empty block of floes still has the 0 of the offsets to write if nobody is before it.
+        // An empty block of floes still has the 0 of the offsets to write if it is the first rank.
         if (f->own_floes > 0 || (last && f->n_floes == 0))
             write_outlines(&o[0], b, 0, f->own_floes, f->first, f->vertices_before, buffer);
         if (last) write_outlines(&o[1], b, f->own_floes, f->own_others, 0, 0, buffer);

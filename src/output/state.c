@@ -356,7 +356,7 @@ static bool all_finite(const double *x, int64_t n)
     return true;
 }
 
-/// The first row that is no number.
+/// The first row with a NaN or an infinity.
 static const char *rows_not_finite(const char *group, const bt_state_row *row, int n_rows, const void *base,
                                    char name[64])
 {

@@ -18,7 +18,7 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
 /// another version), BT_ERR_NUMERIC (the state does not have the hash it was saved with).
 bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors *err);
 
-/// The first number of world, step, tow, window and collisions that is none, by its name in a checkpoint
+/// The first number of world, step, tow, window and collisions that is NaN or infinite, by its name in a checkpoint
 /// ("tow/vessel_vx"); NULL = all are numbers. Those of the bodies are not looked at.
 const char *bt_state_not_finite(const bt_world *w, char name[64]);
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Guards of a run: what no sound run does ends it with exit code 5 and the state before the step, instead of a result
-// nobody should use.
+// Guards of a run: a state that no sound run reaches ends the run with exit code 5, and with the state before the step
+// in place of a result that must not be used.
 //
 //     guard.overlap       deepest overlap of two bodies / mean floe size
 //     guard.energy        kinetic energy of all bodies / the energy that the scene can drive them to
 //     guard.unconverged   steps in a row that met the sweep limit
 //     guard.escape        a body whose centroid is beyond a wall
-// and, always, a number that is none, or a number where there can be none: in poses and velocities, in tow, window and
+// and, always, NaN or infinity, or a number where there must be NaN: in poses and velocities, in tow, window and
 // collisions, in what the series take (bt_sample_fault). 0 or false switches the others off. The limits are assumed:
 // far beyond what a run with warnings shows (overlap of 30 % of a floe, 1,000 unconverged steps in a jam), and short of
 // what happens before numbers overflow.

@@ -55,7 +55,7 @@ typedef struct bt_run_manner {
 bt_status bt_running_begin(bt_running *r, const bt_comm *comm, const bt_case *c, const bt_run_options *o,
                            bt_run_manner *m, bt_errors *err);
 
-/// Is a step left, and has nobody asked to stop?
+/// Is a step left, and has no stop been asked for?
 bool bt_running_goes_on(const bt_running *r);
 
 /// Collective. One step, observed, guarded and recorded; frame and checkpoint when they are due.

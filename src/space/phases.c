@@ -138,7 +138,7 @@ static void run_phases(pass *o, bt_vel *exchanged)
             }
         }
         if (t->start[p] + t->n_border[p] < t->start[p + 1]) visit_stretch(o, 2 * p + 1);
-        else if (!among) continue; // nobody was here
+        else if (!among) continue; // no other cell was here
         if (among && exchanged) {
 #pragma omp master
             w->exchange->receive(w, p, exchanged);

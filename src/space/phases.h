@@ -55,7 +55,7 @@ void bt_phases_distribute(bt_world *w);
 
 /// Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at
 /// once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date
-/// on all ranks, while cells that nobody waits for are still worked on. Collective.
+/// on all ranks, while the other cells are still worked on. Collective.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
 
 /// Visit the cells with work in any order, all at once.

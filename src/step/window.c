@@ -236,9 +236,9 @@ static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t 
     }
 }
 
-/// Collective. Which candidates stay: those whose place is held by a body that is no candidate, then those whose place
-/// is held by one of these, and so on; what is left can go all at once. Each round, all that it can tell: the order of
-/// nothing matters.
+/// Collective. Which candidates stay: those whose place is held by a body that is not a candidate, then those whose
+/// place is held by one of these, and so on; what is left can go all at once. Each round, all that it can tell: the
+/// order of nothing matters.
 static void settle_places(const bt_world *w, candidate *list, size_t n, const shapes *shape)
 {
     const bt_bodies *b = &w->bodies;
