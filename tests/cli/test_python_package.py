@@ -535,7 +535,8 @@ def test_ctrl_c_stops_an_ensemble_that_goes_on(tmp_path):
     path = study(tmp_path, set={"run.duration": 50, "output.window_start": 20})
     script = (f"import sys; sys.path.insert(0, {str(ROOT / 'postproc')!r}); import bergtow; "
               f"bergtow.Ensemble.run({str(path)!r}, {str(tmp_path / 'out')!r})")
-    p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    p = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))  # a shell's & ignores it
     end = time.monotonic() + 60
     while not list(tmp_path.glob("out/members/*/result.part.h5")) and time.monotonic() < end:
         time.sleep(0.02)
