@@ -215,7 +215,7 @@ DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
 DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
              chromium chromium-driver ffmpeg poppler-utils python3-hypothesis python3-xarray python3-h5netcdf \
              python3-netcdf4 python3-pip python3-setuptools python3-wheel python3-gdal gdal-bin python3-pyproj \
-             python3-shapely $(DEPS_DOCS)
+             python3-shapely python3-distributed $(DEPS_DOCS)
 
 # SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
 SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'

@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # Launchers of every kind, from a Slurm of one node that lives as long as this script: srun with PMIx for Open MPI, with
-# PMI2 for MPICH, each MPI's own mpirun, and each MPI under the launcher of the other, which has to be refused.
+# PMI2 for MPICH, each MPI's own mpirun, and each MPI under the launcher of the other, which has to be refused; and a
+# study as an array of jobs.
 #
 #     tests/slurm.sh [FOLDER]      as root, who alone may start slurmd; FOLDER takes what is built with MPICH, and logs
 #
@@ -129,5 +130,34 @@ threads "cores for all ranks" $((cores / 2)) mpirun.openmpi --bind-to none --ove
 threads "cores for each rank" 1 mpirun.openmpi --bind-to core --oversubscribe -n 2 "$openmpi"
 threads "srun, one core a task" 1 srun -n 2 -c 1 --mpi=pmix "$openmpi"
 threads "one task, all cores" "$cores" srun -n 1 -c "$cores" --mpi=pmix "$openmpi"
+
+# --- A study as an array of jobs -------------------------------------------------------------------------------------
+
+# ensemble.h5 of an array, of which one task is cancelled in the middle of a member and another comes too late for any,
+# is that of one call.
+cat >"$folder/study.yml" <<END
+base: $PWD/cases/basin/basin-80.yml
+repeats: 3
+parameters: {tow.speed: [0.1, 0.2]}
+set: {run.duration: 20, output.window_start: 10, output.checkpoint_steps: 50}
+END
+rm -rf "$folder/alone" "$folder/array"
+"$openmpi" ensemble "$folder/study.yml" -o "$folder/alone" --threads 1 --quiet
+export BERGTOW=$openmpi STUDY=$folder/study.yml OUT=$folder/array
+job=$(sbatch --parsable --array=1-3 --output="$folder/array-%a.txt" cases/studies/slurm-array.sh)
+for _ in {1..600}; do compgen -G "$OUT/members/*/checkpoint.h5" >/dev/null && break; sleep 0.1; done
+scancel "${job}_1"
+for _ in {1..600}; do [ -z "$(squeue -h -j "$job")" ] && break; sleep 0.5; done
+finished=$(find "$OUT/members" -name finished | wc -l)
+echo "array: $finished members finished by the tasks that were left"
+[ "$finished" = 6 ]
+count $?
+"$openmpi" ensemble "$STUDY" -o "$OUT" --threads 1 --quiet
+count $?
+differing=$(PYTHONPATH=tests ${PYTHON:-/usr/bin/python3} -c "import sys, harness; print(harness.differing(*sys.argv[1:]))" \
+  "$folder/alone/ensemble.h5" "$OUT/ensemble.h5")
+echo "array: differs in $differing"
+[ "$differing" = "[]" ]
+count $?
 echo "$passed passed, $failed failed"
 [ $failed = 0 ]

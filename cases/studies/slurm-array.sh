@@ -9,5 +9,5 @@
 #SBATCH --time=12:00:00
 #SBATCH --signal=B:TERM@120
 set -eu
-exec build/release/bergtow ensemble "${STUDY:-cases/studies/fullscale.yml}" -o "${OUT:-out/fullscale}" \
+exec "${BERGTOW:-build/release/bergtow}" ensemble "${STUDY:-cases/studies/fullscale.yml}" -o "${OUT:-out/fullscale}" \
     --threads "$SLURM_CPUS_PER_TASK" --no-wait

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from . import _library
 from ._library import IO, OK, BergtowError
+from .engines import on_workers
 from .pictures import plot_ensemble, report, statistics
 from .results import Result, _imported, _text, _wrapper
 
@@ -53,17 +54,25 @@ class Ensemble:
                                IO)
 
     @classmethod
-    def run(cls, study, out, *, overrides=None, threads=0, retry_failed=False, progress=True):
-        """Run the members of a study that are open, one process for all cores, and return the Ensemble.
+    def run(cls, study, out, *, overrides=None, threads=0, retry_failed=False, progress=True, client=None, tasks=0):
+        """Run the members of a study that are open, and return the Ensemble.
 
         out: the folder, made or gone on with. overrides: {key: value} for all members. progress: print a line for each
         member. Ctrl-C stops it as `bergtow ensemble` stops: with checkpoints, to be gone on with. Errors: BergtowError
         with the messages of the program; also where a member has failed, and the others are finished.
+
+        client: a dask.distributed.Client whose workers see the same folders and the same program; without one it is one
+        process for all cores here. tasks: how many calls of the program share the members, of `threads` (1) each;
+        default as many as the workers have threads for. A worker that dies costs what its members computed since their
+        last checkpoint: another task goes on with them, or the last call, which is made here.
         """
-        command = [program_path(), "ensemble", os.fspath(study), "-o", os.fspath(out)]
+        command = [program_path(), "ensemble", os.path.abspath(study), "-o", os.path.abspath(out)]
         command += [word for key, value in (overrides or {}).items() for word in ("--set", f"{key}={value}")]
-        command += ["--threads", str(threads)] if threads else []
         command += ["--retry-failed"] if retry_failed else []
+        if client is not None:
+            on_workers(client, [*command, "--threads", str(threads or 1), "--no-wait"], out, tasks, threads, progress)
+            command = [word for word in command if word != "--retry-failed"]
+        command += ["--threads", str(threads)] if threads else []
         # a group of its own: a Ctrl-C comes here, and reaches the program once
         with tempfile.TemporaryFile("w+") as errors:
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True,
