@@ -154,8 +154,8 @@ echo "array: $finished members finished by the tasks that were left"
 count $?
 "$openmpi" ensemble "$STUDY" -o "$OUT" --threads 1 --quiet
 count $?
-differing=$(PYTHONPATH=tests ${PYTHON:-/usr/bin/python3} -c "import sys, harness; print(harness.differing(*sys.argv[1:]))" \
-  "$folder/alone/ensemble.h5" "$OUT/ensemble.h5")
+differing=$(PYTHONPATH=tests ${PYTHON:-/usr/bin/python3} -c \
+  "import sys, harness; print(harness.differing(*sys.argv[1:]))" "$folder/alone/ensemble.h5" "$OUT/ensemble.h5")
 echo "array: differs in $differing"
 [ "$differing" = "[]" ]
 count $?
