@@ -36,7 +36,8 @@ static inline bt_record_bodies bodies(void)
             vertices[v][1] = (i + 1) * sin(a);
         }
     return (bt_record_bodies){.n_floes = FLOES, .n_bodies = BODIES, .offsets = offsets, .vertices = &vertices[0][0],
-                              .thickness = thickness, .area = area, .names = names, .towed = FLOES};
+                              .thickness = thickness, .area = area, .names = names, .towed = FLOES,
+                              .branches = 2};
 }
 
 static inline bt_case made_up_case(void)
@@ -118,8 +119,11 @@ static inline bt_status record_frame(bt_record *r, int k, bt_errors *err)
                                  .y = pose[i][1],
                                  .yaw = pose[i][2],
                                  .contact_force = i < FLOES ? force[i] : -1,
-                                 .speed = speed[i]};
-    return bt_record_frame(r, 0.5 * k, rows, err);
+                                 .speed = speed[i],
+                                 .vx = 0.6 * speed[i],
+                                 .vy = -0.8 * speed[i]};
+    const bt_frame_line line = {{{{1, 2}, {3 + k, 4}}, {{5, 6}, {7, 8 + k}}}, {100 + k, 200}};
+    return bt_record_frame(r, 0.5 * k, rows, &line, err);
 }
 
 static bool print_summary;

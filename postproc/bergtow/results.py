@@ -77,7 +77,7 @@ def _wrapper(xarray):
         def __init__(self, dataset, column, part):
             self.dataset, self.column, self.part = dataset, column, part
             shape = dataset.shape if column is None else dataset.shape[:-1]
-            self.shape = shape if part is None else (*shape[:-1], part.stop - part.start)
+            self.shape = shape if part is None else (shape[0], part.stop - part.start, *shape[2:])
             self.dtype = dataset.dtype
 
         def __getitem__(self, key):
@@ -86,14 +86,13 @@ def _wrapper(xarray):
 
         def _get(self, key):
             if self.part is not None:
-                *first, last = key
-                key = (*first, self._moved(last))
+                key = (key[0], self._moved(key[1]), *key[2:])
             return self.dataset[key if self.column is None else (*key, self.column)]
 
         def _moved(self, key):
-            """An index into the part, as one into the dataset."""
+            """An index into the part of the second axis, as one into the dataset."""
             if isinstance(key, slice):
-                start, stop, step = key.indices(self.shape[-1])
+                start, stop, step = key.indices(self.shape[1])
                 return slice(start + self.part.start, max(stop, 0) + self.part.start, step)
             return key + self.part.start
 
@@ -173,9 +172,13 @@ def open_result(folder):
             for k, (axis, units, words) in enumerate(_POSE):
                 put(f"{of}_{axis}", ("frame", of), frames[data], k, None, units, words)
         put("floe_contact_force", ("frame", "floe"), frames["contact_force"])
-        if "speed" in frames:
-            for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames["speed"].shape[1]))):
-                put(f"{of}_speed", ("frame", of), frames["speed"], None, part, long_name="speed of the centroid")
+        for name in {"speed", "velocity"} & set(frames):
+            for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames[name].shape[1]))):
+                dims = ("frame", of, "xy")[:frames[name].ndim]
+                put(f"{of}_{name}", dims, frames[name], None, part, long_name=f"{name} of the centroid")
+        if "line_points" in frames:
+            put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
+            put("branch_tension", ("frame", "branch"), frames["line_tension"])
     if any("xy" in v.dims for v in variables.values()):
         variables["xy"] = xarray.Variable(("xy",), ["x", "y"])
     attributes = {name: _text(value) for name, value in file.attrs.items()}

@@ -86,6 +86,21 @@ static void write_outlines(outlines *o, const bt_record_bodies *b, int64_t from,
     bt_rows_end(&r);
 }
 
+/// The ids of the floes, their rows: ParaView numbers the cells of a selection anew.
+static void write_ids(bt_frames *f)
+{
+    bt_slab ids = bt_slab_fixed(f->h, "/xdmf/floe_id", H5T_NATIVE_INT32, f->n_floes, 0, true);
+    bt_h5_describe(f->h, "/xdmf/floe_id", "floe", "1", "id of each floe");
+    if (bt_slab_share(f->comm, (bt_slab *const[]){&ids}, 1) == BT_OK) {
+        char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
+        bt_rows r = bt_rows_from(&ids, f->first, buffer);
+        for (int64_t i = 0; i < f->own_floes; i++) *(int32_t *)bt_rows_next(&r) = (int32_t)(f->first + i);
+        bt_rows_end(&r);
+        free(buffer);
+    }
+    bt_slab_close(&ids);
+}
+
 static void write_bodies(bt_frames *f, const bt_record_bodies *b)
 {
     bt_h5 *h = f->h;
@@ -99,6 +114,7 @@ static void write_bodies(bt_frames *f, const bt_record_bodies *b)
                       &o[1].vertices, &o[1].offsets, &o[1].thickness, &o[1].area, &o[1].topology};
     enum { N = sizeof all / sizeof *all };
     const bool last = f->comm->rank == f->comm->size - 1;
+    write_ids(f);
     if (bt_slab_share(f->comm, all, N) == BT_OK) {
         char *buffer = bt_alloc(BT_SLAB_BYTES, 1);
         // An empty block of floes still has the 0 of the offsets to write if it is the first rank.
@@ -128,12 +144,23 @@ static void create_datasets(bt_frames *f)
     f->body_pose = bt_slab_growing(h, "/frames/body_pose", H5T_NATIVE_DOUBLE, f->n_others, 3);
     f->contact_force = bt_slab_growing(h, "/frames/contact_force", H5T_NATIVE_DOUBLE, f->n_floes, 0);
     f->speed = bt_slab_growing(h, "/frames/speed", H5T_NATIVE_DOUBLE, f->n_floes + f->n_others, 0);
+    f->velocity = bt_slab_growing(h, "/frames/velocity", H5T_NATIVE_FLOAT, f->n_floes + f->n_others, 2);
     bt_h5_describe(h, "/frames/time", "time", "s", "time of each frame, since the start of the run");
     bt_h5_describe(h, "/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe");
     bt_h5_describe(h, "/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies");
     bt_h5_describe(h, "/frames/contact_force", "time floe", "N",
                    "largest normal contact force on the floe in the step");
     bt_h5_describe(h, "/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies");
+    bt_h5_describe(h, "/frames/velocity", "time floe_or_body xy", "m/s",
+                   "velocity of the centroid: floes, then /bodies");
+    if (!f->branches) return;
+    const hsize_t k = (hsize_t)f->branches;
+    f->line_points = bt_h5_growing(h, "/frames/line_points", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){2 * k, 2},
+                                   (hsize_t[]){64, 2 * k}, false);
+    f->line_tension = bt_h5_growing(h, "/frames/line_tension", H5T_NATIVE_DOUBLE, 2, &k, (hsize_t[]){64, k}, false);
+    bt_h5_describe(h, "/frames/line_points", "time line_point xy", "m",
+                   "ends of the branches of the tow line: hull, towing end of the first, then of the second");
+    bt_h5_describe(h, "/frames/line_tension", "time branch", "N", "tension of each branch, 0 once it is broken");
 }
 
 void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t *first)
@@ -144,7 +171,9 @@ void bt_record_blocks(const bt_comm *c, bt_idx n_floes, bt_idx n_bodies, int64_t
 
 void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b)
 {
-    *f = (bt_frames){.h = h, .comm = c, .n_floes = b->n_floes, .n_others = b->n_bodies - b->n_floes, .time = -1};
+    *f = (bt_frames){.h = h, .comm = c, .n_floes = b->n_floes, .n_others = b->n_bodies - b->n_floes, .time = -1,
+                     .towed = b->towed < 0 ? -1 : b->towed - b->n_floes, .branches = b->branches, .line_points = -1,
+                     .line_tension = -1};
     f->first = bt_comm_first(c, c->rank, b->n_floes);
     f->own_floes = bt_comm_first(c, c->rank + 1, b->n_floes) - f->first;
     f->own_others = c->rank == c->size - 1 ? f->n_others : 0;
@@ -157,7 +186,7 @@ void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_
 }
 
 /// Quantities of a frame that are written row by row.
-enum quantity { POSE, FORCE, SPEED, FORCE_4, SPEED_4 };
+enum quantity { POSE, FORCE, SPEED, VELOCITY, FORCE_4, SPEED_4, VECTOR_4 };
 
 /// Bodies from .. from + n of the block to rows first .. first + n.
 static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_frame_row *row, int64_t n, char *buffer)
@@ -169,8 +198,10 @@ static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_fram
         case POSE: memcpy(to, (const double[3]){row[i].x, row[i].y, row[i].yaw}, 3 * sizeof(double)); break;
         case FORCE: *(double *)to = row[i].contact_force; break;
         case SPEED: *(double *)to = row[i].speed; break;
+        case VELOCITY: memcpy(to, (const float[2]){(float)row[i].vx, (float)row[i].vy}, 2 * sizeof(float)); break;
         case FORCE_4: *(float *)to = (float)row[i].contact_force; break;
         case SPEED_4: *(float *)to = (float)row[i].speed; break;
+        case VECTOR_4: memcpy(to, (const float[3]){(float)row[i].vx, (float)row[i].vy, 0}, 3 * sizeof(float)); break;
         }
     }
     bt_rows_end(&r);
@@ -194,7 +225,7 @@ static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt
 }
 
 /// Datasets of the frame in single precision, see xdmf.c.
-typedef struct paraview { bt_slab points, speed, force; } paraview;
+typedef struct paraview { bt_slab points, speed, velocity, force; } paraview;
 
 static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, int64_t points, bool force)
 {
@@ -203,14 +234,17 @@ static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, i
     paraview p = {
         .points = bt_slab_fixed(f->h, NAMED("points"), H5T_NATIVE_FLOAT, points, 2, true),
         .speed = bt_slab_fixed(f->h, NAMED("speed"), H5T_NATIVE_FLOAT, cells, 0, true),
+        .velocity = bt_slab_fixed(f->h, NAMED("velocity"), H5T_NATIVE_FLOAT, cells, 3, true),
         .force = {.h = f->h, .dataset = -1, .piece = 1, .row_bytes = 4},
     };
     if (force) p.force = bt_slab_fixed(f->h, NAMED("force"), H5T_NATIVE_FLOAT, cells, 0, true);
     // Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
-    const char *const names[] = {"points", "speed", "force"}, *const units[] = {"m", "m/s", "N"},
+    const char *const names[] = {"points", "speed", "velocity", "force"},
+                      *const units[] = {"m", "m/s", "m/s", "N"},
                       *const texts[] = {"x, y of every vertex", "speed of the centroid",
+                                        "velocity of the centroid, x, y, 0",
                                         "largest normal contact force in the step"};
-    for (int k = 0; k < (force ? 3 : 2); k++) {
+    for (int k = 0; k < (force ? 4 : 3); k++) {
         bt_h5_attr_text(f->h, NAMED(names[k]), "units", units[k]);
         bt_h5_attr_text(f->h, path, "long_name", texts[k]);
     }
@@ -225,16 +259,26 @@ static void write_frame(bt_frames *f, paraview *floes, paraview *others, const b
     write_rows(&f->pose, POSE, f->first, rows, nf, buffer);
     write_rows(&f->contact_force, FORCE, f->first, rows, nf, buffer);
     write_rows(&f->speed, SPEED, f->first, rows, nf + nb, buffer);
+    write_rows(&f->velocity, VELOCITY, f->first, rows, nf + nb, buffer);
     write_rows(&f->body_pose, POSE, 0, rows + nf, nb, buffer);
     write_points(f, &floes->points, f->vertices_before, rows, 0, nf, 0, buffer);
     write_rows(&floes->speed, SPEED_4, f->first, rows, nf, buffer);
+    write_rows(&floes->velocity, VECTOR_4, f->first, rows, nf, buffer);
     write_rows(&floes->force, FORCE_4, f->first, rows, nf, buffer);
     write_points(f, &others->points, 0, rows, nf, nb, f->floe_vertices - f->vertices_before, buffer);
     write_rows(&others->speed, SPEED_4, 0, rows + nf, nb, buffer);
+    write_rows(&others->velocity, VECTOR_4, 0, rows + nf, nb, buffer);
     free(buffer);
 }
 
-bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows)
+/// Of all ranks one writes; the line is the same on all.
+static void write_line(bt_frames *f, const bt_frame_line *line)
+{
+    bt_h5_append(f->h, f->line_points, H5T_NATIVE_DOUBLE, (hsize_t)f->n, 1, line->point);
+    bt_h5_append(f->h, f->line_tension, H5T_NATIVE_DOUBLE, (hsize_t)f->n, 1, line->tension);
+}
+
+bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line)
 {
     bt_h5 *h = f->h;
     bt_status status = bt_comm_agree(f->comm, h->status);
@@ -243,40 +287,48 @@ bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows)
     bt_slab_grow(&f->body_pose, f->n);
     bt_slab_grow(&f->contact_force, f->n);
     bt_slab_grow(&f->speed, f->n);
+    bt_slab_grow(&f->velocity, f->n);
     char path[64];
     snprintf(path, sizeof path, "/xdmf/%06lld", (long long)f->n);
     bt_h5_group(h, path);
     paraview floes = create_paraview(f, "floe", f->n_floes, f->floe_vertices, true);
     paraview others = create_paraview(f, "body", f->n_others, f->other_vertices, false);
-    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, // these stay open
-                         &floes.points, &floes.speed, &floes.force, &others.points, &others.speed};
+    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity, // these stay open
+                         &floes.points, &floes.speed, &floes.velocity, &floes.force,
+                         &others.points, &others.speed, &others.velocity};
     enum { N = sizeof shared / sizeof *shared };
     status = bt_slab_share(f->comm, shared, N);
     if (status == BT_OK) write_frame(f, &floes, &others, rows);
-    for (int k = 4; k < N; k++) bt_slab_close(shared[k]);
+    for (int k = 5; k < N; k++) bt_slab_close(shared[k]);
     // The time comes last: a reader that counts frames by it finds them whole.
     status = bt_comm_agree(f->comm, h->status);
     if (status != BT_OK) {
         bt_h5_give_up(h, status);
         return status;
     }
+    if (f->branches) write_line(f, line);
     bt_h5_append(h, f->time, H5T_NATIVE_DOUBLE, (hsize_t)f->n, 1, &time);
     if (f->n == f->cap) {
         f->cap = f->cap ? 2 * f->cap : 64;
         f->times = bt_realloc(f->times, (size_t)f->cap, sizeof *f->times);
+        if (f->branches) f->lines = bt_realloc(f->lines, (size_t)f->cap, sizeof *f->lines);
     }
+    if (f->branches) f->lines[f->n] = *line;
     f->times[f->n++] = time;
     return BT_OK;
 }
 
 void bt_frames_close(bt_frames *f)
 {
-    bt_slab *all[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed};
-    for (int k = 0; k < 4; k++)
+    bt_slab *all[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity};
+    for (int k = 0; k < 5; k++)
         if (all[k]->h) bt_slab_close(all[k]);
-    if (f->h && f->time >= 0) H5Dclose(f->time);
+    const hid_t datasets[] = {f->time, f->line_points, f->line_tension};
+    for (int k = 0; k < 3; k++)
+        if (f->h && datasets[k] >= 0) H5Dclose(datasets[k]);
+    free(f->lines);
     free(f->vertices);
     free(f->n_vertices);
     free(f->times);
-    *f = (bt_frames){.time = -1};
+    *f = (bt_frames){.time = -1, .line_points = -1, .line_tension = -1};
 }

@@ -17,8 +17,12 @@ typedef struct bt_frames {
     int64_t floe_vertices, other_vertices; ///< of all ranks
     int64_t vertices_before;        ///< of floes on the ranks before this one
     hid_t time;
-    bt_slab pose, body_pose, contact_force, speed;
+    bt_slab pose, body_pose, contact_force, speed, velocity;
+    int64_t towed;                  ///< which of the other bodies, −1 = none
+    int branches;                   ///< of the tow line
+    hid_t line_points, line_tension;///< −1 without a line
     double *times;                  ///< [n] s
+    bt_frame_line *lines;           ///< [n]; NULL without a line
     int64_t n, cap;                 ///< frames
 } bt_frames;
 
@@ -27,7 +31,7 @@ typedef struct bt_frames {
 void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_bodies *b);
 /// Collective. Add a frame: rows of this rank's block. Returns the same status on all ranks; after a failure the file
 /// stays as the last flush left it.
-bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows);
+bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, const bt_frame_line *line);
 void bt_frames_close(bt_frames *f); ///< datasets and memory
 
 #endif

@@ -11,6 +11,7 @@
 
 #include "output/observe.h"
 #include "partition/domain.h"
+#include "tow/tow.h"
 #include "base/elementary.h"
 
 typedef struct list {
@@ -114,7 +115,8 @@ bt_status bt_gather_bodies(const bt_comm *c, const bt_world *w, const bt_roster 
                               .thickness = thickness,
                               .area = area,
                               .names = roster->names,
-                              .towed = (bt_idx)w->towed};
+                              .towed = (bt_idx)w->towed,
+                              .branches = bt_tow_has_line(w->tow) ? w->tow->n_branches : 0};
     if (status != BT_OK) bt_gather_free(out);
     return status;
 }
@@ -139,14 +141,36 @@ bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *
     for (bt_idx i = 0; i < l.n; i++) {
         const bt_idx k = l.body[i];
         rows[i] = (bt_frame_row){.x = b->pose[k].x, .y = b->pose[k].y, .yaw = b->pose[k].yaw, .contact_force = force[k],
-                                 .speed = bt_hypot(b->vel[k].x, b->vel[k].y)};
+                                 .speed = bt_hypot(b->vel[k].x, b->vel[k].y), .vx = b->vel[k].x, .vy = b->vel[k].y};
     }
     free(force);
-    _Static_assert(sizeof *rows == 5 * sizeof(double), "a row is a line of doubles");
-    const bt_status status = bt_comm_rows_by_gid(c, l.first, l.n, l.gid, 5, (const double *)rows, (double *)block, err);
+    const bt_status status =
+        bt_comm_rows_by_gid(c, l.first, l.n, l.gid, BT_FRAME_ROW, (const double *)rows, (double *)block, err);
     free_list(&l);
     free(rows);
     *out = status == BT_OK ? block : NULL;
     if (status != BT_OK) free(block);
     return status;
+}
+
+_Static_assert((int)BT_FRAME_BRANCHES == (int)BT_MAX_BRANCHES, "a frame has room for every branch");
+
+/// The towing end and the travel of the body are not wrapped and the pose is, so the end is drawn from the body on.
+bt_frame_line bt_gather_line(const bt_world *w)
+{
+    bt_frame_line line = {0};
+    const bt_tow *t = w->tow;
+    if (!bt_tow_has_line(t)) return line;
+    const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
+    const double c = bt_cos(p->yaw), s = bt_sin(p->yaw);
+    for (int k = 0; k < t->n_branches; k++) {
+        const bt_branch *b = &t->branch[k];
+        double (*at)[2] = line.point[k];
+        at[0][0] = p->x + c * b->hull_x - s * b->hull_y;
+        at[0][1] = p->y + s * b->hull_x + c * b->hull_y;
+        at[1][0] = b->broken ? at[0][0] : p->x + (t->carriage_x - t->travel_x);
+        at[1][1] = b->broken ? at[0][1] : p->y + (t->carriage_y - t->travel_y);
+        line.tension[k] = b->broken ? 0 : bt_tow_tension(t, k);
+    }
+    return line;
 }

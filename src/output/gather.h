@@ -17,4 +17,7 @@ void bt_gather_free(bt_record_bodies *b);
 bt_status bt_gather_frame(const bt_comm *c, const bt_world *w, const bt_roster *roster, bt_frame_row **rows,
                             bt_errors *err);
 
+/// The tow line beside it, the same on all ranks; zeros without one.
+bt_frame_line bt_gather_line(const bt_world *w);
+
 #endif

@@ -260,10 +260,11 @@ void bt_record_overlap(bt_record *r, double overlap)
     if (r->comm->rank == 0) r->history.max_overlap = bt_max_seen(r->history.max_overlap, overlap);
 }
 
-bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err)
+bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
+                          bt_errors *err)
 {
     r->h5.err = err;
-    const bt_status status = bt_frames_add(&r->frames, time, rows);
+    const bt_status status = bt_frames_add(&r->frames, time, rows, line);
     if (status != BT_OK) return status;
     bt_record_flush(r);
     return bt_comm_agree(r->comm, r->h5.status);
@@ -284,7 +285,8 @@ char *bt_record_xdmf(const bt_record *r)
 {
     const bt_frames *f = &r->frames;
     return bt_xdmf_text(&(bt_xdmf){.n_floes = f->n_floes, .n_bodies = f->n_others, .floe_vertices = f->floe_vertices,
-                                   .body_vertices = f->other_vertices, .time = f->times, .n_frames = f->n});
+                                   .body_vertices = f->other_vertices, .towed = f->towed, .branches = f->branches,
+                                   .time = f->times, .line = f->lines, .n_frames = f->n});
 }
 
 /// What is still on its way goes to the file, and the numbers of the whole run are made: once, on rank 0.

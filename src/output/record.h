@@ -123,6 +123,7 @@ typedef struct bt_record_bodies {
     const double *area;          ///< [bodies of the block] m²
     const char *const *names;    ///< [n_bodies − n_floes] "towed body", "wall x low", ...; on rank 0
     bt_idx towed;                ///< index of the towed body among all, −1 = none
+    int branches;                ///< of the tow line, 0 = none
 } bt_record_bodies;
 
 /// A body in a frame.
@@ -130,7 +131,16 @@ typedef struct bt_frame_row {
     double x, y, yaw;        ///< m, m, rad
     double contact_force;    ///< largest normal force on the floe in this step, N; of other bodies not recorded
     double speed;            ///< of the centroid, m/s
+    double vx, vy;           ///< its velocity, m/s; kept in single precision
 } bt_frame_row;
+enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
+
+/// The tow line in a frame: each branch from the hull to its towing end, or at the hull alone once it is broken.
+enum { BT_FRAME_BRANCHES = 2 };
+typedef struct bt_frame_line {
+    double point[BT_FRAME_BRANCHES][2][2]; ///< m, beside the body as frames show it
+    double tension[BT_FRAME_BRANCHES];     ///< N
+} bt_frame_line;
 
 /// Numbers of the end of the run that the series do not hold.
 typedef struct bt_run_totals {
@@ -210,10 +220,12 @@ void bt_record_overlap(bt_record *r, double overlap);
 bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 
 /// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
-/// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies]; and
-/// for ParaView in single precision with all vertices in the world frame (/xdmf, see src/output/xdmf.c). The status is
-/// the same on all ranks.
-bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, bt_errors *err);
+/// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies],
+/// /frames/velocity [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2], /frames/line_tension
+/// [T][k]; and for ParaView in single precision with all vertices in the world frame (/xdmf, see src/output/xdmf.c).
+/// line: the same on all ranks, read where there are branches. The status is the same on all ranks.
+bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
+                          bt_errors *err);
 
 /// Collective. Statistics over the steady window, summary.json, frames.xdmf; closes and frees r (also on error). t =
 /// NULL closes a run that failed: the series and frames taken so far are flushed and frames.xdmf is written, but no

@@ -10,6 +10,7 @@
 // The copy costs a write of the whole file per checkpoint (nothing where the file system copies by reference).
 // Rejected: to cut the file under way back to the checkpoint's counts, which has to be readable for that; a file of its
 // own for each piece between two checkpoints, which every reader would have to join.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -139,6 +140,27 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
     r->written = n;
 }
 
+/// The velocities of frame k; of a file of an earlier version, which has none, NaN.
+static void read_velocities(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
+{
+    float *v = bt_alloc((size_t)n, 2 * sizeof *v);
+    for (bt_idx i = 0; i < 2 * n; i++) v[i] = NAN;
+    if (bt_h5_there(old, "/frames/velocity"))
+        bt_h5_read(old, "/frames/velocity", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
+    for (bt_idx i = 0; i < n; i++) rows[i].vx = (double)v[2 * i], rows[i].vy = (double)v[2 * i + 1];
+    free(v);
+}
+
+/// The tow line of frame k; of a file of an earlier version NaN.
+static void read_line(bt_h5_reader *old, int64_t k, int branches, bt_frame_line *line)
+{
+    if (branches == 0) return;
+    *line = (bt_frame_line){.tension = {NAN, NAN}, .point = {{{NAN, NAN}, {NAN, NAN}}, {{NAN, NAN}, {NAN, NAN}}}};
+    if (!bt_h5_there(old, "/frames/line_points")) return;
+    bt_h5_read(old, "/frames/line_points", H5T_NATIVE_DOUBLE, k, 1, 4 * branches, &line->point[0][0][0]);
+    bt_h5_read(old, "/frames/line_tension", H5T_NATIVE_DOUBLE, k, 1, branches, line->tension);
+}
+
 /// Frame k of the old file as rows of all bodies; on rank 0.
 static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bodies, double *time, bt_frame_row *rows)
 {
@@ -154,6 +176,7 @@ static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bo
     bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, n_bodies, x);
     for (bt_idx i = 0; i < n_bodies; i++) rows[i].speed = x[i];
     free(x);
+    read_velocities(old, k, n_bodies, rows);
 }
 
 /// Collective. The first n frames, through the function that takes any frame.
@@ -171,14 +194,16 @@ static bt_status load_frames(bt_record *r, bt_h5_reader *old, int64_t n, bt_erro
     bt_status status = BT_OK;
     for (int64_t k = 0; k < n && status == BT_OK; k++) {
         double time = 0;
+        bt_frame_line line = {0};
         if (first) read_frame(old, k, n_floes, n_bodies, &time, rows);
+        if (first) read_line(old, k, r->frames.branches, &line);
         status = bt_comm_agree(r->comm, first ? old->status : BT_OK);
         if (status != BT_OK) break;
         bt_comm_bcast(r->comm, &time, sizeof time);
-        _Static_assert(sizeof *rows == 5 * sizeof(double), "a row is a line of doubles");
-        status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, 5, (const double *)(const void *)rows,
+        bt_comm_bcast(r->comm, &line, sizeof line);
+        status = bt_comm_rows_by_gid(r->comm, blocks, mine, gid, BT_FRAME_ROW, (const double *)(const void *)rows,
                                      (double *)(void *)block, err);
-        if (status == BT_OK) status = bt_frames_add(&r->frames, time, block);
+        if (status == BT_OK) status = bt_frames_add(&r->frames, time, block, &line);
     }
     free(blocks);
     free(rows);

@@ -3,8 +3,11 @@
 //
 // ParaView moves no cells by a pose, so result.h5 also holds the vertices of every frame in the world frame, in single
 // precision; the polygons never change, and their connectivity is stored once:
-//     /xdmf/floes, /xdmf/bodies                                  mixed topology
-//     /xdmf/NNNNNN/{floe_points, floe_speed, floe_force, body_points, body_speed}     frame NNNNNN
+//     /xdmf/floes, /xdmf/bodies     mixed topology
+//     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
+//     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity}, floe_force     frame NNNNNN
+// Thickness and height are those of /floes and /bodies; what belongs to a few bodies (ids, which one is towed) and the
+// ends of the tow line stand in the XML itself. Velocities have a third component, 0, as ParaView's vectors have.
 // Floes and other bodies are two blocks, because only floes have a contact force. Each frame has datasets of its own:
 // as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps
 // a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be
@@ -14,40 +17,122 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-static void data_item(FILE *f, int64_t n, int width, const char *type, const char *dataset)
+static void data_item(FILE *f, int64_t n, int width, const char *type, int bytes, const char *dataset)
 {
+    char columns[8] = "";
+    if (width > 1) snprintf(columns, sizeof columns, " %d", width);
     fprintf(f,
             "<DataItem Dimensions=\"%" PRId64
-            "%s\" NumberType=\"%s\" Precision=\"4\" Format=\"HDF\">result.h5:%s</DataItem>",
-            n, width == 2 ? " 2" : "", type, dataset);
+            "%s\" NumberType=\"%s\" Precision=\"%d\" Format=\"HDF\">result.h5:%s</DataItem>",
+            n, columns, type, bytes, dataset);
 }
 
-static void attribute(FILE *f, int64_t n, const char *name, int64_t frame, const char *kind, const char *quantity)
+static void begin_attribute(FILE *f, const char *name, const char *type)
+{
+    fprintf(f, "          <Attribute Name=\"%s\" AttributeType=\"%s\" Center=\"Cell\">\n            ", name, type);
+}
+
+static void end_attribute(FILE *f) { fputs("\n          </Attribute>\n", f); }
+
+/// An attribute of the cells in a dataset of the file.
+static void attribute(FILE *f, int64_t n, const char *name, const char *type, int bytes, const char *dataset)
+{
+    begin_attribute(f, name, "Scalar");
+    data_item(f, n, 1, type, bytes, dataset);
+    end_attribute(f);
+}
+
+/// One in a dataset of the frame.
+static void of_frame(FILE *f, int64_t n, const char *name, int width, int64_t frame, const char *kind,
+                     const char *quantity)
 {
     char path[64];
     snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_%s", frame, kind, quantity);
-    fprintf(f, "          <Attribute Name=\"%s\" AttributeType=\"Scalar\" Center=\"Cell\">\n            ", name);
-    data_item(f, n, 1, "Float", path);
-    fputs("\n          </Attribute>\n", f);
+    begin_attribute(f, name, width > 1 ? "Vector" : "Scalar");
+    data_item(f, n, width, "Float", 4, path);
+    end_attribute(f);
+}
+
+static void begin_xml(FILE *f, int64_t n, int width, const char *type, int bytes)
+{
+    fprintf(f, "<DataItem Dimensions=\"%" PRId64, n);
+    if (width > 1) fprintf(f, " %d", width);
+    fprintf(f, "\" NumberType=\"%s\" Precision=\"%d\" Format=\"XML\">", type, bytes);
 }
 
 /// Floes or other bodies of one frame: kind "floe" or "body".
-static void block(FILE *f, const char *name, const char *kind, int64_t cells, int64_t points, int64_t frame)
+static void begin_block(FILE *f, const char *name, const char *kind, int64_t cells, int64_t points, int64_t frame)
 {
-    if (cells == 0) return;
     char path[64];
     snprintf(path, sizeof path, "/xdmf/%s", name);
     fprintf(f,
             "        <Grid Name=\"%s\" GridType=\"Uniform\">\n"
             "          <Topology TopologyType=\"Mixed\" NumberOfElements=\"%" PRId64 "\">\n            ",
             name, cells);
-    data_item(f, points + 2 * cells, 1, "Int", path);
+    data_item(f, points + 2 * cells, 1, "Int", 4, path);
     fputs("\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
     snprintf(path, sizeof path, "/xdmf/%06" PRId64 "/%s_points", frame, kind);
-    data_item(f, points, 2, "Float", path);
+    data_item(f, points, 2, "Float", 4, path);
     fputs("\n          </Geometry>\n", f);
-    attribute(f, cells, "speed", frame, kind, "speed");
-    if (*kind == 'f') attribute(f, cells, "contact_force", frame, kind, "force");
+    of_frame(f, cells, "speed", 1, frame, kind, "speed");
+    of_frame(f, cells, "velocity", 3, frame, kind, "velocity");
+}
+
+static void floes(FILE *f, const bt_xdmf *x, int64_t frame)
+{
+    const int64_t n = x->n_floes;
+    if (n == 0) return;
+    begin_block(f, "floes", "floe", n, x->floe_vertices, frame);
+    of_frame(f, n, "contact_force", 1, frame, "floe", "force");
+    attribute(f, n, "thickness", "Float", 8, "/floes/thickness");
+    attribute(f, n, "id", "Int", 4, "/xdmf/floe_id");
+    fputs("        </Grid>\n", f);
+}
+
+/// A number of each of the other bodies: their ids, or 1 for the one that is towed.
+static void in_xml(FILE *f, const bt_xdmf *x, const char *name, bool ids)
+{
+    begin_attribute(f, name, "Scalar");
+    begin_xml(f, x->n_bodies, 1, "Int", 4);
+    for (int64_t i = 0; i < x->n_bodies; i++)
+        fprintf(f, "%s%" PRId64, i ? " " : "", ids ? x->n_floes + i : i == x->towed);
+    fputs("</DataItem>", f);
+    end_attribute(f);
+}
+
+static void bodies(FILE *f, const bt_xdmf *x, int64_t frame)
+{
+    if (x->n_bodies == 0) return;
+    begin_block(f, "bodies", "body", x->n_bodies, x->body_vertices, frame);
+    attribute(f, x->n_bodies, "height", "Float", 8, "/bodies/height");
+    in_xml(f, x, "id", true);
+    in_xml(f, x, "towed", false);
+    fputs("        </Grid>\n", f);
+}
+
+/// The branches of the tow line, each of two points.
+static void line(FILE *f, const bt_xdmf *x, int64_t frame)
+{
+    const int k = x->branches;
+    if (k == 0) return;
+    const bt_frame_line *l = &x->line[frame];
+    fprintf(f,
+            "        <Grid Name=\"line\" GridType=\"Uniform\">\n"
+            "          <Topology TopologyType=\"Polyline\" NodesPerElement=\"2\" NumberOfElements=\"%d\">\n"
+            "            ",
+            k);
+    begin_xml(f, k, 2, "Int", 4);
+    for (int i = 0; i < 2 * k; i++) fprintf(f, "%s%d", i ? " " : "", i);
+    fputs("</DataItem>\n          </Topology>\n          <Geometry GeometryType=\"XY\">\n            ", f);
+    begin_xml(f, 2 * (int64_t)k, 2, "Float", 8);
+    for (int i = 0; i < 2 * k; i++)
+        fprintf(f, "%s%.9g %.9g", i ? " " : "", l->point[i / 2][i % 2][0], l->point[i / 2][i % 2][1]);
+    fputs("</DataItem>\n          </Geometry>\n", f);
+    begin_attribute(f, "tension", "Scalar");
+    begin_xml(f, k, 1, "Float", 8);
+    for (int i = 0; i < k; i++) fprintf(f, "%s%.9g", i ? " " : "", l->tension[i]);
+    fputs("</DataItem>", f);
+    end_attribute(f);
     fputs("        </Grid>\n", f);
 }
 
@@ -60,8 +145,9 @@ char *bt_xdmf_text(const bt_xdmf *x)
     for (int64_t i = 0; i < x->n_frames; i++) {
         fprintf(f, "      <Grid Name=\"frame %" PRId64 "\" GridType=\"Collection\" CollectionType=\"Spatial\">\n"
                    "        <Time Value=\"%.17g\"/>\n", i, x->time[i]);
-        block(f, "floes", "floe", x->n_floes, x->floe_vertices, i);
-        block(f, "bodies", "body", x->n_bodies, x->body_vertices, i);
+        floes(f, x, i);
+        bodies(f, x, i);
+        line(f, x, i);
         fputs("      </Grid>\n", f);
     }
     fputs("    </Grid>\n  </Domain>\n</Xdmf>\n", f);

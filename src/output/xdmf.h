@@ -3,13 +3,16 @@
 #ifndef BT_XDMF_H
 #define BT_XDMF_H
 
-#include "bergtow/base.h"
+#include "output/record.h"
 
 /// Sizes of what result.h5 holds.
 typedef struct bt_xdmf {
     int64_t n_floes, n_bodies;                 ///< cells: floes, other bodies
     int64_t floe_vertices, body_vertices;      ///< points
+    int64_t towed;                             ///< which of the other bodies, −1 = none
+    int branches;                              ///< of the tow line
     const double *time;                        ///< [n_frames] s
+    const bt_frame_line *line;                 ///< [n_frames], where there are branches
     int64_t n_frames;
 } bt_xdmf;
 

@@ -75,7 +75,8 @@ static bt_status record_frame(run *r, bt_errors *err)
     r->framed = r->w->step;
     bt_frame_row *rows;
     bt_status status = bt_gather_frame(r->comm, r->w, &r->roster, &rows, err);
-    if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, err);
+    const bt_frame_line line = bt_gather_line(r->w);
+    if (status == BT_OK) status = bt_record_frame(r->record, (double)r->w->step * r->w->par.dt, rows, &line, err);
     free(rows);
     return status;
 }

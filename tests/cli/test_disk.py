@@ -58,7 +58,8 @@ def test_what_is_left(tmp_path, name, ranks):
     estimate = said(text, "disk +about" if ranks == 1 else "while it runs;")
     bytes_left = run(tmp_path / "out", path, ranks)
     assert estimate == pytest.approx(bytes_left, rel=WITHIN), f"{estimate / bytes_left:.2f} of what was left"
-    assert said(text, "up to") >= 0.8 * bytes_left
+    if ranks == 1:  # what is said of several ranks is what is left
+        assert said(text, "up to") >= 0.8 * bytes_left
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

@@ -100,6 +100,9 @@ def test_all_of_the_file_is_in_the_dataset(towed):
         np.testing.assert_array_equal(d.floe_speed, f["frames/speed"][:, :n])
         np.testing.assert_array_equal(d.other_body_speed, f["frames/speed"][:, n:])
         np.testing.assert_array_equal(d.other_body_speed[3, -2:], f["frames/speed"][3, -2:])
+        np.testing.assert_array_equal(d.floe_velocity, f["frames/velocity"][:, :n])
+        np.testing.assert_array_equal(d.other_body_velocity.sel(xy="y"), f["frames/velocity"][:, n:, 1])
+        np.testing.assert_allclose(np.hypot(*d.floe_velocity.values.T), d.floe_speed.values.T, rtol=1e-6)
         np.testing.assert_array_equal(d.floe_speed[[1, 4], 2:9:3], f["frames/speed"][[1, 4], 2:9:3])
         for group, prefix in (("impacts", "collision"), ("panels", "panel"), ("events", "event"), ("floes", "floe"),
                               ("bodies", "other_body")):

@@ -10,8 +10,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from harness import BERGTOW, ROOT, TOW, changed, differing, environment, write_case
 
-ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test_record"
 
 
@@ -34,6 +34,9 @@ def dimensions(item):
 
 def load(item, folder):
     """The array a DataItem stands for, its size and type checked against what it says."""
+    if item.get("Format") == "XML":
+        kind = {"Float": float, "Int": int}[item.get("NumberType")]
+        return np.array([kind(word) for word in item.text.split()]).reshape(dimensions(item))
     assert item.get("Format") == "HDF"
     path, name = item.text.strip().split(":")
     with h5py.File(folder / path, "r") as file:
@@ -66,6 +69,7 @@ def placed(group, poses):
 def test_xdmf_describes_the_frames(run):
     with h5py.File(run / "result.h5", "r") as file:
         frames = {name: data[()] for name, data in file["frames"].items()}
+        thickness, height, towed = (file[n][()] for n in ("floes/thickness", "bodies/height", "bodies/towed"))
         floes = [list(placed(file["floes"], poses)) for poses in frames["pose"]]
         bodies = [list(placed(file["bodies"], poses)) for poses in frames["body_pose"]]
     collection = ElementTree.parse(run / "frames.xdmf").getroot().find("Domain/Grid")
@@ -74,7 +78,7 @@ def test_xdmf_describes_the_frames(run):
     assert [float(g.find("Time").get("Value")) for g in steps] == list(frames["time"]) == [0, 0.5, 1]
     for k, step in enumerate(steps):
         blocks = {g.get("Name"): g for g in step.findall("Grid")}
-        assert sorted(blocks) == ["bodies", "floes"]
+        assert sorted(blocks) == ["bodies", "floes", "line"]
         for name, expected in ("floes", floes[k]), ("bodies", bodies[k]):
             points = load(blocks[name].find("Geometry/DataItem"), run)
             got = polygons(blocks[name].find("Topology"), points, run)
@@ -87,6 +91,21 @@ def test_xdmf_describes_the_frames(run):
         np.testing.assert_array_equal(values["floes", "contact_force"], frames["contact_force"][k].astype("f4"))
         np.testing.assert_array_equal(values["floes", "speed"], frames["speed"][k, :n].astype("f4"))
         np.testing.assert_array_equal(values["bodies", "speed"], frames["speed"][k, n:].astype("f4"))
+        for name, part in ("floes", slice(0, n)), ("bodies", slice(n, None)):
+            velocity = values[name, "velocity"]
+            np.testing.assert_array_equal(velocity[:, :2], frames["velocity"][k, part])
+            assert velocity.shape[1] == 3 and not velocity[:, 2].any() and velocity[-1, :2].all()
+            total = len(frames["speed"][k])
+            np.testing.assert_array_equal(values[name, "id"], np.arange(total)[part])
+        np.testing.assert_array_equal(values["floes", "thickness"], thickness)
+        np.testing.assert_array_equal(values["bodies", "height"], height)
+        np.testing.assert_array_equal(np.flatnonzero(values["bodies", "towed"]), towed)
+        line = blocks["line"]
+        points = load(line.find("Geometry/DataItem"), run)
+        np.testing.assert_allclose(points, frames["line_points"][k], rtol=1e-8)
+        np.testing.assert_array_equal(points, [(1, 2), (3 + k, 4), (5, 6), (7, 8 + k)])
+        assert load(line.find("Topology/DataItem"), run).tolist() == [[0, 1], [2, 3]]
+        np.testing.assert_array_equal(values["line", "tension"], [100 + k, 200])
 
 
 def test_summary_is_json_with_every_promised_number(run):
@@ -134,3 +153,29 @@ def test_the_printed_table_says_the_same(run):
     assert shares in table
     assert summary["state_hash"] in table
     assert "warning" not in table
+
+
+TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000,
+                    tow__speed=0.6, body__x=4, tow__line={"branches": 2}, output__frame_interval=0.5)
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_the_line_of_a_run_that_goes_on(tmp_path, ranks):
+    write_case(tmp_path, TWO_LINES)
+    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
+    for words in (["run", "case.yml", "-o", "parts", "--steps", "33"], ["resume", "parts"],
+                  ["run", "case.yml", "-o", "whole"]):
+        done = subprocess.run([*(mpi if "parts" in words else []), BERGTOW, *words, "--quiet", "--threads", "1"],
+                              cwd=tmp_path, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert differing(tmp_path / "whole/result.h5", tmp_path / "parts/result.h5") == []
+    assert (tmp_path / "whole/frames.xdmf").read_bytes() == (tmp_path / "parts/frames.xdmf").read_bytes()
+    with h5py.File(tmp_path / "whole/result.h5") as f:
+        points, tension = f["frames/line_points"][()], f["frames/line_tension"][()]
+        at = np.searchsorted(f["series/time"][()], f["frames/time"][1:] * (1 - 1e-9))
+        np.testing.assert_allclose(points[1:, 1, 0], f["series/carriage_x"][()][at], rtol=1e-12)
+        np.testing.assert_array_equal(tension[1:, 0], f["series/line_tension_1"][()][at])
+        np.testing.assert_array_equal(tension[1:, 1], f["series/line_tension_2"][()][at])
+        body = f["frames/body_pose"][:, 0]
+        assert tension.max() > 0 and np.ptp(np.hypot(*(points[:, 0] - body[:, :2]).T)) < 1e-9  # a point of the hull
