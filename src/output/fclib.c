@@ -8,10 +8,9 @@
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
 //     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
-//     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc about
-//     0 that both
-//                                                  components of a contact lie in (mu is 0), NaN = it is no such
-//                                                  contact; where contacts and bodies are
+//     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc
+//                                                  about 0 that both components of a contact lie in (mu is 0),
+//                                                  NaN = another contact; where contacts and bodies are
 // A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 
@@ -49,7 +48,29 @@ static bt_status check_problem(const char *path, int n_contacts, const int64_t *
     return BT_OK;
 }
 
-static void write_int(bt_h5 *h, const char *name, int value) { bt_h5_write(h, name, H5T_NATIVE_INT, 1, 0, &value); }
+/// A dataset and what it holds; axes, units and meaning as for bt_h5_describe.
+static void put(bt_h5 *h, const char *name, hid_t type, hsize_t n, hsize_t width, const void *data, const char *axes,
+                const char *units, const char *meaning)
+{
+    bt_h5_write(h, name, type, n, width, data);
+    bt_h5_describe(h, name, axes, units, meaning);
+}
+
+static void put_int(bt_h5 *h, const char *name, int value, const char *meaning)
+{
+    put(h, name, H5T_NATIVE_INT, 1, 0, &value, "one", "1", meaning);
+}
+
+static void put_text(bt_h5 *h, const char *name, const char *text, const char *meaning)
+{
+    bt_h5_write_text(h, name, text);
+    bt_h5_describe(h, name, NULL, NULL, meaning);
+}
+
+static void put_rows(bt_h5 *h, const char *name, int m, const double *data, const char *units, const char *meaning)
+{
+    put(h, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
+}
 
 static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const int32_t *w_col, const double *w_val,
                           const double *q, const double *mu)
@@ -58,18 +79,19 @@ static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const 
     int32_t *rows = bt_alloc((size_t)m + 1, sizeof *rows);
     for (int i = 0; i <= m; i++) rows[i] = (int32_t)w_ptr[i];
     bt_h5_group(h, "/fclib_local");
-    write_int(h, "/fclib_local/spacedim", 2);
+    put_int(h, "/fclib_local/spacedim", 2, "dimensions of space");
     bt_h5_group(h, "/fclib_local/W");
-    write_int(h, "/fclib_local/W/nzmax", rows[m]);
-    write_int(h, "/fclib_local/W/m", m);
-    write_int(h, "/fclib_local/W/n", m);
-    write_int(h, "/fclib_local/W/nz", COMPRESSED_ROWS);
-    bt_h5_write(h, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows);
-    bt_h5_write(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, w_col);
-    bt_h5_write(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, w_val);
+    put_int(h, "/fclib_local/W/nzmax", rows[m], "entries of W");
+    put_int(h, "/fclib_local/W/m", m, "rows of W");
+    put_int(h, "/fclib_local/W/n", m, "columns of W");
+    put_int(h, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
+    put(h, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
+        "row i has the entries p[i] up to p[i + 1]");
+    put(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, w_col, "entry", "1", "column of each entry");
+    put(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, w_val, "entry", "kg-1", "entries of W");
     bt_h5_group(h, "/fclib_local/vectors");
-    bt_h5_write(h, "/fclib_local/vectors/q", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, q);
-    bt_h5_write(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, mu);
+    put_rows(h, "/fclib_local/vectors/q", m, q, "m/s", "velocities without impulses: u = W r + q");
+    put(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, mu, "contact", "1", "friction");
     free(rows);
 }
 
@@ -82,10 +104,10 @@ static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_
         for (int64_t k = w_ptr[i]; k < w_ptr[i + 1]; k++) u[i] += w_val[k] * r[w_col[k]];
     }
     bt_h5_group(h, "/guesses");
-    write_int(h, "/guesses/number_of_guesses", 1);
+    put_int(h, "/guesses/number_of_guesses", 1, "how many starts there are");
     bt_h5_group(h, "/guesses/1");
-    bt_h5_write(h, "/guesses/1/u", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, u);
-    bt_h5_write(h, "/guesses/1/r", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, r);
+    put_rows(h, "/guesses/1/u", m, u, "m/s", "velocities at the start of the iteration");
+    put_rows(h, "/guesses/1/r", m, r, "N s", "impulses at the start of the iteration");
     free(u);
 }
 
@@ -94,16 +116,15 @@ static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
     bt_h5_group(h, "/places");
     bt_h5_attr_double(h, "/places", "time", p->time);
     bt_h5_attr_double(h, "/places", "dt", p->dt);
-    bt_h5_write(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body);
-    bt_h5_describe(h, "/places/body", NULL, "1", "ids of the two bodies of each contact");
-    bt_h5_write(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal);
-    bt_h5_describe(h, "/places/normal", NULL, "1", "from the first body to the second, world frame");
-    bt_h5_write(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever);
-    bt_h5_describe(h, "/places/lever", NULL, "m",
-             "from the centroid of the first and of the second body to the contact point, world frame, at the start of "
-             "the step");
-    bt_h5_write(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose);
-    bt_h5_describe(h, "/places/pose", NULL, "m, m, rad", "x, y, yaw of every body at the end of the step, by id");
+    put(h, "/places/body", H5T_NATIVE_INT64, n, 2, p->body, "contact pair", "1",
+        "ids of the two bodies of each contact");
+    put(h, "/places/normal", H5T_NATIVE_DOUBLE, n, 2, p->normal, "contact xy", "1",
+        "from the first body to the second, world frame");
+    put(h, "/places/lever", H5T_NATIVE_DOUBLE, n, 4, p->lever, "contact pair_xy", "m",
+        "from the centroid of the first and of the second body to the contact point, world frame, at the start of the "
+        "step");
+    put(h, "/places/pose", H5T_NATIVE_DOUBLE, (hsize_t)p->n_bodies, 3, p->pose, "any_body component", "m, m, rad",
+        "x, y, yaw of every body at the end of the step, by id");
 }
 
 bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
@@ -121,20 +142,26 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
 
     bt_h5 h;
     if (bt_h5_create(&h, temporary, err) == BT_OK) {
+        bt_h5_describe_file(&h, title ? title : "contact problem");
         write_problem(&h, n_contacts, w_ptr, w_col, w_val, q, mu);
         bt_h5_group(&h, "/fclib_local/info");
-        bt_h5_write_text(&h, "/fclib_local/info/title", title ? title : "");
-        bt_h5_write_text(&h, "/fclib_local/info/description", description ? description : "");
-        bt_h5_write_text(&h, "/fclib_local/info/math_info",
-                         "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent");
-        if (bound) bt_h5_write(&h, "/bound", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, bound);
-        if (disc) bt_h5_write(&h, "/disc", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, disc);
+        put_text(&h, "/fclib_local/info/title", title ? title : "", "title");
+        put_text(&h, "/fclib_local/info/description", description ? description : "", "description");
+        put_text(&h, "/fclib_local/info/math_info",
+                 "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent",
+                 "what the problem is");
+        const hsize_t n = (hsize_t)n_contacts;
+        if (bound)
+            put(&h, "/bound", H5T_NATIVE_DOUBLE, n, 0, bound, "contact", "N s", "upper bound of the normal impulse");
+        if (disc)
+            put(&h, "/disc", H5T_NATIVE_DOUBLE, n, 0, disc, "contact", "N s",
+                "radius of the disc about 0 that both impulses lie in; NaN: another contact");
         if (places) write_places(&h, places, (hsize_t)n_contacts);
         if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
         if (solution_r) {
             bt_h5_group(&h, "/solution");
-            bt_h5_write(&h, "/solution/u", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, solution_u);
-            bt_h5_write(&h, "/solution/r", H5T_NATIVE_DOUBLE, (hsize_t)m, 0, solution_r);
+            put_rows(&h, "/solution/u", m, solution_u, "m/s", "velocities of the solution");
+            put_rows(&h, "/solution/r", m, solution_r, "N s", "impulses of the solution");
         }
         bt_h5_close(&h);
     }

@@ -17,13 +17,11 @@
 // Vessel (mode thrust). A point of mass M (with added mass) that touches no ice [assumed], on the end of the line.
 // Course d: towards the point of the planned path that lies `lookahead` ahead of the vessel's own place on it
 // (line-of-sight guidance, Fossen 2011). Relative to the water it has speed s along d:
-//     drag     R = (R_f/s_f²) |u| u along d, `lateral` times as much across       R_f: resistance at the free-running
-//     speed s_f
-//     thrust   0 ≤ T ≤ T_b − (T_b − R_f)(s/s_f)²  along d                         T_b: bollard pull; at full power the
-//     net pull
-//                                                                                 T − R = T_b (1 − (s/s_f)²) [assumed
-//                                                                                 parabola]
+//     drag     R = (R_f/s_f²) |u| u along d, `lateral` times as much across
+//     thrust   0 ≤ T ≤ T_b − (T_b − R_f)(s/s_f)² along d
 //     governor T is as large as it can be without the speed over ground along d exceeding the programme's; never astern
+// with R_f the resistance at the free-running speed s_f and T_b the bollard pull. At full power the net pull is
+// T − R = T_b (1 − (s/s_f)²) [assumed parabola].
 // Drag and the fall of thrust are linearised about the speed at the start of the step and taken at U2, as in forces.h:
 // with K = R_f/s_f² |u1| and C = (T_b − R_f)/s_f² max(0, s1), full power is one more drag: (M + Δt (K + C)) U2 = M U1 +
 // Δt (K + C) U_w + Δt T_b − Σ λ l̂. So at U2 the vessel is one of three linear things along d, {full power, held at the

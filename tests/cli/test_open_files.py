@@ -40,11 +40,12 @@ def made(tmp_path_factory):
         "variants": {"a": {"ice.size": 1}, "b": {"ice.shape": "rectangles"}}}))
     called(folder, "ensemble", "study.yml", "-o", "all")
     write_case(folder, LINE)
-    called(folder, "run", "case.yml", "-o", "line", "--quiet")
+    called(folder, "run", "case.yml", "-o", "line", "--quiet", "--dump-contacts", "20:contacts.h5")
     return folder
 
 
-FILES = ("full/result.h5", "full/checkpoint.h5", "line/result.h5", "line/checkpoint.h5", "field.h5", "all/ensemble.h5")
+FILES = ("full/result.h5", "full/checkpoint.h5", "line/result.h5", "line/checkpoint.h5", "field.h5", "all/ensemble.h5",
+         "contacts.h5")
 
 
 def datasets(path):
@@ -79,9 +80,10 @@ def test_every_dataset_has_units_a_name_and_axes(made, name):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_xarray_opens_every_group(made, engine):
     """The values of h5py, with named dimensions; time, and the member, as coordinates."""
-    for name in ("full/result.h5", "line/result.h5", "field.h5", "all/ensemble.h5"):
+    for name in ("full/result.h5", "line/result.h5", "field.h5", "all/ensemble.h5", "contacts.h5"):
         with h5py.File(made / name) as f:
-            for group in (g for g in f if isinstance(f[g], h5py.Group) and g != "xdmf"):
+            groups = [g for g in f if isinstance(f[g], h5py.Group) and g not in ("xdmf", "fclib_local", "guesses")]
+            for group in groups + [g for g in ("fclib_local/W", "fclib_local/vectors", "guesses/1") if g in f]:
                 with xarray.open_dataset(made / name, group=group, engine=engine) as ds:
                     assert not [d for d in ds.sizes if d.startswith("phony") or d.startswith("dim_")], (name, group)
                     assert set(ds.variables) == set(f[group]), (name, group)
