@@ -6,7 +6,7 @@
 // threads. Only wall times, and the counts of what the division among ranks has cost, are those of the pieces. A run
 // that is killed before its first checkpoint starts again from case.resolved.yml, which is then also its case as given.
 //
-// The file. DIR/checkpoint.h5 is a protected by a checksum HDF5 file (src/base/checksum.h) of named arrays
+// The file. DIR/checkpoint.h5 is an HDF5 file protected by a checksum (src/base/checksum.h), of named arrays
 // (src/base/snapshot.h); rank 0 gathers and writes it. It is written as checkpoint.h5.tmp, brought to the disk, the one
 // before becomes checkpoint.previous.h5, the new one checkpoint.h5; so at every moment there is one that is whole. It
 // holds the case as text with its tables of current and wind, and the ice field as made, with the lead in it: a run
@@ -23,36 +23,41 @@
 //                       radius, area, mass, inertia, share,
 //                       friction, restitution, thickness, drag, motion, large, home.x, home.y, home.yaw
 //                     - vel_start, vel_free, inv: bt_forces_predict makes them anew, also for bodies at rest, since no
-//                     cell is known to rest
+//                       cell is known to rest
 //   bt_cells          S corner, sides, allowance, reach, heaviest, rebounds, margin_max, box, wrap, relabel: labels
 //                       decide which cell owns a contact, and so the order of the sweeps. They are older than the
 //                       poses, and cannot be made from them
-//                     D cell array, at, n_in_cells, labelled      - moved, moved_any, speed, bound, awake, order, run,
-//                     still not needed: rest (a cell that rests is found to do so again), n_listings
+//                     D cell array, at, n_in_cells, labelled
+//                     - moved, moved_any, speed, bound, awake, order, run, still
+//                     not needed: rest (a cell that rests is found to do so again), n_listings
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
 //                     (contacts.h)
-//   bt_memory          S all: what contact laws remember of pairs (contact/law.h)
-//                     bt_contact, bt_limit, bt_solver, lists   - (the momentum starts anew in every solve)
+//   bt_memory         S all: what contact laws remember of pairs (contact/law.h)
+//   bt_contact, bt_limit, bt_solver, lists
+//                     - all: the momentum starts anew in every solve
 //   bt_tow            S time, carriage, travel, way, mark, course, per branch lambda, taut, broken; vessel vx, vy, way
-//       D, - the rest
-//   bt_forces         D own                                                                        - what is recorded
-//   of the towed body, its place
-//   bt_window         S start, rear, drift, vel, counters, dropped, brought                       D the rest
-//   bt_environment    D (tables from the checkpoint)        bt_world   S step, drift, events      - stats
-//   bt_impacts        S open                       D rule, panels' places                         - touch, closed,
-//   collision, largest_push, panels' loads
-//   bt_record         S history, numbers of entries and frames, the entry under way               the entries and
-//   frames themselves: result.h5
+//                     D, - the rest
+//   bt_forces         D own
+//                     - what is recorded of the towed body, its place
+//   bt_window         S start, rear, drift, vel, counters, dropped, brought
+//                     D the rest
+//   bt_environment    D (tables from the checkpoint)
+//   bt_world          S step, drift, events
+//                     - stats
+//   bt_impacts        S open
+//                     D rule, panels' places
+//                     - touch, closed, collision, largest_push, panels' loads
+//   bt_record         S history, numbers of entries and frames, the entry under way
+//                     in result.h5: the entries and frames themselves
 //   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
-//     the rows: result.h5
+//                     in result.h5: the rows
 //   bt_run_totals     S lead, stall, wall times; concentration, mean_thickness, mean_radius, outlines from the field
-//   D the rest
-//   bt_domain         not state: which rank owns what steers no bit
-//   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: there is no
-//   counter
+//                     D the rest
+//   bt_domain         not state: which rank owns what affects no bit
+//   random numbers    are keyed by seed, purpose and id (src/base/rng.h) and used by the field alone: no counter
 //
-// That nothing is missing is shown by a test that takes up a run after every step (tests/contact/test_checkpoint.c).
+// That nothing is missing is shown by a test that takes up a run after every step (tests/unit/test_checkpoint.c).
 // What no step can leave is refused, under a sound checksum too (src/output/state_check.c).
 #ifndef BERGTOW_CHECKPOINT_H
 #define BERGTOW_CHECKPOINT_H

@@ -10,16 +10,14 @@
 //                    [Lichey & Hellmer 2001, J. Glaciol. 47, with P* = 20 kN/m², P_s = 13 kN/m; FESOM2's iceberg code]
 //   Three closures of "F × 1 m = work spent on opening 1 m of channel" [Marchenko et al. 2010 as quoted by Yulmetov &
 //   Løset 2017; their formula is not at hand, so each of these is ours and has a name]:
-//     compaction     F = P W                                    the strip is pressed against ice of strength P
-//     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W          the ice of the strip is pushed onto or under other
-//     ice; κ: work
-//                                                               over potential energy, of which a range is given
-//     momentum       F = ρ_i h W V² A φ/(φ − A)                 the ice of the strip is swept together to φ, with the
-//     front at V φ/(φ − A)
-//   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²         resting disc-like floes of radius r, each met once by
-//   a heavy disc of
-//                                                               radius R = W/2, without friction and drag (derived;
-//                                                               tests/physics/test_resistance.c)
+//     compaction     F = P W                              the strip is pressed against ice of strength P
+//     rafting        F = κ ½ ρ_i (1 − ρ_i/ρ_w) g h² A W    the ice of the strip is pushed onto or under other ice; κ:
+//                                                         work over potential energy, of which a range is given
+//     momentum       F = ρ_i h W V² A φ/(φ − A)           the ice of the strip is swept together to φ, with the front
+//                                                         at V φ/(φ − A)
+//   dilute limit     F = (4/3)(1 + e) A ρ_i h (R + r) V²   resting disc-like floes of radius r, each met once by
+//                                                         a heavy disc, R = W/2, without friction and drag (derived;
+//                                                         tests/physics/test_resistance.c)
 //   ships in pack    F = ½ k Fr_p^b ρ_i W h V² A^n,  Fr_p = V/√(g h A): a regression of ship resistance in pack ice
 //                    over the pack-ice Froude number [Colbourne 2000:
 //                    the form; not at hand]. Hulls: blunt k 16.1, b −1.7937, n 3; slender k 4.4, b −0.8267, n 2, as in
@@ -28,7 +26,7 @@
 //                    gives no range of A, h, V or floe size; the numbers are of ships: for any other body the note says
 //                    extrapolated
 //   open water       F = (½ ρ_w C_w draft b + ρ_w C_ws A_wl) |ΔV| ΔV·d   the drag that src/force/forces.c computes; no
-//   ice resistance
+//                    ice resistance
 //
 // Ice and water are taken to move together, with the current, its mean over the run: ΔV = V_tow − U_w.
 //

@@ -18,8 +18,7 @@
 //     samples: 100                         # conditions of the Latin hypercube
 //     repeats: 20                          # fields of each condition
 //     seed: 1
-//     fields: own                          # of each condition; common: the same seeds in all, to compare conditions on
-//     the same ice
+//     fields: own                          # of each condition; common: the same seeds, and so the same ice, in all
 //     ranks: 1                             # MPI ranks that work on one member
 //
 // The keys, with defaults and ranges: src/case/study_keys.c, bergtow --list-keys. Members write no frames unless the

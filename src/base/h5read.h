@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reading back what this program wrote: a protected by a checksum file, with one way to fail.
+// Reading back what this program wrote: a file protected by a checksum, with one way to fail.
 #ifndef BT_H5READ_H
 #define BT_H5READ_H
 

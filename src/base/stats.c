@@ -2,7 +2,7 @@
 // Mean with its interval, trend, and the start of the steady window of a correlated series.
 //
 // Interval of the mean: the cosine estimator with equal weights [Lazarus, Lewis, Stock & Watson 2018, J. Bus. Econ.
-//     Stat. 36].
+// Stat. 36].
 //     Λ_j = √(2/n) Σ_i (x_i − m) cos(π j (i + ½)/n),   j = 1..ν      how much of the slowest waves the series holds
 //     S_ν = (1/ν) Σ_{j≤ν} Λ_j²,   var(m) = max(S_FEW, S_WAVES) / n,   interval m ± FACTOR √var(m)
 // The Λ_j are nearly independent, each with the variance of the spectrum near frequency zero, which is n var(m): S_ν
@@ -17,9 +17,9 @@
 // two and six waves with 2.78: 89, 98, 99, 97 % of the 160.
 //
 // Correlation time: B batches (at most BATCHES), and a first-order autoregression through their deviations d_k,
-//     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²       p parameters
-//     fitted
-// It counts the independent samples of the short correlation and is far less noisy than ν squares.
+//     φ = Σ d_k d_{k+1} / Σ d_k²,   v = Σ d_k² / (B − p − 1) · (1 + φ)/(1 − φ),   2τ = v (n/B) / sd²
+// with p parameters fitted. It counts the independent samples of the short correlation and is far less noisy than ν
+// squares.
 //
 // Trend: least squares on the same batches against the time u from −½ to ½. Of its deviations from the line, the larger
 // of v and the mean square of Λ_2..Λ_7 (slow waves that the short correlation does not know) gives

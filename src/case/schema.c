@@ -7,7 +7,7 @@
 //   [Sukhorukov & Løset 2013] Cold Reg. Sci. Technol. 94: friction of sea ice on sea ice
 //   [Rothrock & Thorndike 1984] J. Geophys. Res. 89: floe size distribution
 //   [Lichey & Hellmer 2001]  J. Glaciol. 47: giant iceberg drift, force of sea ice on a berg; numbers also as in
-//   FESOM2's iceberg code
+//                            FESOM2's iceberg code
 //   [Flato & Hibler 1995]    J. Geophys. Res. 100: ridging, work / potential energy
 //   [Metrikin 2014]          NTNU: numerical simulation of dynamic positioning in ice, position projection
 // "assumed" is a choice of this program without a measurement behind it.

@@ -2,8 +2,7 @@
 // Which bodies touch or may touch within the step: pair lists, narrow phase, contact manifolds.
 //
 // Data flow of one step (detect.c), cell by cell (cells.h):
-//   speeds ─> margins ─> pair list of the cell (kept over many steps) ─> narrow phase ─> contacts in the order they are
-//   swept
+//   speeds ─> margins ─> pair list of the cell (kept over many steps) ─> narrow phase ─> contacts, in sweep order
 //
 // What the result depends on is only this: a contact exists for every pair of an active cell whose gap along the best
 // separating axis is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far

@@ -10,17 +10,16 @@
 // The mass of crushed ice stays where it was.
 //
 // Contact length. ℓ is the width, across the normal, of the overlap of the two outlines as they are when the crushed
-// surfaces
-// touch: the overlapping part for two edges; for a corner of angle φ that was crushed squarely to the depth d, 2 d
-// tan(φ/2); the chord for a disc. Two points share it as the forces at their places that are equivalent to a uniform
-// pressure on it: half each for two edges that lie on each other, nearly all for the end of an edge that has come in
-// tilted. It is looked at one slop deeper, so that edges that lie on each other bear from the first touch. No contact
-// is shorter than ℓ_min = least_length × h (half of it for each of two points), or a corner at its first touch would
-// bear nothing; assumed.
+// surfaces touch: the overlapping part for two edges; for a corner of angle φ that was crushed squarely to the depth d,
+// 2 d tan(φ/2); the chord for a disc. Two points share it as the forces at their places that are equivalent to a
+// uniform pressure on it: half each for two edges that lie on each other, nearly all for the end of an edge that has
+// come in tilted. It is looked at one slop deeper, so that edges that lie on each other bear from the first touch. No
+// contact is shorter than ℓ_min = least_length × h (half of it for each of two points), or a corner at its first touch
+// would bear nothing; assumed.
 //
 // Implicit length. A step can be long against the crushing itself (Δt = 5 s; a floe of 30 m stops in 1 s): with the
 // length of the start of the step a corner would go in by v Δt as if it bore nothing. So the bound is a function of the
-//     approach in the step,
+// approach in the step,
 //     λ <= max(p h Δt ℓ_min, p h Δt (ℓ1 + θ κ (−w) Δt)) and <= p h Δt ℓ2,   κ = (ℓ2 − ℓ1)/D
 // ℓ1: length now, ℓ2: after the approach D that the pair would make in the step by itself. With X2 = X1 + U2 Δt and g²
 // = Δt² p h κ W (W: inverse mass of the row) a corner of speed v that meets the surface, ℓ1 = 0, crushes d1 = Δt v/(1 +
@@ -29,8 +28,7 @@
 // i.e. the mean over the step where it resolves the crushing, and the whole depth v/√(p h κ W) in one step where it
 // does not; in between the depth of a stop comes out up to 30 % too small (at g = 1) [D].
 // Rejected: θ = ½ (a fourth of the depth at g = 8) and θ = 0 (eight times the depth); lengths from the corner's angle,
-// or from the clipped points of the manifold: a disc of 32 short edges bears on one of them then, however deep it is
-// in.
+// or from the clipped points of the manifold: a disc of 32 short edges then bears on one of them at any depth.
 //
 // Memory. A pair keeps its depths, by contact feature, while its gap is at most BT_LAW_MEMORY mean floe sizes; then
 // they are forgotten, and the ice is sharp again (assumed). A point whose feature is new (the corner has slid on to the

@@ -303,11 +303,10 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
 // The parts of such a body are convex, but some of their edges are cuts through the ice, and some of their corners are
 // no corners of the body. A contact there would be with something that is not there: a floe that slides along a shore
 // of two parts would be stopped by the corner of the part ahead ("ghost" or "internal edge" collisions). So a contact
-//   counts only where the outline itself can be touched:
+// counts only where the outline itself can be touched:
 //   an edge       is one of the outline, not a cut;
 //   a corner V    of the outline, with edges e1 → V → e2, is convex, and the direction n from the body to the other one
-//   lies in its normal
-//                 cone: n·e1 >= 0 and n·e2 <= 0.
+//                 lies in its normal cone: n·e1 >= 0 and n·e2 <= 0.
 // What is left out here is found with the part that has the edge, or with the one on the other side of the cut. Parts
 // that are apart touch at their nearest features or not at all. Parts that overlap part along the best axis that
 // counts, if that is not much farther than along the best of

@@ -1,11 +1,11 @@
-// SPDX-License-Identifier: MIT Free drift: the velocity at which the forces of water, wind, Coriolis and slope on a
-// body balance, with which ice begins (ice.start: drift).
+// SPDX-License-Identifier: MIT
+// Free drift: the velocity at which the forces of water, wind, Coriolis and slope on a body balance, with which ice
+// begins (ice.start: drift).
 //
-//     k_w |U_w − U| (U_w − U) + k_a |U_a − U| (U_a − U) + M (U' − U)/Δt + … = 0,   U': U after Coriolis and slope in a
-//     step
+//     k_w |U_w − U| (U_w − U) + k_a |U_a − U| (U_a − U) + M (U' − U)/Δt + … = 0
 //
-// with whatever else the table of force laws has: the load of the body (forces.h) at U, of which drag is differentiated
-// exactly.
+// with U' the velocity after Coriolis force and slope in a step, and whatever else the table of force laws has: the
+// load of the body (forces.h) at U, of which drag is differentiated exactly.
 //
 // The left side is the force in a step of the scheme itself, so that a body that begins with this velocity keeps it,
 // without contacts, to rounding. It is that of M dU/dt = 0 but for f Δt/2 of the Coriolis force (4e-4 at 5 s). Each

@@ -14,7 +14,7 @@
 //
 // Sea-surface tilt, for a body that takes the place of water (model: −m g ∇η, m without added mass: forces.h):
 //     geostrophic   −g∇η = f k×U_w at that time: balances Coriolis on the current, and nothing accelerates the body
-//     with the water but drag
+//                   with the water but drag
 //     dynamic       −g∇η = dU_w/dt + f k×U_w: the tilt that a current without friction, uniform in space, has; dU_w/dt
 //                   moves the added mass, too. A body that moves with the water goes on doing so without drag. dU_w/dt
 //                   is taken from the middle of the last step (from t = 0 in the first) to the middle of this one, and

@@ -3,7 +3,7 @@
 //
 // The impulses follow from the load of the law alone, by the scheme of bergtow/forces.h:
 //     rotation   M (R − I) (U1 − U_b): with U1 the part of the law whose turn it is, with U_b that of the law that says
-//     U_b
+//                U_b
 //     gain       M times the gain;   explicit: Δt F
 //     implicit   Δt (j − D U2 − O U*), K = D + O with the diagonal D: contacts and line see D alone, so that what
 //                couples turning and drift is that of U*. From (M + Δt K) U* = M U' + Δt j and (M + Δt D)(U2 − U*) =

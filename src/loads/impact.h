@@ -5,8 +5,7 @@
 // Yulmetov & Løset 2017, section 2.2 begins so; formulas derived here]:
 //
 //   push        a contact that has been closed before: F = λ / Δt
-//   collision   a contact whose approach the step cuts: λ_c acts for the time of a collision T_c, which is not that of
-//   a step
+//   collision   a contact whose approach the step cuts: λ_c acts for the time of a collision, T_c, not for a step
 //
 // Telling them apart. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ +
 // M_b⁻¹)·n including rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse alone changes the normal
@@ -26,8 +25,7 @@
 // Force of a collision with impulse λ, approach v_n and effective mass m_e; every peak names which:
 //   duration    T_c given:                       mean λ / T_c,  peak (π/2) λ / T_c of a half-sine
 //   crushing    a corner of angle φ is crushed at pressure p over thickness h: F = k x, k = 2 p h tan(φ/2), so
-//               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then; the rebound, if any, has
-//               no part in it
+//               peak v_n √(k m_e) after t_p = (π/2) √(m_e / k),  mean (2/π) peak up to then, without the rebound
 // In the second v_n is what the contact itself takes away, min(approach, λ / m_e): neighbours may take a part.
 //
 // What is counted of them, and from when: src/output/impact_count.h, src/loads/panel_blocks.h.

@@ -190,7 +190,7 @@ struct bt_snapshot;
 /// to the run whatever its end is. The status is that of rank 0.
 bt_status bt_record_save(bt_record *r, int64_t n_frames, struct bt_snapshot *s, bt_errors *err);
 
-/// Collective. result.h5 and frames.xdmf as they are now: a protected by a checksum copy of the file under way, in
+/// Collective. result.h5 and frames.xdmf as they are now: a copy of the file under way, protected by a checksum, in
 /// place of what was there.
 bt_status bt_record_publish(bt_record *r, bt_errors *err);
 

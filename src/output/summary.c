@@ -2,8 +2,7 @@
 // The numbers of a whole run: reduced over one window (steady.h), with a warning for each doubt.
 //
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
-//     mean ice resistance with its 95 % interval (bergtow/stats.h), sd, 95th and 99th percentile and peak of the step
-//     means
+//     mean ice resistance with its 95 % interval (bergtow/stats.h); sd, 95th and 99th percentile, peak of step means
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − … − <inertia>)      the body's own momentum balance
 // and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
 #include "output/summary.h"

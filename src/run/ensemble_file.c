@@ -3,18 +3,16 @@
 //
 //     /members/id, condition, repeat, seed, status [M]   status: 0 waiting, 1 finished, 2 failed; id from 1
 //     /members/name, state_hash, reason [M]              texts, "" where there is none; reason: of a failure, that a
-//     waiting member's process died, or that its
-//                                                        result is not sound
+//                                                        waiting member's process died, or that its result is not sound
 //     /parameters/KEY [M]                                value in SI with attribute units, or text; NaN or "" where the
-//     case could not be read
+//                                                        case could not be read
 //     /summary/NAME [M]                                  every number of summary.json that does not depend on time or
-//     machine; nested ones as A_B; NaN where
-//                                                        there is none; attributes: key (A.B), order, and as registered
-//                                                        units, description; of an estimate also estimate (its name),
-//                                                        label, kind
+//                                                        machine; nested ones as A_B; NaN where there is none;
+//                                                        attributes: key (A.B), order, and as registered units,
+//                                                        description; of an estimate also its name, label, kind
 //     /series/time, ice_resistance, tow_force [M][T]     NaN after the end of a run
 //     /study, /study_resolved                            texts; attributes of the root: complete, n_members,
-//     n_finished, n_failed
+//                                                        n_finished, n_failed
 //
 // Made whole each time under a temporary name, protected by a checksum and renamed: a reader finds the old or the new
 // one. Only members whose files fit their record (ensemble_record.h) are taken in. Members are written in their order,

@@ -8,8 +8,8 @@
 //
 // name and study (the digest of study.resolved.yml) tell whose record it is, the digests (XXH3, 128 bits) cover every
 // byte of what an ensemble and its statistics read. A member is sound when the record made anew from its files is this
-// text to the last byte; so a damaged record is no sound one, either. It is written only of a protected by a checksum
-// result and a summary that reads, is of a whole run and has its numbers, and after that nothing changes these files.
+// text to the last byte; so a damaged record is not sound, either. It is written only of a result whose checksum fits,
+// and a summary that can be read, is of a whole run and has its numbers; nothing changes these files after that.
 // Rejected: to compare state hash and key numbers of summary.json with result.h5, which leaves all other numbers open;
 // a digest inside summary.json, which does not tell a member from another that was copied over it; to trust the
 // checksum of result.h5 alone, for the same reason.

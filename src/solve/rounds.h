@@ -9,8 +9,8 @@
 //
 // Between two sweeps of a round everything is moved on along its last change (Nesterov 1983, Soviet Math. Dokl. 27;
 // Beck & Teboulle 2009, SIAM J. Imaging Sci. 2; for contacts Mazhar et al. 2015, ACM Trans. Graph. 34):
-//     x_{k+1} = sweep(y_k),   y_{k+1} = x_{k+1} + β (x_{k+1} − x_k),   β = min(cap, (θ_k − 1)/θ_{k+1}),   θ_{k+1} = (1
-//     + √(1 + 4 θ_k²))/2
+//     x_{k+1} = sweep(y_k),   y_{k+1} = x_{k+1} + β (x_{k+1} − x_k),
+//     β = min(cap, (θ_k − 1)/θ_{k+1}),   θ_{k+1} = (1 + √(1 + 4 θ_k²))/2
 // and where the sweep turned against the move, Σ W (y_k − x_{k+1}) (x_{k+1} − x_k) > 0, it starts anew with θ = 1, β =
 // 0 (O'Donoghue & Candès 2015, Found. Comput. Math. 15). Velocities are linear in the impulses: those of y are the same
 // combination, so each body needs but its velocity before, no impulse is applied again, and ghosts, which have the same

@@ -1,5 +1,6 @@
-// SPDX-License-Identifier: MIT Form drag along the outline against plain sums, width and hull; no reversal at any step;
-// added mass; free drift that stays.
+// SPDX-License-Identifier: MIT
+// Form drag along the outline against plain sums, width and hull; no reversal at any step; added mass; free drift that
+// stays.
 #include "scene.h"
 
 #include "force/drift.h"
