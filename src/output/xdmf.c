@@ -19,7 +19,7 @@
 
 static void data_item(FILE *f, int64_t n, int width, const char *type, int bytes, const char *dataset)
 {
-    char columns[8] = "";
+    char columns[16] = "";
     if (width > 1) snprintf(columns, sizeof columns, " %d", width);
     fprintf(f,
             "<DataItem Dimensions=\"%" PRId64
