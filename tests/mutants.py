@@ -336,7 +336,6 @@ MUTANTS = {
          "copies of a window that goes backwards"),
         ("late > 0 && floe_at", "floe_at", "floes are renewed before their time"),
         ("if (x >= low + period) x -= period, ++*turns; // rounding", "// rounding", "a place on the rim"),
-        ("dx * dx + dy * dy >= reach * reach || c->gid == b->gid[i]", "dx * dx + dy * dy >= reach * reach", "itself"),
         ("> slop) blocked[k] = 1;", "> 100 * slop) blocked[k] = 1;", "floes are put upon others"),
         ("bt_domain_maxima(w, blocked, (int)n);", "", "ranks disagree on free places"),
         ("more = more || (blocked[k] > 0 && !list[k].stays);", "", "no second look at what stays"),

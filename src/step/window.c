@@ -231,7 +231,7 @@ static void obstruct(const bt_world *w, bt_idx i, const candidate *list, size_t 
         const double dx = bt_nearest_image(p->x - c->place.x, w->par.period_x),
                      dy = bt_nearest_image(p->y - c->place.y, w->par.period_y);
         const double reach = b->radius[i] + c->radius;
-        if (dx * dx + dy * dy >= reach * reach || c->gid == b->gid[i]) continue;
+        if (dx * dx + dy * dy >= reach * reach) continue;
         if (depth(b, i, c, s, dx, dy) > slop) blocked[k] = 1;
     }
 }

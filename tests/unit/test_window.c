@@ -2,7 +2,10 @@
 // The moving window floe by floe: what comes back, when, where, what waits for what, and what is counted.
 #include "scene.h"
 
+#include <stdlib.h>
+
 #include "bergtow/outline.h"
+#include "space/cells.h"
 #include "step/window.h"
 
 enum { LENGTH = 40, AHEAD = 16 }; // zone 8 m, stride 2 m, rear at first body − 24 m
@@ -286,6 +289,103 @@ static void does_not_go_back(void **state)
     bt_world_free(w);
 }
 
+/// Two floes that nearly touch are put at their places: they have the velocity of the undisturbed ice, know of no contact, and
+/// are looked at as after a blow. Two others are left alone. A home a rounding below the period's rim is on the rim.
+static void put_as_new(void **state)
+{
+    (void)state;
+    bt_world *w = empty(0.1);
+    const double x[4] = {0, 1.25, 30, 31.25};
+    for (int k = 0; k < 4; k++) add_floe(w, x[k], 0, 0);
+    add_body_and_window(w, 1, speed);
+    w->window->rear = -2; // so that the first home is not passed
+    w->window->start = -2;
+    bt_world_step(w);
+    bt_bodies *b = &w->bodies;
+    bt_idx of[4], n_pairs = 0;
+    for (int k = 0; k < 4; k++) {
+        of[k] = bt_world_index(w, k);
+        b->vel[of[k]] = b->vel_start[of[k]] = b->vel_free[of[k]] = (bt_vel){.x = 1, .y = 2, .w = 3};
+        b->disturbed[of[k]] = 0;
+    }
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++, n_pairs++)
+            w->cells->cell[k].search.pairs[j].n_points = 1;
+    assert_int_equal(n_pairs, 2);
+    assert_false(w->cells->relabel);
+    b->home[of[0]].x = -1e-20;
+    w->window->vel = (bt_vel){.x = 0.3, .y = 0.1};
+    w->tow->travel_x += 4.5;
+    bt_window_begin(w);
+    assert_int_equal(w->window->renewed_now, 2);
+    assert_true(w->cells->relabel);
+    for (int k = 0; k < 4; k++) {
+        const bt_vel put = {.x = 0.3, .y = 0.1}, left = {.x = 1, .y = 2, .w = 3}, *want = k < 2 ? &put : &left;
+        const bt_vel *is[3] = {&b->vel[of[k]], &b->vel_start[of[k]], &b->vel_free[of[k]]};
+        for (int j = 0; j < 3; j++) assert_true(is[j]->x == want->x && is[j]->y == want->y && is[j]->w == want->w);
+        assert_int_equal(b->disturbed[of[k]], k < 2);
+        assert_true(at(w, k, x[k], 0));
+    }
+    assert_int_equal(b->home[of[0]].lap, b->home[of[0]].copy);
+    for (bt_idx k = 0; k < w->cells->n; k++)
+        for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++) {
+            const bt_pair *p = &w->cells->cell[k].search.pairs[j];
+            assert_int_equal(p->n_points, p->a == of[0] || p->a == of[1] ? 0 : 1);
+        }
+    bt_world_free(w);
+}
+
+/// A floe whose place another has entered by some times the slop waits; by less than the slop it goes.
+static void no_place_upon_others(void **state)
+{
+    (void)state;
+    for (int deep = 0; deep < 2; deep++) {
+        bt_world *w = empty(0.1);
+        double v[8];
+        scene_square(1, v);
+        for (int k = 0; k < 2; k++) {
+            bt_body_def d = scene_prism(4, v, 36.4);
+            d.x = 2 + (k ? 6 : 0), d.drag.water_skin = 5;
+            bt_world_add(w, &d);
+        }
+        add_body_and_window(w, 1, speed);
+        bt_world_step(w);
+        move(w, 1, -5 - (deep ? 5 : 0.5) * w->par.slop, 0, 0); // onto the place of floe 0
+        move(w, 0, -0.5, 4, 0);
+        w->tow->travel_x += 4.5;
+        bt_window_begin(w);
+        assert_int_equal(w->window->renewed, !deep);
+        bt_world_free(w);
+    }
+}
+
+/// Where walls hold the ice, the field around it does not drift across; a stride leaves most of the zone of entry as it
+/// is, however short that is.
+static void held_by_walls(void **state)
+{
+    (void)state;
+    for (int held = 0; held < 2; held++) {
+        bt_params p = scene_params(0.1, 1);
+        p.period_x = LENGTH;
+        p.water_u = p.water_v = 0.2;
+        bt_world *w = bt_world_create(&p);
+        add_floe(w, 2, 0, 0);
+        add_body_and_window(w, 1, speed);
+        w->window->held = held;
+        for (int k = 0; k < 10; k++) bt_window_advance(w);
+        assert_true(w->window->drift_x > 0.1);
+        assert_true(held ? w->window->drift_y == 0 : w->window->drift_y > 0.1);
+        bt_world_free(w);
+    }
+    bt_world *w = empty(0.1);
+    add_floe(w, 2, 0, 0);
+    add_body_and_window(w, 1, speed);
+    free(w->window);
+    bt_window_create(w, 1, 4, 1, false);
+    assert_true(w->window->zone == 2 && w->window->stride == 0.5);
+    bt_world_free(w);
+}
+
 /// What decides about the floes' way is in the hash of the state.
 static void hashed(void **state)
 {
@@ -319,6 +419,9 @@ int main(void)
         cmocka_unit_test(carried_along),
         cmocka_unit_test(drifts_as_undisturbed_ice),
         cmocka_unit_test(does_not_go_back),
+        cmocka_unit_test(put_as_new),
+        cmocka_unit_test(no_place_upon_others),
+        cmocka_unit_test(held_by_walls),
         cmocka_unit_test(hashed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
