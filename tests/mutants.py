@@ -13,7 +13,8 @@ PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
 FILES = ["cli/test_faults.py", "cli/test_replace.py"]
-OBSERVE = ["cli/test_balance.py", "cli/test_tow.py", "scenes:line_bridle_breaks,thrust,impacts_sine"]
+OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
+           "scenes:line_bridle_breaks,thrust,impacts_sine"]
 
 MUTANTS = {
     "src/force/laws.h": (DRAG, [

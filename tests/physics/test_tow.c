@@ -126,6 +126,18 @@ static void a_slack_line_is_no_damper(void **state)
     bt_world_free(w);
 }
 
+/// What a solution begins from: the impulse of the last step in a branch that is taut, none in a slack one, none at all
+/// where there is no last step.
+static void a_slack_branch_begins_from_nothing(void **state)
+{
+    (void)state;
+    for (int keep = 0; keep < 2; keep++) {
+        bt_tow t = {.n_branches = 2, .branch = {{.taut = true, .lambda = 3}, {.taut = false, .lambda = 4}}};
+        bt_tow_warm_start(&t, keep);
+        assert_true(t.branch[0].lambda == (keep ? 3 : 0) && t.branch[1].lambda == 0);
+    }
+}
+
 /// A stretched line that slackens within the step damps as long as it is stretched:
 /// T Δt = Δt (k s − c v) / (1 + Δt c/m).
 static void a_stretched_line_damps_while_it_slackens(void **state)
@@ -514,6 +526,7 @@ int main(void)
         cmocka_unit_test(free_vessel_and_body_swing_with_the_reduced_mass),
         cmocka_unit_test(body_in_the_wind_swings_on_a_fixed_end),
         cmocka_unit_test(a_slack_line_is_no_damper),
+        cmocka_unit_test(a_slack_branch_begins_from_nothing),
         cmocka_unit_test(a_stretched_line_damps_while_it_slackens),
         cmocka_unit_test(a_vessel_drifts_with_the_current),
         cmocka_unit_test(bridle_shares_the_load),

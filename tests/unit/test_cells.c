@@ -512,6 +512,31 @@ static void no_floes_need_no_rows(void **state)
     bt_world_free(w);
 }
 
+/// Light floes fly over many cells towards a heavy free body that stays where it is: the last cell, whose list has
+/// nothing of its own that moves, looks again in time, and each hits.
+static void floes_find_a_body_at_rest(void **state)
+{
+    (void)state;
+    bt_params p = calm_params();
+    bt_world *w = bt_world_create(&p);
+    for (int k = 0; k < 3; k++) {
+        double s[8];
+        scene_square(0.7, s);
+        bt_body_def d = scene_prism(4, s, 40);
+        d.x = 10 + 4 * k, d.y = 0.5 * k - 0.5, d.vx = -0.9 + 0.1 * k;
+        bt_world_add(w, &d);
+    }
+    const bt_gid body = add_hitter(w, 3, 0, 0, 0, 0, BT_DYNAMIC, true);
+    double deepest = 0;
+    for (int i = 0; i < 300; i++) {
+        bt_world_step(w);
+        deepest = bt_max(deepest, bt_world_overlap(w));
+    }
+    assert_true(deepest < 0.01);
+    assert_true(pose_of(w, body).x < 0);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -524,6 +549,7 @@ int main(void)
         cmocka_unit_test(work_is_counted_cell_by_cell),
         cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
+        cmocka_unit_test(floes_find_a_body_at_rest),
         cmocka_unit_test(a_body_far_away_covers_no_cell),
         cmocka_unit_test(no_floes_need_no_rows),
     };

@@ -99,6 +99,7 @@ static void everything_wrong(bt_sample *s, int i)
 {
     s->unconverged = i % 3 == 0;
     s->contact_work = i % 5 == 0 ? 1 : -1;
+    s->repeats = i % 4 == 0 ? 3 : 0;
     s->overlap = 0.1;
     s->crushed_depth = 0.9;
     s->momentum_residual = 1e-3;
@@ -143,6 +144,7 @@ static void every_doubt_is_told(void **state)
     for (size_t k = 0; k < sizeof told / sizeof *told; k++)
         if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
     assert_null(strstr(json, "independent samples of the"));
+    assert_string_equal(json_value(json, "repeated_solves"), "450");
     assert_string_equal(json_value(json, "verdict"), "\"not steady\""); // a third of the steps did not converge
     free(json);
 

@@ -289,8 +289,9 @@ static void does_not_go_back(void **state)
     bt_world_free(w);
 }
 
-/// Two floes that nearly touch are put at their places: they have the velocity of the undisturbed ice, know of no contact, and
-/// are looked at as after a blow. Two others are left alone. A home a rounding below the period's rim is on the rim.
+/// Two floes that nearly touch are put at their places: they have the velocity of the undisturbed ice, know of no
+/// contact, and are looked at as after a blow. Two others are left alone. A home a rounding below the period's rim is
+/// on the rim.
 static void put_as_new(void **state)
 {
     (void)state;
@@ -320,7 +321,8 @@ static void put_as_new(void **state)
     assert_int_equal(w->window->renewed_now, 2);
     assert_true(w->cells->relabel);
     for (int k = 0; k < 4; k++) {
-        const bt_vel put = {.x = 0.3, .y = 0.1}, left = {.x = 1, .y = 2, .w = 3}, *want = k < 2 ? &put : &left;
+        const bt_vel put = {.x = 0.3, .y = 0.1}, left = {.x = 1, .y = 2, .w = 3};
+        const bt_vel *want = k < 2 ? &put : &left;
         const bt_vel *is[3] = {&b->vel[of[k]], &b->vel_start[of[k]], &b->vel_free[of[k]]};
         for (int j = 0; j < 3; j++) assert_true(is[j]->x == want->x && is[j]->y == want->y && is[j]->w == want->w);
         assert_int_equal(b->disturbed[of[k]], k < 2);

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// What a step's sample says of the towed body: force and moment of the ice on it, whichever of the two bodies of a
+// contact it is, against the momentum of the other body; drag of the vessel in a current.
+#include "scene.h"
+
+#include "output/observe.h"
+
+/// A square that stands on its corner slides along the flat side of the towed body, with friction. What the towed body
+/// feels is what the square loses, at the point of its corner; the bodies are added in either order.
+static void force_and_moment_on_the_towed_body(void **state)
+{
+    (void)state;
+    for (int towed_first = 0; towed_first < 2; towed_first++) {
+        const bt_params p = scene_params(0.1, 1);
+        bt_world *w = bt_world_create(&p);
+        double hull[8], floe[8];
+        scene_square(4, hull);
+        scene_square(1, floe);
+        const double corner = sqrt(0.5), y = 1.3;
+        bt_gid gid[2];
+        for (int k = 0; k < 2; k++) {
+            const bool towed = towed_first ? k == 0 : k == 1;
+            bt_body_def d = scene_prism(4, towed ? hull : floe, 100);
+            d.friction = 0.3;
+            if (!towed) d.x = 2 + corner + 0.001, d.y = y, d.yaw = BT_PI / 4, d.vx = -0.5, d.vy = 0.4;
+            else d.large = true;
+            gid[towed] = bt_world_add(w, &d);
+        }
+        w->towed = gid[1];
+        w->tow = bt_alloc(1, sizeof *w->tow);
+        *w->tow = (bt_tow){.mode = BT_TOW_LINE, .ux = 1, .dt = p.dt};
+        const bt_vel before = w->bodies.vel[bt_world_index(w, gid[0])];
+        bt_sample s;
+        bt_world_step(w);
+        bt_observe(w, 1, &s);
+        const bt_idx i = bt_world_index(w, gid[0]); // a step may sort the storage
+        const bt_vel after = w->bodies.vel[i];
+        const double fx = -w->bodies.mass[i] * (after.x - before.x) / p.dt,
+                     fy = -w->bodies.mass[i] * (after.y - before.y) / p.dt;
+        assert_true(fx < -10 && fy > 1);
+        CHECK_CLOSE(s.ice_force_x, fx, 1e-9 * fabs(fx));
+        CHECK_CLOSE(s.ice_force_y, fy, 1e-9 * fabs(fx));
+        CHECK_CLOSE(s.ice_moment, 2 * fy - y * fx, 0.01 * fabs(y * fx)); // arms to the middle of a gap of 1 mm
+        bt_world_free(w);
+    }
+}
+
+/// Linear drag of the vessel is that of its speed through the water.
+static void vessel_in_a_current(void **state)
+{
+    (void)state;
+    const bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(4, v);
+    bt_body_def d = scene_prism(4, v, 100);
+    d.large = true;
+    w->towed = bt_world_add(w, &d);
+    w->tow = bt_alloc(1, sizeof *w->tow);
+    *w->tow = (bt_tow){.mode = BT_TOW_THRUST, .ux = 1, .dt = p.dt, .n_branches = 0,
+                       .vessel = {.kd = 50, .vd1 = 1.5, .vd2 = 2, .ud = 0.5, .mass = 10, .thrust = 7}};
+    bt_cells_begin(w);
+    bt_sample s;
+    bt_observe(w, 1, &s);
+    assert_true(s.vessel_drag == 75 && s.vessel_speed == 2 && s.vessel_thrust == 70 && s.vessel_inertia == 50);
+    bt_world_free(w);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(force_and_moment_on_the_towed_body),
+        cmocka_unit_test(vessel_in_a_current),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
