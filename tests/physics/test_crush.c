@@ -2,6 +2,7 @@
 // Crushing-limited contact against closed forms: creep at the limit force, stops, corners, friction, memory.
 #include "scene.h"
 
+#include "bergtow/outline.h"
 #include "contact/crush.h"
 
 static const double pressure = 2e4, sheet = 36.4; // Pa, kg/m²
@@ -324,12 +325,83 @@ static void body_at_a_set_speed(void **state)
     bt_world_free(w);
 }
 
+/// A jam of floes that crush and raft, solved badly: whatever the impulses are, crushed ice does not grow back, and a
+/// pair that has rafted measures its contact from the edges, not from what was crushed before.
+static void laws_of_a_jam(void **state)
+{
+    (void)state;
+    const double h = 0.1, speed = 0.5;
+    bt_params p = params(0.01);
+    p.max_sweeps = 2;
+    p.raft_line = 2 * pressure / h, p.raft_sheet = 1e3, p.raft_rise = 1e3;
+    bt_world *w = bt_world_create(&p);
+    uint64_t seed = 1;
+    for (int k = 0; k < 64; k++) {
+        double v[16];
+        const int n = scene_random_polygon(&seed, 0.45, v);
+        const double x = k % 8 - 3.5, y = k / 8 - 3.5; // NOLINT(bugprone-integer-division): rows of eight
+        const bt_idx floe = add_floe(w, n, v, x, y, 0, -speed * x, h);
+        w->bodies.vel[floe].y = -speed * y, w->bodies.restitution[floe] = 0.5, w->bodies.friction[floe] = 0.3;
+    }
+    int crushed = 0, rafted = 0, unconverged = 0;
+    for (int s = 0; s < 400; s++) {
+        bt_world_step(w);
+        unconverged += !w->stats.converged;
+        for (bt_idx k = 0; k < w->cells->n; k++) {
+            const bt_cell *t = &w->cells->cell[k];
+            for (bt_idx j = 0; j < t->n_contacts; j++) {
+                const bt_limit *l = &t->laws.limits[j];
+                const bool rafts = l->trace[BT_LAW_RAFTING] >= 0;
+                for (int i = 0; i < t->contacts[j].n; i++) {
+                    assert_true(l->grown[i] >= 0);
+                    if (rafts) assert_true(l->depth[i] <= l->grown[i]);
+                    crushed += l->grown[i] > 0, rafted += rafts;
+                }
+            }
+        }
+    }
+    assert_true(crushed > 100 && rafted > 100 && unconverged > 100);
+    bt_world_free(w);
+}
+
+/// A floe in two parts crushes against a wall. What one part crushed stands open to the other too: a contact that finds
+/// no point of its own in the records goes by the deepest of them.
+static void parts_share_their_dent(void **state)
+{
+    (void)state;
+    bt_params p = params(1e-3);
+    bt_world *w = bt_world_create(&p);
+    double v[] = {0.5, -1, 0.5, -0.1, 0, 0, 0.5, 0.1, 0.5, 1, -0.5, 1, -0.5, -1};
+    bt_parts parts;
+    bt_body_def d = scene_prism(7, v, sheet);
+    assert_true(bt_outline_split(7, v, &parts));
+    d.parts = &parts, d.vx = 2, d.thickness = 0.1;
+    bt_world_add(w, &d);
+    scene_wall(w, v[0], -50, 5, 50, 0);
+    for (int s = 0; s < 200; s++) bt_world_step(w);
+    const double deep = pose(w, 0)->x;
+    bt_law_state *laws = &w->cells->cell[0].laws;
+    assert_true(deep > 0.02 && laws->n_memory == 2);
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < 2; i++) laws->memory[k].feature[i] = 1000, laws->memory[k].value[i] /= 1 + k;
+    vel(w, 0)->x = 1e-9;
+    w->bodies.disturbed[bt_world_index(w, 0)] = 1;
+    w->cells->asleep[0] = BT_AWAKE;
+    bt_cells_wake(w->cells, 0);
+    for (int s = 0; s < 5; s++) {
+        bt_world_step(w);
+        assert_true(w->stats.overlap <= 1e-9);
+    }
+    CHECK_CLOSE(pose(w, 0)->x, deep, 1e-6);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pressed_against_a_wall), cmocka_unit_test(stop_at_constant_force), cmocka_unit_test(two_floes),
         cmocka_unit_test(corner), cmocka_unit_test(friction_from_the_limit), cmocka_unit_test(memory),
-        cmocka_unit_test(rebound_below_the_limit), cmocka_unit_test(body_at_a_set_speed),
+        cmocka_unit_test(rebound_below_the_limit), cmocka_unit_test(body_at_a_set_speed), cmocka_unit_test(laws_of_a_jam), cmocka_unit_test(parts_share_their_dent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
