@@ -537,6 +537,26 @@ static void floes_find_a_body_at_rest(void **state)
     bt_world_free(w);
 }
 
+/// A floe that leaves all lists behind in a step, farther than the largest margin, is told; one just within is not.
+static void what_outruns_all_margins_is_told(void **state)
+{
+    (void)state;
+    const double dt = 0.1, sizes[] = {11, 13};
+    for (int k = 0; k < 2; k++) {
+        bt_params p = calm_params();
+        p.dt = dt;
+        bt_world *w = bt_world_create(&p);
+        double s[8];
+        scene_square(1, s);
+        bt_body_def d = scene_prism(4, s, 40);
+        d.vx = sizes[k] * p.size / dt;
+        bt_world_add(w, &d);
+        bt_world_step(w);
+        assert_int_equal(w->stats.outrun, k);
+        bt_world_free(w);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -550,6 +570,7 @@ int main(void)
         cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
         cmocka_unit_test(floes_find_a_body_at_rest),
+        cmocka_unit_test(what_outruns_all_margins_is_told),
         cmocka_unit_test(a_body_far_away_covers_no_cell),
         cmocka_unit_test(no_floes_need_no_rows),
     };
