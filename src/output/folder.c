@@ -17,6 +17,7 @@
 #include "output/xdmf.h"
 
 #define CASE_FILE "case.resolved.yml"
+#define NEW_CASE CASE_FILE ".new"
 
 static bool is_summary(const char *path) { return bt_file_begins(path, "{\n  \"title\": "); }
 static bool is_frames(const char *path) { return bt_file_begins(path, BT_XDMF_HEAD); }
@@ -160,7 +161,7 @@ static void move_back(const char *dir)
 
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err)
 {
-    char *ready = bt_file_join(dir, CASE_FILE ".new"), *path = bt_file_join(dir, CASE_FILE);
+    char *ready = bt_file_join(dir, NEW_CASE), *path = bt_file_join(dir, CASE_FILE);
     bt_status status = bt_file_write(ready, resolved, err); // where the disk is full, nothing has changed
     if (status == BT_OK) {
         status = make_room(dir, err);
@@ -191,7 +192,9 @@ void bt_folder_put_back(const char *dir)
 void bt_folder_recover(const char *dir)
 {
     if (!bt_file_there(dir, CASE_FILE)) bt_folder_put_back(dir);
-    char *aside = aside_of(dir);
+    char *aside = aside_of(dir), *ready = bt_file_join(dir, NEW_CASE);
+    if (is_case(ready)) unlink(ready);
+    free(ready);
     rmdir(aside); // it stays where it is not empty
     free(aside);
 }

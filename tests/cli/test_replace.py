@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from faults import CALLS
 from harness import CLOSING, DONE, IO, NUMERIC, TOW, Run, call, changed, faulty, run, write_case
 from resuming import assert_same_result
 
@@ -38,6 +39,30 @@ def test_a_failed_start_changes_nothing(tmp_path, old, name):
     before = contents(old)
     result = call("run", write_case(tmp_path, OTHER), "-o", old, "--force", env=faulty(BT_FAULT=name))
     assert result.returncode == IO and "No space left on device; free some space" in result.stderr
+    assert "is finished" in call("resume", old).stdout
+    assert contents(old) == before and not (old / "replaced").exists()
+
+
+@pytest.mark.parametrize("name", STANDING)
+def test_a_name_that_cannot_be_moved_aside(tmp_path, old, name):
+    """What has been moved before it is back when the call ends."""
+    before = contents(old)
+    result = call("run", write_case(tmp_path, OTHER), "-o", old, "--force", env=faulty(BT_FAULT=name))
+    assert result.returncode == IO and "No space left on device" in result.stderr
+    assert contents(old) == before and not (old / "replaced").exists()
+
+
+@pytest.mark.parametrize("name, before_rename, code", [("case.resolved.yml.new.tmp", 1, IO), ("checkpoint.h5", 7, -9)])
+def test_killed_after_a_fault(tmp_path, old, name, before_rename, code):
+    """On a disk that is full from the first byte on nothing is moved, so no kill meets a move; on one that refuses a
+    name later, the case is the last to come back, and the next call goes on with the rest."""
+    before = contents(old)
+    env = faulty(BERGTOW_STARTED=1, BT_FAULT=name, BT_CALLS_UNDER=old, BT_CALLS="rename,renameat",
+                 BT_CALLS_AT=before_rename, BT_CALLS_SIGNAL=9)
+    env["LD_PRELOAD"] += f" {CALLS}"
+    result = call("run", write_case(tmp_path, OTHER), "-o", old, "--force", env=env)
+    assert result.returncode == code
+    assert (old / "replaced").exists() == (code != IO)
     assert "is finished" in call("resume", old).stdout
     assert contents(old) == before and not (old / "replaced").exists()
 
