@@ -225,9 +225,6 @@ MUTANTS = {
     "src/contact/law.c": (["physics/test_crush", "physics/test_rafting", "scenes:crushing,rafting_press"], [
         ("if (!(approach > 0)) continue;", "", "what opens gives way"),
         ("l->grown[i] = w->par.dt * approach;", "l->grown[i] = approach;", "depth without the step"),
-        ("for (int law = BT_LAWS - 1; law > BT_LAW_RIGID; law--) {\n        if (m->n_points == 0",
-         "for (int law = BT_LAW_RIGID + 1; law < BT_LAWS; law++) {\n        if (m->n_points == 0",
-         "order of the laws"),
         ("bt_max(t->gaps[j].gap[i], 0) / w->par.dt;", "t->gaps[j].gap[i] / w->par.dt;", "place of an overlap"),
         ("if (t->laws.n_memory > before)", "if (0)", "records are not sorted"),
         ("bt_domain_maxima(w, most, BT_LAWS);", "", "deepest of one rank"),
@@ -445,7 +442,7 @@ MUTANTS = {
         ("d->water + wind + push + drawn", "d->water + wind + push", "a law that draws floes"),
         (".overlap = c->guard.overlap * mean_size", ".overlap = c->guard.overlap", "overlap in metres"),
     ]),
-    "src/base/fileio.c": (["unit/test_h5driver", *SYNC], [
+    "src/base/fileio.c": (["unit/test_h5driver", "unit/test_disk_faults", *SYNC], [
         ("    if (!reason) reason = bt_file_sync(fd);\n    const int closed", "    const int closed",
          "text is not synced"),
         ("const int reason = rename(from, to) != 0 ? errno : sync_folder_of(to);",
@@ -461,13 +458,13 @@ MUTANTS = {
         ("if (status != BT_OK && fd >= 0) unlink(temporary);", "", "a part stays under the temporary name"),
         ("const int broken = got < 0 ? errno : 0;", "const int broken = 0;", "half a text is taken for the whole"),
     ]),
-    "src/base/checksum.c": (SYNC + ["cli/test_resume.py"], [
+    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "cli/test_resume.py"], [
         ("        if (!reason) reason = bt_file_sync(fd);\n", "", "the checksum is not synced"),
         ("!memcmp(behind, zeros, sizeof hdf5_magic));", "false);", "a file cut off early is a stranger's"),
         ("} else if (memcmp(block, wanted, sizeof block)) {", "} else if (0) {", "damage passes"),
         ("if (n == 0) errno = EIO;", "if (n == 0) errno = 0;", "a file that became shorter"),
     ]),
-    "src/base/h5driver.c": (SYNC + ["unit/test_h5driver", "cli/test_faults.py"], [
+    "src/base/h5driver.c": (SYNC + ["unit/test_h5driver", "unit/test_disk_faults", "cli/test_faults.py"], [
         ("    if (f->writes && !*f->errnum) *f->errnum = bt_file_sync(f->fd);\n", "",
          "contact problems are not synced"),
         ("if (!*f->errnum) *f->errnum = bt_file_put(f->fd, (off_t)address, p, size);",
@@ -489,7 +486,7 @@ MUTANTS = {
         ("if (!done || *h->errnum) fail(h, \"write the file\");", "if (!done) fail(h, \"write the file\");",
          "what the driver keeps to itself is lost"),
     ]),
-    "src/base/h5read.c": (FILES, [
+    "src/base/h5read.c": (FILES + ["unit/test_disk_faults"], [
         ("    if (*r->errnum) {\n        r->status = bt_file_fail", "    if (0) {\n        r->status = bt_file_fail",
          "a read error is called damage"),
     ]),
@@ -509,7 +506,8 @@ MUTANTS = {
         ("        bt_record_flush(r);\n        status = r->h5.status;", "        status = r->h5.status;",
          "not flushed"),
     ]),
-    "src/output/checkpoint.c": (FILES + ["cli/test_resume.py"], [
+    "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
+                                         "cli/test_resume.py"], [
         ("status = bt_file_rename(path, sound ? before : damaged, err);",
          "status = bt_file_rename(path, damaged, err);", "the checkpoint before is called damaged"),
         ("sound ? before : damaged", "before", "a damaged checkpoint replaces a sound one"),
@@ -519,7 +517,8 @@ MUTANTS = {
         ("if (status == BT_OK) status = bt_file_rename(temporary, path, err);", "rename(temporary, path);",
          "not synced"),
     ]),
-    "src/output/folder.c": (FILES, [
+    "src/output/folder.c": (FILES + ["cli/test_replace.py::test_killed_after_a_fault",
+                                     "cli/test_replace.py::test_a_name_that_cannot_be_moved_aside"], [
         ("move_back(dir); // a case that is", "; // a case that is", "a failed start leaves the old result aside"),
         ("if (stands(dir)) bt_folder_settle(dir);", "", "an older result is kept for the last"),
         ("if (bt_folder_keeps(dir)) return clear(dir, err);", "", "the old result is replaced by half a new one"),
@@ -527,7 +526,8 @@ MUTANTS = {
         ("bt_status status = bt_file_write(ready, resolved, err);",
          "bt_status status = BT_OK; bt_file_write(ready, resolved, err);", "a full disk is seen too late"),
     ]),
-    "src/run/ensemble_file.c": (SYNC + ["cli/test_ensemble.py"], [
+    "src/run/ensemble_file.c": (SYNC + ["cli/test_ensemble_failures.py::test_members_that_cannot_be_read",
+                                        "cli/test_ensemble.py"], [
         ("status = bt_file_rename(part, path, err);", "rename(part, path);", "the name of ensemble.h5 is not synced"),
         ("if (errnum && h->status == BT_OK)", "if (0)", "series that cannot be read are empty rows"),
         ("t->unread += status == BT_ERR_IO;", "", "a member that cannot be read is left out without a word"),

@@ -27,7 +27,8 @@ from mutants import MUTANTS
 
 HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
-PATIENCE = {"build": 300, "test": 240, "scene": 40}
+# seconds; what takes longer hangs, also where as many trees are at work as there are cores
+PATIENCE = {"build": 300, "program": 240, "pytest": 1500, "scene": 40}
 # (ranks, threads) of the legs of a run
 LAYOUTS = {"scenes": [((1, 1),)], "ranks": [((1, 2),), ((3, 2), (2, 1))]}
 # Half the time of -O3 to compile, and the same bits.
@@ -140,12 +141,12 @@ def fails(tree, test):
         code, out = make(tree, program)
         if code != 0:
             return f"{test} does not build"
-        return None if run([tree / program], tree, PATIENCE["test"])[0] == 0 else test
+        return None if run([tree / program], tree, PATIENCE["program"])[0] == 0 else test
     extra = []
     if "ranks" in test or "same_bits" in test or "broken" in test:
         make(tree, "build/release/tests/parallel/broken_division")
     code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *extra, f"tests/{test}"],
-                    tree, PATIENCE["test"])
+                    tree, PATIENCE["pytest"])
     return None if code == 0 else test
 
 

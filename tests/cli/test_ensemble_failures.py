@@ -15,7 +15,8 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import CASE, DONE, IO, NUMERIC, TOW, call, changed, differing, write_case
+import faults
+from harness import BERGTOW, CASE, DONE, IO, NUMERIC, TOW, call, changed, differing, write_case
 from resuming import children, started
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
@@ -246,3 +247,28 @@ def test_a_member_beside_one_that_ends_the_program_is_not_given_up_with_it(tmp_p
         assert np.array_equal(f["summary/mean_ice_resistance_n"][()],
                               np.where(np.arange(6) == 2, np.nan, whole),
                               equal_nan=True)
+
+
+def test_members_that_cannot_be_read(tmp_path):
+    """Reads of a file of a finished member fail, each in turn: what the call does not read again it says, and
+    ensemble.h5 does not pass for whole without it. The next call finds all."""
+    assert ensemble(prepare(tmp_path)).returncode == DONE
+    folder = tmp_path / "all"
+    whole = (folder / "ensemble.h5").read_bytes()
+    assert len(list(folder.rglob("result.h5"))) == 3
+    for path in sorted(folder.rglob("summary.json"))[:1] + sorted(folder.rglob("result.h5"))[1:2]:
+        words = [BERGTOW, "ensemble", tmp_path / "study.yml", "-o", folder, "--threads", "1"]
+        log = tmp_path / "log"
+        log.unlink(missing_ok=True)
+        assert faults.started(words, faults.shim(path, BT_CALLS_LOG=log)).returncode == DONE
+        reads = [c for c in faults.logged(log) if c.name in ("read", "pread64")]
+        outcomes = set()
+        for n in faults.numbers(len(reads), 12):
+            result = faults.started(words, faults.shim(path, BT_CALLS="read,pread64", BT_CALLS_AT=n, BT_CALLS_WITH=5))
+            outcomes.add(result.returncode)
+            if result.returncode == DONE:  # read again, and found
+                assert (folder / "ensemble.h5").read_bytes() == whole
+            else:
+                assert re.search("Input/output error|could not be read", result.stderr), (n, result.stderr)
+        assert outcomes == {DONE, IO}
+        assert ensemble(tmp_path).returncode == DONE and (folder / "ensemble.h5").read_bytes() == whole

@@ -399,9 +399,16 @@ static void parts_share_their_dent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(pressed_against_a_wall), cmocka_unit_test(stop_at_constant_force), cmocka_unit_test(two_floes),
-        cmocka_unit_test(corner), cmocka_unit_test(friction_from_the_limit), cmocka_unit_test(memory),
-        cmocka_unit_test(rebound_below_the_limit), cmocka_unit_test(body_at_a_set_speed), cmocka_unit_test(laws_of_a_jam), cmocka_unit_test(parts_share_their_dent),
+        cmocka_unit_test(pressed_against_a_wall),
+        cmocka_unit_test(stop_at_constant_force),
+        cmocka_unit_test(two_floes),
+        cmocka_unit_test(corner),
+        cmocka_unit_test(friction_from_the_limit),
+        cmocka_unit_test(memory),
+        cmocka_unit_test(rebound_below_the_limit),
+        cmocka_unit_test(body_at_a_set_speed),
+        cmocka_unit_test(laws_of_a_jam),
+        cmocka_unit_test(parts_share_their_dent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

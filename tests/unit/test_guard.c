@@ -393,6 +393,54 @@ static void no_floe_is_driven_beyond_the_scale(void **state)
     assert_true(closest > 0.5); // and it is no bound for its own sake
 }
 
+static double stream; // m/s, of a law from outside the program
+
+static void add_stream(const bt_force_body *b, bt_load *l)
+{
+    if (stream > 0) bt_load_damper(l, b->mass, 0, stream);
+}
+
+/// Nor by a law that draws it along, in water and air at rest.
+static void no_floe_is_drawn_beyond_the_scale(void **state)
+{
+    (void)state;
+    static const bt_force_law law = {.name = "stream", .doc = "drawn along", .add = add_stream};
+    bt_errors err = {0};
+    assert_int_equal(bt_force_register(&law, &err), BT_OK);
+    stream = 3;
+    bt_case c;
+    bt_case_defaults(&c);
+    c.run.dt = 0.1, c.run.duration = 20;
+    c.domain.ends = c.domain.sides = BT_BOUND_OPEN;
+    c.domain.length = c.domain.width = 1000, c.domain.x0 = c.domain.y0 = -500;
+    c.body.shape = BT_BODY_ABSENT;
+    c.tow.mode = BT_TOW_NONE, c.tow.speed = 0;
+    c.solver.reference_speed = 1e-9;
+    c.ice.concentration = 0, c.ice.size = 1, c.ice.thickness = 0.1;
+    c.ice.drag = (bt_drag_coefs){0};
+    bt_floe_def floe = {.shape = BT_BODY_RECTANGLE, .length = 1, .width = 1, .thickness = 0.1};
+    c.floes = &floe, c.n_floes = 1;
+    bt_field f;
+    bt_field_init(&f);
+    bt_world *w = NULL;
+    bt_roster r;
+    if (bt_case_finish(&c, &err) != BT_OK || bt_setup_world(&c, &f, &w, &r, &err) != BT_OK) fail_msg("%s", err.text[0]);
+    c.guard.energy = 1;
+    bt_guard g = {0};
+    bt_guard_begin(&g, &c, w, 1, 1);
+    for (int k = 0; k < 200; k++) {
+        bt_world_step(w);
+        assert_true(w->stats.kinetic_energy <= g.energy * (1 + 1e-9));
+    }
+    assert_true(w->stats.kinetic_energy > 0.9 * g.energy);
+    stream = 0;
+    bt_world_free(w);
+    bt_roster_free(&r);
+    bt_field_free(&f);
+    c.floes = NULL, c.n_floes = 0;
+    bt_case_free(&c);
+}
+
 // --- the last state --------------------------------------------------------------------------------------------------
 
 /// What the last look finds is what the next step finds, and the state stays as it was.
@@ -441,6 +489,7 @@ int main(void)
         cmocka_unit_test(numbers_that_are_none_are_found_in_tow_window_and_collisions),
         cmocka_unit_test(numbers_that_are_none_are_found_in_samples),
         cmocka_unit_test(no_floe_is_driven_beyond_the_scale),
+        cmocka_unit_test(no_floe_is_drawn_beyond_the_scale),
         cmocka_unit_test(overlap_of_the_last_state_is_that_of_the_next_step),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What a step's sample says of the towed body: force and moment of the ice on it, whichever of the two bodies of a
-// contact it is, against the momentum of the other body; drag of the vessel in a current.
+// contact it is, against the momentum of the other body; drag of the vessel in a current; contact forces of floes.
 #include "scene.h"
 
 #include "output/observe.h"
@@ -66,11 +66,43 @@ static void vessel_in_a_current(void **state)
     bt_world_free(w);
 }
 
+/// Two squares that have rafted are drawn apart: friction of the sheets is spread over them, and no contact bears it.
+static void sheets_are_no_contact(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 10);
+    p.slop = 0.01;
+    p.raft_line = 4e3, p.raft_rise = 1e3, p.raft_sheet = 1e3;
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    for (int k = 0; k < 2; k++) {
+        scene_square(10, v);
+        bt_body_def d = scene_prism(4, v, 900);
+        d.x = -10.01 * k, d.vx = k ? 1 : -1, d.thickness = 1, d.friction = 0.3;
+        bt_world_add(w, &d);
+    }
+    double force[2];
+    int edges = 0, sheets = 0;
+    for (int n = 0; n < 100; n++) {
+        bt_world_step(w);
+        bt_observe_contact_force(w, force);
+        edges += force[0] > 1e3 && force[1] == force[0];
+        if (n == 60)
+            for (int k = 0; k < 2; k++) w->bodies.vel[k].x *= -1, w->bodies.vel[k].x += w->bodies.gid[k] ? -0.5 : 0.5;
+        if (n < 65) continue;
+        assert_true(force[0] == 0 && force[1] == 0);
+        sheets += w->stats.raft_friction_work > 0;
+    }
+    assert_true(edges > 3 && sheets > 3);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(force_and_moment_on_the_towed_body),
         cmocka_unit_test(vessel_in_a_current),
+        cmocka_unit_test(sheets_are_no_contact),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+// Reads, writes and closes that fail once, at every place of a small file in turn: each is told in the system's own
+// words, none is taken for damage, and none passes because the next call succeeds. Files cut off early are known as
+// ours.
+#include <errno.h>
+#include <hdf5.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include "base/checksum.h"
+#include "base/fileio.h"
+#include "base/h5read.h"
+#include "base/h5util.h"
+
+enum { WRITE, READ, CLOSE };
+static const int reason_of[] = {[WRITE] = ENOSPC, [READ] = EIO, [CLOSE] = EDQUOT};
+static int failing = -1;  // a call of this kind, once
+static long calls_before; // so many that succeed come first
+
+static bool fails(int kind)
+{
+    if (kind != failing || calls_before-- > 0) return false;
+    failing = -1;
+    errno = reason_of[kind];
+    return true;
+}
+
+// In place of the C library's.
+ssize_t pwrite(int fd, const void *data, size_t n, off_t at)
+{
+    return fails(WRITE) ? -1 : syscall(SYS_pwrite64, fd, data, n, at);
+}
+
+ssize_t pread(int fd, void *to, size_t n, off_t at)
+{
+    return fails(READ) ? -1 : syscall(SYS_pread64, fd, to, n, at);
+}
+
+int close(int fd)
+{
+    const int status = (int)syscall(SYS_close, fd);
+    return fails(CLOSE) ? -1 : status;
+}
+
+static bt_status make(const char *path, bt_errors *err)
+{
+    bt_h5 h = {0};
+    if (bt_h5_create_with_room(&h, path, err) != BT_OK) return BT_ERR_IO;
+    const hid_t d = bt_h5_growing(&h, "/series", H5T_NATIVE_DOUBLE, 1, NULL, (hsize_t[]){8, 1}, false);
+    for (int n = 0; n < 6; n++) {
+        const double row[4] = {n, n + 1, n + 2, n + 3};
+        bt_h5_append(&h, d, H5T_NATIVE_DOUBLE, (hsize_t)n * 4, 4, row);
+        if (n % 2) bt_h5_flush(&h);
+    }
+    if (d >= 0) H5Dclose(d);
+    return bt_h5_close(&h);
+}
+
+static bt_status take(const char *path, bt_errors *err)
+{
+    bt_h5_reader r;
+    double series[24] = {0};
+    if (bt_h5_open(&r, path, BT_CHECKSUM_FIELD, err) == BT_OK)
+        bt_h5_read(&r, "/series", H5T_NATIVE_DOUBLE, 0, 24, 1, series);
+    const bt_status status = bt_h5_end(&r);
+    if (status == BT_OK) assert_true(series[0] == 0 && series[23] == 8);
+    return status;
+}
+
+/// The n-th call of a kind fails, for each n from the first one on. Returns how many there are.
+static int every(int kind, int first, const char *path, bt_status (*work)(const char *, bt_errors *))
+{
+    for (int n = first;; n++) {
+        bt_errors err = {0};
+        failing = kind, calls_before = n;
+        const bt_status status = work(path, &err);
+        const bool met = failing < 0;
+        failing = -1;
+        if (!met) {
+            assert_int_equal(status, BT_OK);
+            return n;
+        }
+        if (status != BT_ERR_IO || err.n != 1 || !strstr(err.text[0], strerror(reason_of[kind])))
+            fail_msg("call %d of kind %d: status %d, %d errors: %s", n, kind, status, err.n, err.n ? err.text[0] : "");
+        bt_errors_free(&err);
+    }
+}
+
+static void each_failed_call_is_told(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/bergtow-faults-XXXXXX";
+    bt_errors err = {0};
+    assert_int_equal(close(mkstemp(path)), 0);
+    assert_in_range(every(WRITE, 0, path, make), 10, 200);
+    failing = CLOSE, calls_before = 100;
+    assert_int_equal(make(path, &err), BT_OK);
+    const int closes = 100 - (int)calls_before; // of which the last is that of the file that was written
+    assert_int_equal(every(CLOSE, closes - 1, path, make), closes);
+    assert_int_equal(bt_checksum_write(path, BT_CHECKSUM_FIELD, &err), BT_OK);
+    assert_in_range(every(READ, 0, path, take), 5, 100);
+    unlink(path);
+}
+
+/// A text of which the system gives a part and then an error: here nothing at all, and the error at once.
+static void a_text_that_cannot_be_read(void **state)
+{
+    (void)state;
+    char *text = NULL;
+    size_t size = 0;
+    bt_errors err = {0};
+    assert_int_equal(bt_file_read("/proc/self/mem", "a text", &text, &size, &err), BT_ERR_IO);
+    assert_non_null(strstr(err.text[0], "reading failed: Input/output error"));
+    free(text);
+    bt_errors_free(&err);
+}
+
+/// It has fewer bytes than the system said it has, as one that becomes shorter while it is read.
+static void a_file_with_fewer_bytes_than_its_size(void **state)
+{
+    (void)state;
+    bt_errors err = {0};
+    assert_int_equal(bt_checksum_check("/sys/kernel/fscaps", BT_CHECKSUM_FIELD, NULL, &err), BT_ERR_IO);
+    bt_errors_free(&err);
+}
+
+/// Zeros in the room in front, and behind them nothing, zeros, or HDF5: ours, cut off before it was complete. Anything
+/// else is somebody else's.
+static void what_was_cut_off_early_is_ours(void **state)
+{
+    (void)state;
+    const struct {
+        const char *name;
+        size_t bytes;
+        const char *behind;
+        bool ours;
+    } files[] = {{"nothing", 0, "", true},
+                 {"a part of the room", 100, "", true},
+                 {"the room", 512, "", true},
+                 {"zeros", 600, "", true},
+                 {"HDF5", 600, "\x89HDF\r\n\x1a\n", true},
+                 {"a stranger", 600, "words", false}};
+    for (size_t k = 0; k < sizeof files / sizeof *files; k++) {
+        char bytes[600] = {0}, path[] = "/tmp/bergtow-cut-XXXXXX";
+        memcpy(bytes + BT_CHECKSUM_BYTES, files[k].behind, strlen(files[k].behind));
+        const int fd = mkstemp(path);
+        assert_int_equal(write(fd, bytes, files[k].bytes), files[k].bytes);
+        close(fd);
+        if (bt_checksum_there(path, NULL) != files[k].ours) fail_msg("%s", files[k].name);
+        assert_false(bt_checksum_there(path, BT_CHECKSUM_FIELD));
+        unlink(path);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_failed_call_is_told),
+        cmocka_unit_test(a_text_that_cannot_be_read),
+        cmocka_unit_test(a_file_with_fewer_bytes_than_its_size),
+        cmocka_unit_test(what_was_cut_off_early_is_ours),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
