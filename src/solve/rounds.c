@@ -5,9 +5,11 @@
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/elementary.h"
 #include "solve/solver.h"
+#include "solve/vector.h"
 #include "partition/domain.h"
 
 #define GAIN 0.8        // of the sum of squares, that ROUNDS rounds must take it below
@@ -166,6 +168,23 @@ typedef struct {
     double beta;
 } body_move;
 
+/// Move n velocities on by beta along their last change, 0: only keep them. A velocity is four numbers side by side, of
+/// which the last stays 0.
+BT_FOR_EACH_CPU
+static void move_on_bodies(bt_vel *vel, bt_vel *before, bt_idx n, double beta)
+{
+    _Static_assert(sizeof(bt_vel) == sizeof(bt_vec), "a velocity a vector");
+    for (bt_idx i = 0; i < n; i++) {
+        bt_vec now, last;
+        memcpy(&now, &vel[i], sizeof now);
+        memcpy(&last, &before[i], sizeof last);
+        memcpy(&before[i], &now, sizeof now);
+        if (!(beta > 0)) continue;
+        now = now + beta * (now - last);
+        memcpy(&vel[i], &now, sizeof now);
+    }
+}
+
 static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)t;
@@ -174,15 +193,7 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
     if (!cell->work.swept) return;
     const double beta = cell->work.still ? 0 : m->beta;
     cell->work.still = false;
-    for (bt_idx i = cell->first; i < cell->end; i++) {
-        const bt_vel now = m->vel[i];
-        if (beta > 0) {
-            const bt_vel *before = &m->before[i];
-            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y),
-                                 now.w + beta * (now.w - before->w), 0};
-        }
-        m->before[i] = now;
-    }
+    if (cell->end > cell->first) move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
 /// Returns the largest update.
