@@ -15,7 +15,8 @@
 // instructions it is translated to. So the bits do not depend on the processor; on x86-64 the sweep exists twice, for
 // AVX2 and for any, and the loader takes the one that fits. The scalar update of src/solve/kernel.h remains for
 // contacts with a large body, which share it, and for bounds with a rising part (src/solve/limit.h). A batch holds
-// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h).
+// contacts of one kind: without bounds, with flat ones, or sheets (contact/raft.h). The position projection has batches
+// of its own kind, whose unknowns are the multipliers of the points (project.c).
 //
 // Packing happens before the first sweep over a new list, and the impulses go back before anybody else looks at the
 // contacts.
@@ -26,6 +27,8 @@
 
 /// Are the contacts of this cell swept in batches?
 bool bt_batch_is_for(const bt_cell *cell);
+/// And in the position projection?
+bool bt_batch_pushes(const bt_cell *cell);
 
 /// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
@@ -33,10 +36,14 @@ bool bt_batch_is_for(const bt_cell *cell);
 double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_sweep *s, int times, double enough,
                       int64_t *done, double *most);
 
+/// The same for the position projection, in one pass; d: displacements, slop: overlap that is left alone, m.
+double bt_batch_push(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+                     double *most);
+
 /// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
 void bt_batch_order(const bt_cell *cell, bt_idx *contact);
 
-/// Impulses back into the contacts; nothing when they are there.
+/// Impulses back into the contacts, or multipliers into the gaps; nothing when they are there.
 void bt_batch_unpack(bt_cell *cell);
 
 #endif

@@ -124,4 +124,29 @@ static inline double bt_contact_residual(const bt_contact *u, const bt_limit *k,
     return isfinite(wt) ? bt_max(worst, fabs(r)) : INFINITY; // the maximum itself passes over a NaN
 }
 
+/// How far point i is open beyond the slop after the displacements da and db, m (solve/project.c).
+static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double slop, int i, const bt_vel *da,
+                                const bt_vel *db)
+{
+    return bt_normal_velocity(u, i, da, db) + g->after[i] + slop;
+}
+
+/// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the largest
+/// correction, m.
+static inline double bt_push_contact(const bt_contact *u, bt_gaps *g, double slop, bt_vel *d, const bt_inv *inv)
+{
+    bt_vel da = d[u->a], db = d[u->b];
+    double most = 0;
+    for (int i = 0; i < u->n; i++) {
+        const double p = bt_max(0, g->push[i] - bt_opening(u, g, slop, i, &da, &db) * u->mn[i]);
+        const double step = p - g->push[i];
+        g->push[i] = p;
+        bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
+        most = bt_max(most, fabs(step) * u->w[i]);
+    }
+    bt_store(&d[u->a], inv[u->a], &da);
+    bt_store(&d[u->b], inv[u->b], &db);
+    return most;
+}
+
 #endif

@@ -13,6 +13,7 @@
 #include "contact/law.h"
 #include "solve/solver.h"
 #include "partition/domain.h"
+#include "solve/batch.h"
 #include "solve/kernel.h"
 #include "space/phases.h"
 #include "solve/rounds.h"
@@ -35,13 +36,6 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
     }
 }
 
-/// How far point i is open beyond the slop, m.
-static double opening(const bt_world *w, const bt_contact *u, const bt_gaps *g, int i, const bt_vel *da,
-                      const bt_vel *db)
-{
-    return bt_normal_velocity(u, i, da, db) + g->after[i] + w->par.slop;
-}
-
 static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_problem *p = context;
@@ -50,6 +44,7 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
     const double near = BT_NEAR * p->tolerance;
     double sum = 0;
     int64_t rows = 0, bad = 0;
+    bt_batch_unpack(cell);
     bt_rounds_list(cell);
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_contact *u = &cell->contacts[j];
@@ -57,7 +52,7 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
         double worst = 0;
         bool on = p->plain;
         for (int i = 0; i < u->n; i++) {
-            const double open = opening(w, u, g, i, &d[u->a], &d[u->b]);
+            const double open = bt_opening(u, g, w->par.slop, i, &d[u->a], &d[u->b]);
             const double r = fabs(bt_max(0, g->push[i] - open * u->mn[i]) - g->push[i]) * u->w[i];
             worst = bt_max(worst, r);
             sum += r * r;
@@ -71,35 +66,28 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
     bt_rounds_found(p, cell, sum, rows, bad, t);
 }
 
-static void push_contact(bt_world *w, const bt_contact *u, bt_gaps *g, double *most)
-{
-    bt_vel *d = w->solver->shift, da = d[u->a], db = d[u->b];
-    const bt_inv *inv = w->bodies.inv;
-    bool moved = false;
-    for (int i = 0; i < u->n; i++) {
-        const double p = bt_max(0, g->push[i] - opening(w, u, g, i, &da, &db) * u->mn[i]), step = p - g->push[i];
-        if (step == 0) continue;
-        g->push[i] = p;
-        moved = true;
-        bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
-        *most = bt_max(*most, fabs(step) * u->w[i]);
-    }
-    if (!moved) return;
-    bt_store(&d[u->a], inv[u->a], &da);
-    bt_store(&d[u->b], inv[u->b], &db);
-}
-
 static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_sweep *o = context;
     bt_cell *cell = &w->cells->cell[k];
     if (cell->work.n_list == 0) return;
+    if (bt_batch_pushes(cell) && !o->problem->plain) { // fields are shaken plain, and keep their bits
+        int64_t done = 0;
+        double most = 0;
+        const double against = bt_batch_push(cell, w->par.slop, w->solver->shift, w->bodies.inv, o, &done, &most);
+        t->most = bt_max(t->most, most);
+        bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
+        if (o->moves) bt_rounds_moved(cell, o, against, t);
+        return;
+    }
     bt_moved moved;
     if (o->moves) bt_moved_begin(&moved, cell);
     for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++)
         bt_rounds_move(o, cell->gaps[cell->work.list[j]].push, cell->work.before[cell->work.list[j]], moved.y[j], 2);
     for (bt_idx j = 0; j < cell->work.n_list; j++)
-        push_contact(w, &cell->contacts[cell->work.list[j]], &cell->gaps[cell->work.list[j]], &t->most);
+        t->most = bt_max(t->most, bt_push_contact(&cell->contacts[cell->work.list[j]],
+                                                  &cell->gaps[cell->work.list[j]], w->par.slop, w->solver->shift,
+                                                  w->bodies.inv));
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->work.n_list);
     if (!o->moves) return;
     double against = 0;

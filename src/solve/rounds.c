@@ -5,9 +5,11 @@
 #include <limits.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "base/elementary.h"
 #include "solve/solver.h"
+#include "solve/vector.h"
 #include "partition/domain.h"
 
 #define GAIN 0.8        // of the sum of squares, that ROUNDS rounds must take it below
@@ -15,7 +17,8 @@
 #define NARROWER 1.25   // of the distance of the cap from 1, and of the length of a round
 #define WIDER 1.5
 #define LEAST_CAP 0.3   // less is none
-#define CALM 0.1         // of the limit of work, beyond it
+#define CALM 0.3         // of the limit of work, beyond it
+#define HARD 0.5         // of the limit of work: from here on the best unknowns are kept
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
 
@@ -166,6 +169,23 @@ typedef struct {
     double beta;
 } body_move;
 
+/// Move n velocities on by beta along their last change, 0: only keep them. A velocity is four numbers side by side, of
+/// which the last stays 0.
+BT_FOR_EACH_CPU
+static void move_on_bodies(bt_vel *vel, bt_vel *before, bt_idx n, double beta)
+{
+    _Static_assert(sizeof(bt_vel) == sizeof(bt_vec), "a velocity a vector");
+    for (bt_idx i = 0; i < n; i++) {
+        bt_vec now, last;
+        memcpy(&now, &vel[i], sizeof now);
+        memcpy(&last, &before[i], sizeof last);
+        memcpy(&before[i], &now, sizeof now);
+        if (!(beta > 0)) continue;
+        now = now + beta * (now - last);
+        memcpy(&vel[i], &now, sizeof now);
+    }
+}
+
 static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     (void)t;
@@ -174,15 +194,7 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
     if (!cell->work.swept) return;
     const double beta = cell->work.still ? 0 : m->beta;
     cell->work.still = false;
-    for (bt_idx i = cell->first; i < cell->end; i++) {
-        const bt_vel now = m->vel[i];
-        if (beta > 0) {
-            const bt_vel *before = &m->before[i];
-            m->vel[i] = (bt_vel){now.x + beta * (now.x - before->x), now.y + beta * (now.y - before->y),
-                                 now.w + beta * (now.w - before->w), 0};
-        }
-        m->before[i] = now;
-    }
+    if (cell->end > cell->first) move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
 /// Returns the largest update.
@@ -266,6 +278,24 @@ static void adapt(pace *a, const bt_problem *p, double squares)
     if (a->cap < LEAST_CAP) a->cap = 0;
 }
 
+/// Keep the unknowns of a hard problem when they are the best so far; `best`: the residual of those kept, INFINITY =
+/// none.
+static void keep_better(bt_world *w, const bt_problem *p, const bt_work *work, double *best)
+{
+    if (!(work->residual < *best)) return;
+    *best = work->residual;
+    bt_phases_any_order(w, p->keep, &(bt_keeping){BT_KEEP}, &(bt_totals){0});
+}
+
+/// Back to the best unknowns where they are better than the present ones. True: the velocities are theirs.
+static bool back_to_best(bt_world *w, const bt_problem *p, bt_work *work, double best)
+{
+    if (!(work->residual > p->tolerance && best < work->residual)) return false;
+    bt_phases_any_order(w, p->keep, &(bt_keeping){BT_PUT_BACK}, &(bt_totals){0});
+    bt_rounds_residual(w, p, true, work);
+    return true;
+}
+
 void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
 {
     bt_solver *s = w->solver;
@@ -276,6 +306,7 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     }
     pace a = {.cap = p->cap, .mark = INFINITY, .length = p->plain ? INT_MAX : p->length};
     momentum m = {.theta = 1};
+    double best = INFINITY;
     const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
     // between them no momentum
     const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
@@ -283,16 +314,22 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
         const bool last = !p->plain && spent(p, work) >= calm;
-        if (last) a.cap = 0, a.length = p->length;
-        else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
+        if (last) {
+            // from where momentum came nearest
+            if (a.cap > 0 && back_to_best(w, p, work, best)) settled = true, all = false;
+            a.cap = 0, a.length = p->length;
+        } else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
         const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
         if (part) keep_near_bad(w);
         settled = run_round(w, p, a.length, a.cap, on, last ? limit : calm, &m, work) && !part;
         all = !part;
         bt_rounds_residual(w, p, settled, work);
+        if (p->keep && !p->plain && spent(p, work) > calm - HARD * all_work) keep_better(w, p, work, &best);
         if (settled || work->residual > p->tolerance) continue;
         bt_rounds_residual(w, p, true, work);
         settled = true;
     }
     if (!settled) bt_rounds_residual(w, p, true, work);
+    back_to_best(w, p, work, best);
+    if (!isinf(best)) bt_phases_any_order(w, p->keep, &(bt_keeping){BT_FORGET}, &(bt_totals){0});
 }

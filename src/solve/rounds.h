@@ -26,8 +26,11 @@
 // away again, down to none below 0.3. If that does not help either, three rounds of 400 sweeps follow without a cap:
 // chains of many floes, and heavy bodies that press on light ones, are not circling but slow, and converge with β near
 // 1 alone (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain ones need more than 500,000). What
-// has not converged within the limit of work gets a tenth of it more without momentum, which circles far from the
+// has not converged within the limit of work gets three tenths of it more without momentum, which circles far from the
 // solution where it does not converge.
+//
+// A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the unknowns
+// of the best residual pass are kept, from half of the work on, and are the result.
 //
 // When few contacts are left that are far from the tolerance, every second round is over the cells about them alone.
 //
@@ -45,7 +48,9 @@
 // of the velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which
 // a handful of contacts is left, but where a wedge drives its impulses up over thousands of sweeps a Newton step takes
 // as long as a hundred sweeps and the wedge needs as many steps as contacts change their state. At equal work more
-// steps missed the tolerance with them than without.
+// steps missed the tolerance with them than without. Extrapolation of the last two rounds of plain sweeps along their
+// difference (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after it
+// are where they were before. Going back to the best unknowns whenever the residual has risen: more steps missed.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 
@@ -63,10 +68,14 @@ enum { BT_SWEEP_AGAINST, BT_SWEEP_UPDATES, BT_SWEEP_MOVED, BT_SWEEP_N };
 
 #define BT_NEAR 0.7 // of the tolerance: an update that ends a round, and a residual that does not count as bad
 
+/// What is to be done with the unknowns of the best residual pass.
+typedef enum { BT_KEEP, BT_PUT_BACK, BT_FORGET } bt_keeping;
+
 /// What is iterated.
 typedef struct bt_problem {
     bt_visit *residual;   ///< list the contacts of a cell (bt_rounds_list) and add up BT_RESIDUAL_...; context: this
     bt_visit *sweep;      ///< sweep the list of a cell, after its move; context: bt_sweep
+    bt_visit *keep;       ///< keep the unknowns of a cell, put them back, or forget them; context: bt_keeping. Or NULL
     void (*settle)(bt_world *w); ///< velocities anew from the impulses, or NULL
     bt_vel *vel;          ///< [n bodies] moved by the sweeps
     double tolerance;     ///< of the residual

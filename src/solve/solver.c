@@ -238,11 +238,38 @@ static void sweep_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     bt_moved_end(&moved, cell, o, against, t);
 }
 
+static void keep_impulses(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)t;
+    const bt_keeping what = *(const bt_keeping *)context;
+    bt_cell *cell = &w->cells->cell[k];
+    bt_tow *line = line_of(w, k);
+    if (what == BT_FORGET) {
+        free(cell->work.best);
+        cell->work.best = NULL;
+        return;
+    }
+    bt_batch_unpack(cell);
+    if (!cell->work.best) cell->work.best = bt_alloc((size_t)cell->n_contacts + 1, sizeof *cell->work.best);
+    for (bt_idx i = 0; i < cell->n_contacts; i++) {
+        bt_contact *u = &cell->contacts[i];
+        double *x = cell->work.best[i];
+        if (what == BT_PUT_BACK) u->ln[0] = x[0], u->ln[1] = x[1], u->lt = x[2];
+        else x[0] = u->ln[0], x[1] = u->ln[1], x[2] = u->lt;
+    }
+    for (int c = 0; line && c < line->n_branches; c++) {
+        double *x = &w->solver->line_best[c], *now = &line->branch[c].lambda;
+        if (what == BT_PUT_BACK) *now = *x;
+        else *x = *now;
+    }
+}
+
 static bt_problem contact_problem(const bt_world *w)
 {
     bt_problem p = {
         .residual = residual_of_cell,
         .sweep = sweep_cell,
+        .keep = keep_impulses,
         .settle = settle,
         .vel = w->bodies.vel,
         .tolerance = w->par.tolerance,

@@ -46,6 +46,7 @@ typedef struct bt_solver {
     bt_vel *before;              ///< [n bodies] what sweeps move, before the last of them (src/solve/rounds.h)
     bt_idx cap_before;
     double line_before[BT_MAX_BRANCHES]; ///< impulses of the line before the last sweep, N s
+    double line_best[BT_MAX_BRANCHES]; ///< and of the best residual pass, while they are kept
     bt_vel *shift;               ///< [n bodies] displacement of the position projection, m, m, rad
     bt_idx cap_bodies;
     bool shifted;                ///< the projection did something this step

@@ -119,6 +119,7 @@ typedef struct bt_law_state {
 typedef struct bt_work_list {
     bt_idx *list;                   ///< [n_list] ascending
     double (*before)[3];            ///< [n_contacts] unknowns before the last sweep
+    double (*best)[3];              ///< [n_contacts] of the best residual pass, while they are kept; otherwise NULL
     bt_idx n_list, cap_list;
     struct bt_batch *batch;         ///< [n_batches] the listed contacts again (solve/batch.h)
     bt_idx n_batches, cap_batches;
