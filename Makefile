@@ -46,7 +46,7 @@ endif
 OPT_release := -O3 -g -DNDEBUG
 OPT_debug   := -O1 -g3
 OPT_validate := -O2 -g -DBT_VALIDATE
-OPT_asan    := -O1 -g3 -fsanitize=address,undefined,float-cast-overflow \
+OPT_asan    := -O1 -g1 -fsanitize=address,undefined,float-cast-overflow \
                -fno-sanitize-recover=undefined,float-cast-overflow
 OPT_fuzz    := -O1 -g -Wno-pass-failed -fsanitize=fuzzer-no-link,address,undefined,float-cast-overflow \
                -fno-sanitize-recover=undefined,float-cast-overflow

@@ -2,15 +2,14 @@
 """The uncertainty budget of budget.py as one table and one picture."""
 from pathlib import Path
 
-import style
 from stat_budget import TRUSTED_Q2
-from text_table import number, read_json, table
+from text_table import number, quantity, read_json, scale, table
 
 import numpy as np
 
 
 def _force(found, x):
-    return "–" if x is None or not np.isfinite(x) else style.quantity(x, found["units"])
+    return "–" if x is None or not np.isfinite(x) else quantity(x, found["units"])
 
 
 def _ends(found, ends):
@@ -77,6 +76,8 @@ def text(found, markdown=False):
 
 def figure(found):
     """Standard deviations of the parts, and the indices of the parameters."""
+    import style
+
     import matplotlib.pyplot as plt
     indices = found["shares"].get("indices", {})
     names = sorted(indices, key=lambda k: indices[k]["total"] or 0.0)
@@ -85,7 +86,7 @@ def figure(found):
     fig.subplots_adjust(left=1.2 / width, right=1 - 0.25 / width, top=1 - 0.95 / height, bottom=0.7 / height,
                         wspace=0.55)
     some = [(k, found[k]) for k in ("fields", "parameters", "numerics") if found[k] and found[k]["sd"] is not None]
-    factor, unit = style.scale([found["together"]["sd"]], found["units"])
+    factor, unit = scale([found["together"]["sd"]], found["units"])
     for y, (name, p) in enumerate([*reversed(some), ("together", found["together"])]):
         left.barh(y, p["sd"] / factor, height=0.6, color=style.FAINT if name == "together" else style.ICE)
         ends = p.get("sd_95")

@@ -2,13 +2,11 @@
 """What capability.py found, as tables and as a picture."""
 from pathlib import Path
 
-import style
-from text_table import number, read_json, table
+from text_table import number, quantity, read_json, scale, short, table
 
 import numpy as np
 
 FAR_LOAD = 2  # times the largest tension: a breaking load beyond is not in the picture
-COLOURS = (style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT)
 
 
 def value(found, x):
@@ -16,12 +14,12 @@ def value(found, x):
     if x is None:
         return "–"
     if found["search"] == "ice.concentration":
-        return f"{style.short(100 * x)} %"
-    return style.quantity(x, "N") if found["unit"] == "N" else f"{style.short(x)} {found['unit']}".strip()
+        return f"{short(100 * x)} %"
+    return quantity(x, "N") if found["unit"] == "N" else f"{short(x)} {found['unit']}".strip()
 
 
 def force(x):
-    return "–" if x is None or not np.isfinite(x) else style.quantity(x, "N")
+    return "–" if x is None or not np.isfinite(x) else quantity(x, "N")
 
 
 def limits(found, markdown=False):
@@ -83,7 +81,10 @@ def _curve(axes, c, name, colour, factor, unit):
 def figure(found):
     """Speed and largest tension over the searched key, and the limit over the values of --for where they are
     numbers."""
+    import style
+
     import matplotlib.pyplot as plt
+    colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT
     some, percent = found["conditions"], found["search"] == "ice.concentration"
     factor = 100.0 if percent else 1.0
     across = len(some) > 1 and all(c["for"] is not None for c in some) and any(
@@ -94,11 +95,11 @@ def figure(found):
                         wspace=0.3)
     words = "concentration, %" if percent else f"{found['search']}, {found['unit']}".rstrip(", ")
     largest = [x for c in some for p in c["points"] for x in p["tension"] if x is not None]
-    kilo, newton = style.scale(largest, "N")
+    kilo, newton = scale(largest, "N")
     parts = found["breaking_load"] and found["breaking_load"] < FAR_LOAD * max(largest, default=0.0)
     for axes, name, label, unit in ((grid[0, 0], "speed", "speed made good, m/s", 1.0),
                                     (grid[0, 1], "tension", f"largest line tension, {newton}", kilo)):
-        for c, colour in zip(some, COLOURS * len(some)):
+        for c, colour in zip(some, colours * len(some)):
             if c["points"]:
                 _curve(axes, c, name, colour, factor, unit)
             if c["makes_it"] is not None and c["does_not"] is not None:

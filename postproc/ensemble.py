@@ -19,9 +19,9 @@ import stat_extreme
 import stat_fit
 import stat_mean
 import stat_sensitivity
-import style
 from bergtow_read import RunError
 from ensemble_read import DOUBTS, FAILED, FINISHED, WAITING, Ensemble
+from text_table import scale, short
 
 import numpy as np
 
@@ -114,11 +114,11 @@ def drift(e, rows, mean):
     if len(change) < LEAST_DRIFT:
         return {"verdict": "not judged", "words": "too few fields, or results of an earlier version"}
     low, high = stat_mean.t_interval(change)
-    factor, unit = style.scale([abs(change.mean())], "N")
+    factor, unit = scale([abs(change.mean())], "N")
     moved = (low > 0 or high < 0) and abs(change.mean()) > MATERIAL * abs(mean)
     words = (
-        f"{'rises' if change.mean() > 0 else 'falls'} by {style.short(abs(change.mean()) / factor)} {unit} "
-        f"(95 %: {style.short(min(abs(low), abs(high)) / factor)} to {style.short(max(abs(low), abs(high)) / factor)})"
+        f"{'rises' if change.mean() > 0 else 'falls'} by {short(abs(change.mean()) / factor)} {unit} "
+        f"(95 %: {short(min(abs(low), abs(high)) / factor)} to {short(max(abs(low), abs(high)) / factor)})"
     ) if moved else "no drift"
     return {
         "verdict": "not steady" if moved else "steady", "change": change.mean(), "change_95": (low, high),

@@ -4,9 +4,8 @@ import numpy as np
 
 import converge_text
 import loads_text
-import style
 from ensemble_read import listed
-from text_table import number, pair, table
+from text_table import number, pair, scale, table
 
 DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
 
@@ -26,7 +25,7 @@ def fields_cell(c):
 def unit_of(s):
     """Factor and unit in which the middle one of the conditions reads well."""
     means = [c["resistance"]["mean"] for c in s["conditions"] if c["resistance"]["n"]]
-    return style.scale([np.median(means)] if means else [], "N")
+    return scale([np.median(means)] if means else [], "N")
 
 
 def means(s, markdown):
@@ -124,7 +123,7 @@ def extremes(s, markdown):
         for level in c["extremes"][kind].get("levels", [])
     ]
     hours = sorted(set(hours))
-    factor, unit = style.scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]],
+    factor, unit = scale([c["extremes"]["exceedance"][0]["peak"] for c in some if c["extremes"]["exceedance"]],
                                "N")
     head = [
         "condition", "model", "hours", "collisions/h", f"largest, {unit}", "shape", "p",

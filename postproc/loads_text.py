@@ -2,8 +2,7 @@
 """The design statement and the statistics of loads as tables of text or Markdown."""
 import numpy as np
 
-import style
-from text_table import number, pair, table
+from text_table import number, pair, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
 MOST_NAMED = 5  # conditions of a warning
@@ -44,7 +43,7 @@ def design(s, markdown):
     if not some:
         return "No design tow force. " + "\n".join(warnings(s))
     found = [c["design"]["tow"] for c in some]
-    factor, unit = style.scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
+    factor, unit = scale([np.median([d.get("value", d["largest"]) for d in found])], found[0]["units"])
     lines = any(c["design"]["tension"] for c in some)
     head = ["condition", f"design tow force, {unit}", "95 %", *([f"line tension, {unit}", "95 %"] if lines else []),
             f"mean, {unit}", f"largest simulated, {unit}", "hours simulated", "return time, h", "fields", "tail"]
@@ -103,7 +102,7 @@ def names(s):
 
 def _unit(s, name):
     some = [c["loads"][name] for c in s["conditions"] if name in c["loads"]]
-    factor, unit = style.scale([np.median([abs(x["quantiles"]["95"]["value"]) for x in some])], some[0]["units"])
+    factor, unit = scale([np.median([abs(x["quantiles"]["95"]["value"]) for x in some])], some[0]["units"])
     return factor, unit, some[0]
 
 
@@ -142,7 +141,7 @@ def panel_lines(s):
         if p is None:
             continue
         k, most = int(np.argmax(p["mean"])), int(np.argmax(p["largest"]))
-        factor, unit = style.scale([p["largest"][most]], p["units"])
+        factor, unit = scale([p["largest"][most]], p["units"])
         out.append(f"Hull panels, {c['label']}: panel {k} has the largest mean, {number(p['mean'][k] / factor)} "
                    f"{unit} "
                    f"({pair(p['mean_95'][k], factor)}); the largest mean of a step is "

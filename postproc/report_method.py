@@ -6,8 +6,8 @@ import numpy as np
 import loads_text
 import stat_extreme
 import stat_profile
-import style
 from statement import RIGID
+from text_table import quantity
 
 
 def _one(texts, key, what):
@@ -100,9 +100,9 @@ def holds(case, s):
         return []
     speeds = sorted({str(c["values"]["tow.speed"]) for c in s["conditions"] if "tow.speed" in c["values"]})
     rows = [("tow speed asked for", f"{', '.join(speeds)} m/s" if speeds else case.texts.get("tow.speed", "–"))]
-    rows.append(("breaking load of the line", style.quantity(case.breaking_load, "N")
+    rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
                  if np.isfinite(case.breaking_load) else "none in the case: the line must bear the tension above"
                  if case.mode != "speed" else "no line in the case: it must bear the tow force above"))
-    rows.append(("bollard pull of the vessel", style.quantity(case.bollard_pull, "N")
+    rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
                  if np.isfinite(case.bollard_pull) else "no vessel in the case: it must hold the tow force above"))
     return rows

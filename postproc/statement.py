@@ -12,8 +12,8 @@ import numpy as np
 
 import stat_load
 import stat_profile
-import style
 from bergtow_read import Run, RunError
+from text_table import quantity, short
 
 RIGID = 0.75        # concentration from which on rigid floes jam and nothing limits the force
 FAR = 10.0          # times the hours simulated: an extrapolation beyond is told
@@ -77,7 +77,7 @@ def _of_the_case(e, rows, case, tow):
                     "how much", f"{narrow} of {len(rows)} members"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
-                    style.quantity(case.bollard_pull, "N")))
+                    quantity(case.bollard_pull, "N")))
     return out
 
 
@@ -100,7 +100,7 @@ def _of_the_sample(e, rows, c, load):
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{style.short(d['times_the_hours_simulated'], 2)} times; {more} fields would leave {FAR:g}"))
+                    f"{short(d['times_the_hours_simulated'], 2)} times; {more} fields would leave {FAR:g}"))
     if d["irregular"]:
         out.append(("the fitted tail ends at little more than the largest value simulated", ""))
     if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
@@ -117,7 +117,7 @@ def _of_the_models(load):
     if low <= blocks["level"] <= high:
         return []
     return [("peaks over a threshold and block maxima disagree on the tail",
-             f"{style.quantity(over['level'], load['units'])} and {style.quantity(blocks['level'], load['units'])}")]
+             f"{quantity(over['level'], load['units'])} and {quantity(blocks['level'], load['units'])}")]
 
 
 def statement(e, rows, c):
@@ -136,7 +136,7 @@ def statement(e, rows, c):
         warned += _of_the_sample(e, rows, c, tow)
     breaking = case.breaking_load if case else np.nan
     if worst and worst[0]["value"] > breaking:
-        warned.append(("the tension is above the breaking load of the line", style.quantity(breaking, "N")))
+        warned.append(("the tension is above the breaking load of the line", quantity(breaking, "N")))
     return {
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],

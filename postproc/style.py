@@ -12,6 +12,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend must be chosen first)
 import numpy as np  # noqa: E402
+import text_table  # noqa: E402
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, Locator, MaxNLocator, NullFormatter
@@ -78,29 +79,8 @@ plt.rcParams.update({
 })
 
 
-def scale(values, unit):
-    """(factor, unit): values / factor read well in the unit, with its k, M or G where they are large."""
-    values = np.asarray(values, dtype=float)
-    values = np.abs(values[np.isfinite(values)])
-    top = values.max(initial=0.0)
-    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if top >= 2 * factor:
-            return factor, prefix + unit
-    return 1.0, unit
-
-
-def short(value, digits=3):
-    """A number to so many significant digits, without exponent where that can be avoided."""
-    if value == 0 or not np.isfinite(value):
-        return f"{value:g}"
-    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
-    return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"
-
-
-def quantity(value, unit):
-    """A number with unit, in thousands where it is large: 12345, "N" gives 12.3 kN."""
-    factor, name = scale([value], unit)
-    return f"{short(value / factor)} {name}"
+# for pictures; tables have them without matplotlib
+scale, short, quantity = text_table.scale, text_table.short, text_table.quantity
 
 
 def conditions(run):

@@ -4,8 +4,6 @@ import json
 
 import numpy as np
 
-import style
-
 
 def table(head, rows, markdown):
     """Columns of a head and rows of texts; the first is left-aligned, the others right."""
@@ -26,8 +24,33 @@ def read_json(path):
         return None
 
 
+def scale(values, unit):
+    """(factor, unit): values / factor read well in the unit, with its k, M or G where they are large."""
+    values = np.asarray(values, dtype=float)
+    values = np.abs(values[np.isfinite(values)])
+    top = values.max(initial=0.0)
+    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
+        if top >= 2 * factor:
+            return factor, prefix + unit
+    return 1.0, unit
+
+
+def short(value, digits=3):
+    """A number to so many significant digits, without exponent where that can be avoided."""
+    if value == 0 or not np.isfinite(value):
+        return f"{value:g}"
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"
+
+
+def quantity(value, unit):
+    """A number with unit, in thousands where it is large: 12345, "N" gives 12.3 kN."""
+    factor, name = scale([value], unit)
+    return f"{short(value / factor)} {name}"
+
+
 def number(value, digits=3):
-    return "–" if value is None or not np.isfinite(value) else style.short(
+    return "–" if value is None or not np.isfinite(value) else short(
         value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
 
 

@@ -4,18 +4,23 @@
 and tests run until one fails: the quick ones of those named with it, then two dozen scenes on one rank, which take some
 seconds; with --wide, for survivors, the slow ones named with it, all scenes and the wider suite.
 
-    tests/mutate.py [-j N] [--only TEXT] [--first N] [--again] [--wide] [--seconds S]
+    tests/mutate.py [-j N] [--only TEXT] [--first N] [--again] [--wide] [--seconds S] [--report [FILE.csv]]
 
-Results are kept in build/mutate/results.json, by text: a call goes on where the last one ended. Exit code 1 where a
-mutant survives. Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a
-mutant (20 minutes here), and know of no barrier, order or sync; a list says why each line matters."""
+They are taken in an order drawn with a fixed seed, so that a part of the list is a fair sample of it. A test counts
+only where it passes without a mutant, which is looked at as well. Results are kept in build/mutate/results.json, by
+text: a call goes on where the last one ended. Exit code 1 where a mutant survives that mutants.py does not explain.
+Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a mutant (15 minutes
+here), and know of no barrier, order or sync; a list says why each line matters."""
 import argparse
 import collections
+import csv
 import json
 import multiprocessing
 import os
 import pathlib
+import random
 import shutil
+import resource
 import signal
 import subprocess
 import sys
@@ -23,16 +28,21 @@ import tempfile
 import time
 
 from harness import ROOT, environment
-from mutants import MUTANTS
+from mutants import EQUIVALENT, MUTANTS
 
 HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
-# seconds; what takes longer hangs, also where as many trees are at work as there are cores
-PATIENCE = {"build": 300, "program": 240, "pytest": 1500, "scene": 40}
+SOUND = HERE / "sound.json"
+SEED = 20
+# Seconds of a clock, generous since a busy machine must not kill a mutant; what computes without an end is stopped by
+# its processor time: scenes take half a second of it, the slowest test of a part twenty.
+PATIENCE = {"build": 900, "program": 900, "pytest": 3600, "scene": 600}
+PROCESSOR = {"program": 120, "scene": 30}
 # (ranks, threads) of the legs of a run
-LAYOUTS = {"scenes": [((1, 1),)], "ranks": [((1, 2),), ((3, 2), (2, 1))]}
+LAYOUTS = {"scenes": [((1, 1),)], "legs": [((1, 1), (1, 1))], "ranks": [((1, 2),), ((3, 2), (2, 1))]}
 # Half the time of -O3 to compile, and the same bits.
-MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG"]
+MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG",
+        "REVISION=mutant"]
 PROGRAMS = [f"{p.parent.name}/{p.stem}" for p in sorted(ROOT.glob("tests/*/test_*.c")) if p.parent.name != "fuzz"]
 #: as different from each other as can be
 SOME = ("scenes:rebounds,slope,drag_and_mass,few_sweeps,solver_settings,restitution,crushing_press,rafting_press,"
@@ -59,7 +69,7 @@ def order_of(mutant, wide):
     tests = mutant[4]
     if "domain" in mutant[1] and not any(t.startswith("ranks:") for t in tests):
         tests = [*tests, AMONG]
-    kinds = [[t for t in tests if t.startswith("scenes:")], [t for t in tests if "::" in t],
+    kinds = [[t for t in tests if t.startswith(("scenes:", "legs:"))], [t for t in tests if "::" in t],
              [t for t in tests if t.startswith(("unit/", "physics/"))], [t for t in tests if t.startswith("ranks:")]]
     if "domain" in mutant[1]:
         kinds.reverse()
@@ -67,13 +77,18 @@ def order_of(mutant, wide):
     return [t for t in [*tests, *WIDE] if t not in quick] if wide else quick
 
 
-def run(words, tree, seconds):
+def limited(seconds):
+    """Called in a new process: it is killed after so much processor time."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+
+
+def run(words, tree, seconds, processor=None):
     """Exit code and output; a group that hangs is killed whole, and counts as failed."""
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1, GOMP_SPINCOUNT=5000,
                       BERGTOW=tree / "build/release/bergtow", BERGTOW_VALIDATE="none")
     del env["OMP_WAIT_POLICY"]  # as tests/run.sh has it: threads that sleep do not race
     p = subprocess.Popen(words, cwd=tree, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace",
-                         start_new_session=True, env=env)
+                         start_new_session=True, env=env, preexec_fn=processor and (lambda: limited(processor)))
     try:
         out, _ = p.communicate(timeout=seconds)
     except subprocess.TimeoutExpired:
@@ -101,13 +116,28 @@ def copy_source(tree):
 
 
 def prepare(n):
-    for k in range(n):
-        tree = HERE / f"tree{k}"
-        if k and not tree.exists():
+    for name in ("tree0", "clean", *(f"tree{k}" for k in range(1, n))):
+        tree = HERE / name
+        if name != "tree0" and not tree.exists():
             subprocess.run(["cp", "-a", HERE / "tree0", tree], check=True)
         copy_source(tree)
         code, out = make(tree, "all", *(f"build/release/tests/fault/{s}.so" for s in ("fault", "calls", "memory")))
         assert code == 0, out
+        short = tree / "build/release/limited"
+        short.write_text(f'#!/bin/sh\nulimit -t {PROCESSOR["scene"]}\nexec "$(dirname "$0")/bergtow" "$@"\n')
+        short.chmod(0o755)
+
+
+def sound(by, test):
+    """Does the test that told pass where nothing is wrong? One that does not tells nothing. Looked at once each."""
+    known = json.loads(SOUND.read_text()) if SOUND.exists() else {}
+    if by not in known:
+        scene = by.removeprefix("scene ").split(" ")[0]
+        known[by] = not fails(HERE / "clean", f"{test.partition(':')[0]}:{scene}" if by.startswith("scene ") else test)
+        SOUND.write_text(json.dumps(known, indent=1))
+        if not known[by]:
+            print(f"fails without a mutant, so it tells nothing: {by}", flush=True)
+    return known[by]
 
 
 def fails_scenes(tree, names, layout):
@@ -115,7 +145,7 @@ def fails_scenes(tree, names, layout):
     import scenes  # reads BERGTOW as it is imported
     scenes.PATIENCE = PATIENCE["scene"]
     _, stored = scenes.stored()
-    binary = tree / "build/release/bergtow"
+    binary = tree / "build/release/limited"
     for name in names or scenes.SCENES:
         with tempfile.TemporaryDirectory() as folder:
             try:
@@ -130,24 +160,37 @@ def fails_scenes(tree, names, layout):
 def fails(tree, test):
     """Does the test tell? The word for what did, or None."""
     kind, _, names = test.partition(":")
-    if kind in ("scenes", "ranks"):
+    if kind in LAYOUTS:
         for layout in LAYOUTS[kind]:
             found = fails_scenes(tree, [n for n in names.split(",") if n], layout)
             if found:
-                return f"scene {found}" + (f" {layout}" if kind == "ranks" else "")
+                return f"scene {found}" + (f" {layout}" if kind != "scenes" else "")
         return None
     if test.startswith(("unit/", "physics/")):
         program = f"build/release/tests/{test}"
         code, out = make(tree, program)
         if code != 0:
             return f"{test} does not build"
-        return None if run([tree / program], tree, PATIENCE["program"])[0] == 0 else test
-    extra = []
+        code, _ = run([tree / program], tree, PATIENCE["program"], PROCESSOR["program"])
+        return None if code == 0 else test
     if "ranks" in test or "same_bits" in test or "broken" in test:
         make(tree, "build/release/tests/parallel/broken_division")
-    code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *extra, f"tests/{test}"],
-                    tree, PATIENCE["pytest"])
+    code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", f"tests/{test}"], tree,
+                    PATIENCE["pytest"])
     return None if code == 0 else test
+
+
+def restore(tree, since):
+    """The clean tree's files, with their times, in place of all that was written since; what it has not, goes. So the
+    next make compiles the next mutant, and not the right lines of the last one, too."""
+    for path in (*(tree / d for d in ("src", "partition", "include")), tree / "build/release"):
+        for file in path.rglob("*"):
+            if file.is_file() and file.stat().st_mtime >= since:
+                kept = HERE / "clean" / file.relative_to(tree)
+                if kept.exists():
+                    shutil.copy2(kept, file)
+                else:
+                    file.unlink()
 
 
 def killed_by(tree, mutant, wide):
@@ -155,6 +198,7 @@ def killed_by(tree, mutant, wide):
     target = tree / path
     source = target.read_text()
     assert source.count(text) == 1, f"{path}: {source.count(text)} times: {text}"
+    since = time.time() - 0.1
     target.write_text(source.replace(text, instead))
     try:
         code, out = make(tree, "all")
@@ -162,11 +206,11 @@ def killed_by(tree, mutant, wide):
             return "does not build: " + out.strip().splitlines()[-1][:200]
         for test in order_of(mutant, wide):
             found = fails(tree, test)
-            if found:
+            if found and sound(found, test):
                 return found
         return None
     finally:
-        target.write_text(source)
+        restore(tree, since)
 
 
 def worker(k, jobs, done, wide):
@@ -180,48 +224,57 @@ def worker(k, jobs, done, wide):
         done.put((mutant, by, time.monotonic() - began))
 
 
-def report(mutants, kept):
-    """Score, and what survives."""
-    counts, alive = collections.Counter(), []
-    for m in mutants:
-        r = kept.get(name_of(m))
-        if r is None:
-            continue
-        counts["run"] += 1
-        if r["by"] is None:
-            alive.append(m)
-        elif r["by"].startswith("does not build"):
-            counts["do not build"] += 1
-            print(f"does not build: {name_of(m)}: {r['by']}")
-        else:
-            counts["killed"] += 1
-    for path, text, instead, why, _ in alive:
-        print(f"survives: {path}: {why}\n    - {text!r}\n    + {instead!r}")
-    sound = counts["run"] - counts["do not build"]
-    print(f"{len(mutants)} mutants, {counts['run']} run, {counts['killed']} killed, {len(alive)} survive"
-          f" ({100 * counts['killed'] / max(1, sound):.1f} %)")
-    return not alive and counts["do not build"] == 0
+def verdict(mutant, kept):
+    """(kind, words) of a mutant; kinds: not run, does not build, killed, equivalent, survives."""
+    r = kept.get(name_of(mutant))
+    if r is None:
+        return "not run", ""
+    if r["by"] is None:
+        why = EQUIVALENT.get(mutant[:3])
+        return ("equivalent", why) if why else ("survives", "")
+    return ("does not build" if r["by"].startswith("does not build") else "killed"), r["by"]
+
+
+def report(mutants, kept, table):
+    """Score, and what survives; as a table of all, too."""
+    found = [(m, *verdict(m, kept)) for m in mutants]
+    n = collections.Counter(kind for _, kind, _ in found)
+    for (path, text, instead, why, _), kind, words in found:
+        if kind == "does not build":
+            print(f"does not build: {path}: {text} -> {instead}: {words}")
+        elif kind == "survives":
+            print(f"survives: {path}: {why}\n    - {text!r}\n    + {instead!r}")
+    if table:
+        with open(table, "w", newline="") as f:
+            rows = csv.writer(f, lineterminator="\n")
+            rows.writerow(["file", "mutant", "outcome", "by"])
+            rows.writerows([m[0], m[3], kind, words] for m, kind, words in sorted(found, key=lambda r: r[0][:3]))
+    run_, wrong = n.total() - n["not run"], n["killed"] + n["survives"]
+    print(f"{n.total()} mutants, {run_} run, {n['killed']} killed, {n['survives']} survive, {n['equivalent']} "
+          f"equivalent ({100 * n['killed'] / max(1, wrong):.1f} % of those that are wrong)")
+    return n["survives"] == 0 and n["does not build"] == 0
 
 
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("-j", type=int, default=1, help="trees at work at a time")
     p.add_argument("--only", default="", help="mutants whose file, text or reason holds this")
-    p.add_argument("--first", type=int, default=0, help="so many, evenly over the list")
+    p.add_argument("--first", type=int, default=0, help="so many of those that are left")
     p.add_argument("--wide", action="store_true", help="survivors alone, against the wider suite")
     p.add_argument("--again", action="store_true", help="survivors alone, after new tests")
     p.add_argument("--seconds", type=float, default=1e9, help="begin none after this time")
-    p.add_argument("--report", action="store_true", help="only print what is known")
+    p.add_argument("--report", nargs="?", const="", help="only print what is known; into a table, too")
     a = p.parse_args()
     HERE.mkdir(parents=True, exist_ok=True)
     kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
     mutants = [m for m in listed() if a.only in " ".join(m[:4])]
+    random.Random(SEED).shuffle(mutants)
     alive = a.wide or a.again
     todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if alive else name_of(m) not in kept)]
-    if a.first and len(todo) > a.first:
-        todo = [todo[k * len(todo) // a.first] for k in range(a.first)]
-    if a.report:
-        return 0 if report(mutants, kept) else 1
+    if a.first:
+        todo = todo[:a.first]
+    if a.report is not None:
+        return 0 if report(mutants, kept, a.report) else 1
     prepare(a.j)
     jobs, done = multiprocessing.Queue(), multiprocessing.Queue()
     end, waiting, at_work = time.monotonic() + a.seconds, list(todo), 0
@@ -243,7 +296,7 @@ def main():
         jobs.put(None)
     for w in workers:
         w.join()
-    return 0 if report(mutants, kept) else 1
+    return 0 if report(mutants, kept, None) else 1
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Calls of the system that fail at the n-th time, some n of each kind; tests/long/test_faults.py has them all. And the
 order in which bytes and names are brought to the disk."""
+import os
+
 import pytest
 
 import faults
@@ -54,6 +56,16 @@ def test_bytes_before_names_and_names_before_removals(scenarios, name):
     """As the calls come: a file is synced before it gets its name, the folder after it and before others go."""
     _, calls = scenarios(name)
     assert not_durable(calls) == []
+
+
+def test_an_attempt_is_on_the_disk_before_it_begins(scenarios):
+    """A member that takes the machine down with it is counted all the same, and not tried for ever."""
+    _, calls = scenarios("ensemble")
+    noted = [k for k, c in enumerate(calls) if c.path.endswith("/attempts") and c.name in faults.WRITES]
+    assert len(noted) == 3
+    for k in noted:
+        after = next(c for c in calls[k + 1:] if c.path.startswith(os.path.dirname(calls[k].path)))
+        assert after.name in faults.SYNCS and after.path == calls[k].path and after.result == 0
 
 
 def test_the_old_result_goes_last(scenarios):
