@@ -9,7 +9,11 @@ WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it ma
 
 
 def percent(value):
-    return "–" if value is None else f"{100 * value:+.3g} %"
+    """To a tenth below 20 %, where the margin lies, and to two digits beyond."""
+    if value is None:
+        return "–"
+    x = 100 * value
+    return f"{x:+.1f} %" if abs(x) < 20 else f"{float(f'{x:.1e}'):+.0f} %"
 
 
 def interval(ends):

@@ -6,6 +6,8 @@ import numpy as np
 
 import style
 
+FAR = 100.0  # times a level
+
 
 def table(head, rows, markdown):
     """Columns of a head and rows of texts; the first is left-aligned, the others right."""
@@ -27,8 +29,19 @@ def read_json(path):
 
 
 def number(value, digits=3):
-    return "–" if value is None or not np.isfinite(value) else style.short(
-        value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+    """A number to so many digits, "–" where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return style.short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+
+
+def level(value, ends, factor=1.0):
+    """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds nothing:
+    it says that the sample does not know the tail."""
+    low, high = ends
+    if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
+        high = np.inf
+    return number(value / factor), pair((low, high), factor)
 
 
 def pair(values, factor=1.0):

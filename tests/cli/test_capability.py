@@ -233,7 +233,7 @@ def test_its_block_for_a_report(tmp_path):
              "conditions": rows}
     (tmp_path / "capability.json").write_text(json.dumps(found))
     block = capability_text.block(tmp_path)
-    assert "| ice.thickness 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
+    assert "| 0.5 m | 50.0 % | – | 80.0 % | 5 | not resolved: the budget is spent |" in block["markdown"]
     assert "2 of 2" in block["markdown"] and "150 kN" in block["markdown"] and "4 runs failed" in block["markdown"]
     axes = block["figure"]().axes
     assert [a.get_xlabel() for a in axes] == ["concentration, %", "concentration, %", "ice.thickness, m"]
