@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What capability.py found, as tables and as a picture."""
-from pathlib import Path
-
 import style
-from text_table import number, read_json, table
+from text_table import number, table
 
 import numpy as np
 
@@ -48,7 +46,8 @@ def curve(found, markdown=False):
             low, high = p["mean_speed_95"]
             band = "" if low is None else f" ({number(max(low, 0.0))} to {number(high)})"
             tension = [x for x in p["tension"] if x is not None]
-            rows.append([condition(found, c), value(found, p["value"]), f"{p['made']} of {p['fields']}", str(p["parted"]),
+            made = f"{p['made']} of {p['fields']}"
+            rows.append([condition(found, c), value(found, p["value"]), made, str(p["parted"]),
                          number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
                          force(max(tension, default=None))])
     return table(head, rows, markdown)
@@ -133,17 +132,3 @@ def figure(found):
     style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
                "dots: fields; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
     return fig
-
-
-def of_folder(folder):
-    """What capability.py left in a folder, None where it has not been there, or its file cannot be read."""
-    return read_json(Path(folder) / "capability.json")
-
-
-def block(folder):
-    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments. None where there is no
-    capability.json."""
-    found = of_folder(folder)
-    if found is None:
-        return None
-    return {"heading": "Towing capability", "markdown": text(found, True), "figure": lambda: figure(found)}

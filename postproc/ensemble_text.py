@@ -271,7 +271,7 @@ def report(s, markdown=False):
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
     if s["convergence"]:
-        lines += ["", heading("Convergence"), "", converge_text.verdicts(s["convergence"], markdown)]
+        lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
     for title, part in (("Loads", loads_text.signals), ("Return levels of loads", loads_text.returns),
                         ("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
                         ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):

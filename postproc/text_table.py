@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, how numbers stand in them, and the files that they are made from."""
-import json
-
+"""Tables of text or Markdown, and how numbers stand in them."""
 import numpy as np
 
 import style
@@ -20,14 +18,6 @@ def table(head, rows, markdown):
     return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
 
 
-def read_json(path):
-    """What a command left in a file, None where there is none, or it cannot be read."""
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-
-
 def number(value, digits=3):
     """A number to so many digits, "–" where there is none."""
     if value is None or not np.isfinite(value):
@@ -36,8 +26,8 @@ def number(value, digits=3):
 
 
 def level(value, ends, factor=1.0):
-    """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds nothing:
-    it says that the sample does not know the tail."""
+    """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds
+    nothing: it says that the sample does not know the tail."""
     low, high = ends
     if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
         high = np.inf

@@ -96,7 +96,8 @@ def test_the_title_names_no_other_concentration(title, left):
 
 
 def test_levels_have_the_digits_that_they_are_worth():
-    assert [text_table.number(v) for v in (99.96, 1642.0, 0.09996, 1.5e7, None)] == ["100", "1640", "0.100", "1.5e+07", "–"]
+    some = (99.96, 1642.0, 0.09996, 1.5e7, None)
+    assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
     assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "87.4 to 10000")
     assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.0874 to no bound")
     assert report_case.short("2.60245e-16 m") == "0 m" and report_case.short("-3.24837e-17 m") == "0 m"
@@ -311,7 +312,7 @@ def test_only_what_is_in_sight_is_in_the_legend():
     axes.plot([3], [0.5], "o", label="beside")
     axes.plot([0.5, np.nan, 0.6], [-9, np.nan, 9], label="never joined")
     axes.axhline(0.5, label="level")
-    axes.plot(x, x + 30, label="in part")  # an estimate: outside of its range it is drawn dotted, under the same name
+    axes.plot(x, x + 30, label="in part")  # an estimate: beyond its range it is dotted, under the same name
     axes.plot(x, x / 2, ":", label="in part")
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
