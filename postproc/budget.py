@@ -14,12 +14,11 @@ import subprocess
 import time
 from pathlib import Path
 
-import budget_text
 import command
-import converge_text
+import findings
 import stat_budget
 from bergtow_read import RunError
-from case_runs import STOPPED, above_zero, plain, program
+from case_runs import STOPPED, program
 from ensemble_read import Ensemble
 
 import h5py
@@ -82,8 +81,8 @@ def of_ensemble(e, key=OF, converge=None):
 
 def read_converge(path, folder):
     if path is None:
-        return converge_text.of_folder(folder)
-    found = converge_text.of_folder(path if path.is_dir() else path.parent)
+        return findings.read("converge", folder)
+    found = findings.read("converge", path if path.is_dir() else path.parent)
     if found is None:
         raise RunError(path, "is no converge.json", "name the folder or the file of bergtow converge")
     return found
@@ -94,28 +93,15 @@ def main(argv=None):
                                 "fields, of each parameter, and of the computation.")
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
-    p.add_argument("--budget", type=above_zero, default=BUDGET, metavar="MIN",
-                   help=f"wall time, min (default {BUDGET:g}); the same call goes on")
     p.add_argument("--of", default=OF, metavar="NUMBER", help=f"number of the summary (default {OF})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
                    "computation adds")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="members at a time (default: the cores)")
-    command.add_force(p)
+    findings.add_options(p, BUDGET)
     a = p.parse_args(argv)
-    if not a.study.is_file():
-        raise RunError(a.study, "no such file", "name a study file")
     folder = a.output or Path("out") / a.study.stem
-    for name in ("budget.json", "budget.png"):
-        command.may_write(folder / name, a.force)
-    run(program(), a.study, folder, a.set, max(1, a.jobs), a.budget)
-    found = plain(of_ensemble(Ensemble(folder), a.of, read_converge(a.converge, folder)))
-    command.write_json(found, folder / "budget.json", a.force)
-    print(budget_text.text(found))
-    print()
-    command.save(budget_text.figure(found), folder / "budget.png", a.force)
-    print(folder / "budget.json")
+    findings.begin("budget", a.study, "study", folder, a.force)
+    run(program(), a.study, folder, a.set, a.jobs, a.budget)
+    findings.keep("budget", of_ensemble(Ensemble(folder), a.of, read_converge(a.converge, folder)), folder, a.force)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The uncertainty budget of budget.py as one table and one picture."""
-from pathlib import Path
-
 from stat_budget import TRUSTED_Q2
-from text_table import number, quantity, read_json, scale, table
+from text_table import number, quantity, scale, table
 
 import numpy as np
 
@@ -113,17 +111,3 @@ def figure(found):
     style.head(fig, f"{style.plain(found['title'])}: uncertainty budget",
                f"{found['meaning']}: {_force(found, found['mean'])} on average; black: 95 %", left=0.15 / width)
     return fig
-
-
-def of_folder(folder):
-    """What budget.py left in a folder, None where it has not been there, or its file cannot be read."""
-    return read_json(Path(folder) / "budget.json")
-
-
-def block(folder):
-    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments. None where there is no
-    budget.json."""
-    found = of_folder(folder)
-    if found is None:
-        return None
-    return {"heading": "Uncertainty budget", "markdown": text(found, True), "figure": lambda: figure(found)}

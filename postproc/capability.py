@@ -11,7 +11,6 @@ line that may part; a prescribed speed is kept whatever it takes. The search is 
 a part of the curve, and the rest of the curve is run with CURVE fields a value if the budget allows.
 """
 import argparse
-import os
 import subprocess
 import sys
 import time
@@ -19,11 +18,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bracket
-import capability_text
 import command
+import findings
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case
-from case_runs import SPENT, CaseRuns, above_zero, plain, program
+from case_runs import SPENT, CaseRuns, above_zero, program
 
 import numpy as np
 
@@ -253,12 +252,7 @@ def arguments(argv):
     p.add_argument("--points", type=int, choices=range(0, 101), default=POINTS, metavar="N",
                    help=f"values of the curve, with {CURVE} fields each at least (default {POINTS}; 0: those of the "
                    "search alone)")
-    p.add_argument("--budget", type=above_zero, default=BUDGET, metavar="MIN",
-                   help=f"wall time, min (default {BUDGET:g})")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="runs at a time (default: the cores)")
-    command.add_force(p)
+    findings.add_options(p, BUDGET)
     a = p.parse_args(argv)
     for name, k in (("start", 0), ("end", 1)):
         if getattr(a, name) is None:
@@ -270,8 +264,8 @@ def arguments(argv):
 
 def main(argv=None):
     a = arguments(argv)
-    if not a.case.is_file():
-        raise RunError(a.case, "no such file", "name a case file")
+    folder = a.output or Path("out") / f"capability-{a.case.stem}"
+    findings.begin("capability", a.case, "case", folder, a.force)
     a.case, began, binary = a.case.resolve(), time.monotonic(), program()
     case = resolved(binary, a.case, a.set)
     check(case, a.search)
@@ -282,10 +276,8 @@ def main(argv=None):
         return number_of(binary, a.case, a.set, key, text) if text else otherwise
     resolution = number(a.search, a.resolution, abs(end - start) / PARTS)
     least = number("tow.speed", a.speed, STOPPED * case_value(case, "tow.speed"))
-    folder, last = a.output or Path("out") / f"capability-{a.case.stem}", began + 60 * a.budget
-    for name in ("capability.json", "capability.png"):
-        command.may_write(folder / name, a.force)
-    runs = CaseRuns(a.case, folder, "capability", binary, a.set, max(1, a.jobs), last, last)
+    last = began + 60 * a.budget
+    runs = CaseRuns(a.case, folder, "capability", binary, a.set, a.jobs, last, last)
     search = Search(runs, a.search, least, sys.stderr if sys.stderr.isatty() else None)
     some = conditions(a, binary, a.set, start, end, resolution)
     for k, c in enumerate(some):
@@ -307,12 +299,7 @@ def main(argv=None):
         "budget_min": a.budget, "spent_min": (time.monotonic() - began) / 60, "grid_runs": grid,
         "conditions": [found_of(c, least) for c in some]
     }
-    found = plain(found)
-    command.write_json(found, folder / "capability.json", a.force)
-    print(capability_text.text(found))
-    print()
-    command.save(capability_text.figure(found), folder / "capability.png", a.force)
-    print(folder / "capability.json")
+    findings.keep("capability", found, folder, a.force)
 
 
 if __name__ == "__main__":

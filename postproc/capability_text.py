@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What capability.py found, as tables and as a picture."""
-from pathlib import Path
-
-from text_table import number, quantity, read_json, scale, short, table
+from text_table import number, quantity, scale, short, table
 
 import numpy as np
 
@@ -22,13 +20,18 @@ def force(x):
     return "–" if x is None or not np.isfinite(x) else quantity(x, "N")
 
 
+def condition(found, c):
+    """Words for a condition below a head that names its key."""
+    return c["label"].removeprefix(f"{found['for']} ")
+
+
 def limits(found, markdown=False):
     head = [found["for"] or "case", "makes it at", "does not at", "limit about", "runs", "verdict"]
     rows = []
     for c in found["conditions"]:
         verdict = ": ".join(w for w in ("resolved" if c["resolved"] else "not resolved", c["why"]) if w)
         ends = [value(found, c[k]) for k in ("makes_it", "does_not", "estimate")]
-        rows.append([c["label"], *ends, str(c["runs"]), verdict])
+        rows.append([condition(found, c), *ends, str(c["runs"]), verdict])
     return table(head, rows, markdown)
 
 
@@ -41,7 +44,8 @@ def curve(found, markdown=False):
             low, high = p["mean_speed_95"]
             band = "" if low is None else f" ({number(max(low, 0.0))} to {number(high)})"
             tension = [x for x in p["tension"] if x is not None]
-            rows.append([c["label"], value(found, p["value"]), f"{p['made']} of {p['fields']}", str(p["parted"]),
+            made = f"{p['made']} of {p['fields']}"
+            rows.append([condition(found, c), value(found, p["value"]), made, str(p["parted"]),
                          number(p["mean_speed"]) + band, force(p["mean_tow_force"]), force(p["mean_tension"]),
                          force(max(tension, default=None))])
     return table(head, rows, markdown)
@@ -87,8 +91,8 @@ def figure(found):
     colours = style.ICE, style.TOW, style.DRAG, style.INERTIA, style.CORIOLIS, style.TILT
     some, percent = found["conditions"], found["search"] == "ice.concentration"
     factor = 100.0 if percent else 1.0
-    across = len(some) > 1 and all(c["for"] is not None for c in some) and any(
-        c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some)
+    across = all(c["for"] is not None for c in some) and sum(
+        c["estimate"] is not None or None not in (c["makes_it"], c["does_not"]) for c in some) > 1
     fig, grid = plt.subplots(1, 3 if across else 2, figsize=(12.6 if across else 8.8, 4.4), squeeze=False)
     width, height = fig.get_size_inches()
     fig.subplots_adjust(left=0.75 / width, right=1 - 0.2 / width, top=1 - 1.0 / height, bottom=0.95 / height,
@@ -129,17 +133,3 @@ def figure(found):
     style.head(fig, f"{style.plain(found['title'] or found['case'])}: towing capability",
                "dots: fields; band: 95 % of their mean; shaded: where the limit lies", left=0.15 / width)
     return fig
-
-
-def of_folder(folder):
-    """What capability.py left in a folder, None where it has not been there, or its file cannot be read."""
-    return read_json(Path(folder) / "capability.json")
-
-
-def block(folder):
-    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments. None where there is no
-    capability.json."""
-    found = of_folder(folder)
-    if found is None:
-        return None
-    return {"heading": "Towing capability", "markdown": text(found, True), "figure": lambda: figure(found)}

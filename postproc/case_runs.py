@@ -116,17 +116,6 @@ class CaseRuns:
         return np.array(out, dtype=float)
 
 
-def plain(value):
-    """As JSON has it: what is not finite is null."""
-    if isinstance(value, dict):
-        return {k: plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
-
-
 def above_zero(text):
     value = float(text)
     if not (np.isfinite(value) and value > 0):

@@ -12,6 +12,7 @@ import argparse
 import csv
 import io
 import json
+import math
 import mmap
 import os
 import sys
@@ -19,6 +20,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from bergtow_read import RunError
+
+import numpy as np
 
 PICTURES = (".png", ".pdf", ".svg")
 MARK = "made by bergtow postproc, which may replace it"
@@ -97,9 +100,20 @@ def write_text(text, path, force):
         new.write_text(text, encoding="utf-8")
 
 
+def plain(value):
+    """As it comes back from JSON: numbers of numpy as those of Python, what is not finite as None."""
+    if isinstance(value, dict):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [plain(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def write_json(value, path, force):
     """Write a dict, and the mark with it. Errors: RunError."""
-    write_text(json.dumps({"made_by": MARK, **value}, indent=1, allow_nan=False) + "\n", path, force)
+    write_text(json.dumps({"made_by": MARK, **plain(value)}, indent=1, allow_nan=False) + "\n", path, force)
 
 
 def write_csv(rows, path, force):

@@ -22,16 +22,15 @@ an error of 2 % open while most of the budget was still there.
 A tow that starts at its full speed (tow.ramp of 0) is held against one that takes the time of the body's own size.
 """
 import argparse
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import command
-import converge_text
+import findings
 import stat_mean
 from bergtow_read import Run, RunError
-from case_runs import SPENT, CaseRuns, above_zero, plain, program
+from case_runs import SPENT, CaseRuns, above_zero, program
 
 import numpy as np
 from scipy import stats
@@ -262,30 +261,22 @@ def main(argv=None):
     p.add_argument("case", metavar="CASE.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="default: out/converge-CASE; runs are kept there, "
                    "and the same call takes those of the same case file and program")
-    p.add_argument("--budget", type=above_zero, default=BUDGET, metavar="MIN", help="wall time, min (default 10)")
     p.add_argument("--vary", type=names_of, default=list(NAMES), metavar="NAME,...",
                    help=f"some of {', '.join(NAMES)} (default: all)")
     p.add_argument("--margin", type=above_zero, default=MARGIN, metavar="M",
                    help="relative effect that does not matter (default 0.1)")
     p.add_argument("--tries", type=int, choices=range(1, 6), default=TRIES, metavar="K",
                    help="values of a quantity after each other, where the first change matters (default 3)")
-    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
-    p.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), metavar="N",
-                   help="runs at a time (default: the cores)")
-    command.add_force(p)
+    findings.add_options(p, BUDGET)
     a = p.parse_args(argv)
-    if not a.case.is_file():
-        raise RunError(a.case, "no such file", "name a case file")
     folder, began = a.output or Path("out") / f"converge-{a.case.stem}", time.monotonic()
-    command.may_write(folder / "converge.json", a.force)
-    study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, max(1, a.jobs), began + 60 * a.budget,
+    findings.begin("converge", a.case, "case", folder, a.force)
+    study = CaseRuns(a.case.resolve(), folder, "converge", program(), a.set, a.jobs, began + 60 * a.budget,
                      began + 60 * a.budget)
     rows = converge(study, a.vary, a.margin, a.tries)
     found = {"case": str(a.case), "set": a.set, "margin": a.margin, "budget_min": a.budget, "looks": LOOKS,
              "spent_min": (time.monotonic() - began) / 60, "rows": rows}
-    command.write_json(plain(found), folder / "converge.json", a.force)
-    print(converge_text.verdicts(found))
-    print(f"\n{folder / 'converge.json'}")
+    findings.keep("converge", found, folder, a.force)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
 """The verdicts of converge.py, a line each, or as a table of the report."""
-import json
-from pathlib import Path
-
-from text_table import number, read_json, table
+from text_table import number, table
 
 WORDS = {"none": "resolved: no effect that matters", "matters": "resolved: it matters", "open": "not resolved"}
 
 
 def percent(value):
-    return "–" if value is None else f"{100 * value:+.3g} %"
+    """To a tenth below 20 %, where the margin lies, and to two digits beyond."""
+    if value is None:
+        return "–"
+    x = 100 * value
+    return f"{x:+.1f} %" if abs(x) < 20 else f"{float(f'{x:.1e}'):+.0f} %"
 
 
 def interval(ends):
@@ -50,19 +51,8 @@ def cells(row):
             f"{percent(row['effect'])} ({interval(row['interval_95'])})", on, WORDS[row["judged"]], advice(row)]
 
 
-def plain(found):
-    """As it comes back from the file: what is not finite is None."""
-    return json.loads(json.dumps(found, default=float).replace("NaN", "null").replace("Infinity", "null"))
-
-
-def verdicts(found, markdown=False):
-    found = plain(found)
+def text(found, markdown=False):
     head = ["varied", "value", "of the", "effect (95 %)", "fields", "verdict", "recommended"]
     note = (f"Effect: on the mean over fields, relative; 95 % over {found['looks']} looks together. What is below "
             f"{100 * found['margin']:g} % does not matter. {found['spent_min']:.3g} of {found['budget_min']:g} min.")
     return table(head, [cells(row) for row in found["rows"]], markdown) + "\n\n" + note
-
-
-def of_folder(folder):
-    """What converge.py left in a folder, None where it has not been there, or its file cannot be read."""
-    return read_json(Path(folder) / "converge.json")

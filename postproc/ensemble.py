@@ -10,8 +10,8 @@ import argparse
 from pathlib import Path
 
 import command
-import converge_text
 import ensemble_text
+import findings
 import loads
 import soundness
 import statement
@@ -208,23 +208,8 @@ def statistics(e, options):
         "unsound": e.unsound, "without_mean": e.without_mean, "waiting": waiting(e), "holes": e.holes(),
         "checked": soundness.available(), "doubts": DOUBTS, "conditions": conditions,
         "sensitivity": sensitivity(e, members), "members": list(members.values()),
-        "convergence": converge_text.of_folder(e.path)
+        "convergence": findings.read("converge", e.path)
     }
-
-
-def plain(value):
-    """Numbers as JSON has them: NaN and infinity are null."""
-    if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [plain(v) for v in value]
-    if isinstance(value, (np.bool_, bool)):
-        return bool(value)
-    if isinstance(value, (int, np.integer)):
-        return int(value)
-    if isinstance(value, (float, np.floating)):
-        return float(value) if np.isfinite(value) else None
-    return value
 
 
 def load_columns(c, names):
@@ -272,7 +257,7 @@ def csv_row(c, load_names):
 def write(s, folder, force):
     """statistics.json and statistics.csv in the folder. Errors: RunError."""
     names = {name: x["units"] for c in s["conditions"] for name, x in c["loads"].items()}
-    command.write_json(plain(s), folder / "statistics.json", force)
+    command.write_json(s, folder / "statistics.json", force)
     command.write_csv([csv_row(c, names) for c in s["conditions"]], folder / "statistics.csv", force)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import converge_text
 import loads_text
 from ensemble_read import listed
-from text_table import number, pair, scale, table
+from text_table import FAR, number, pair, scale, table
 
 DOUBT_LETTERS = {"unconverged": "U", "jammed": "J", "unsteady": "N", "short": "S", "stopped": "X", "other": "O"}
 
@@ -147,9 +147,7 @@ def extremes(s, markdown):
                 c["label"], label, *first,
                 f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
                 number(f["p_value"], 2),
-                *(f"{number(at[T]['level'] / factor)}{'*' if at[T]['beyond_data'] else ''} "
-                  f"({pair(at[T]['level_95'], factor)})"
-                  if T in at else "–" for T in hours)
+                *(loads_text.level(at.get(T), factor) for T in hours)
             ])
     refused = {
         f"{c['label']}, {kind.replace('_', ' ')}: {c['extremes'][kind]['refused']}"
@@ -162,7 +160,7 @@ def extremes(s, markdown):
         f"Peaks of collisions by {'; '.join(conversions)}: another conversion of impulse to force gives other peaks. "
         f"GPD: peaks over a threshold; GEV: block maxima. "
         "Brackets: 95 %. * beyond the hours simulated. ! shape below -0.5: the levels are little more than the largest "
-        "peak seen."
+        f"peak seen. No bound: the upper end is more than {FAR:g} times the level."
     )
     return table(head, rows, markdown) + "\n\n" + "\n".join([text, *(f"No fit for {r}." for r in sorted(refused))])
 
@@ -272,7 +270,7 @@ def report(s, markdown=False):
     if heavy:
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
     if s["convergence"]:
-        lines += ["", heading("Convergence"), "", converge_text.verdicts(s["convergence"], markdown)]
+        lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
     for title, part in (("Loads", loads_text.signals), ("Return levels of loads", loads_text.returns),
                         ("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
                         ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):

@@ -2,6 +2,7 @@
 """The design statement and the statistics of loads as tables of text or Markdown."""
 import numpy as np
 
+import text_table
 from text_table import number, pair, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
@@ -173,18 +174,19 @@ def returns(s, markdown):
                 at = {level["hours"]: level for level in f["levels"]}
                 rows.append([c["label"], first["label"], label,
                              f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
-                             number(f["p_value"], 2), *(_level(at.get(T), factor) for T in hours), unit,
+                             number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
     note = ("Levels of the whole signal, pushes and collisions together, that are exceeded once in so many hours of "
             "tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
             "likelihood. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
-            "than the largest value seen.")
+            f"than the largest value seen. No bound: the upper end is more than {text_table.FAR:g} times the level.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {load}, {tail}, {several(some)}."
                                                                   for (load, tail), some in refused.items())])
 
 
-def _level(level, factor):
-    if level is None or not np.isfinite(level["level"]):
+def level(found, factor):
+    """A return level as the statistics have it, None where there is none."""
+    if found is None or not np.isfinite(found["level"]):
         return "–"
-    return (f"{number(level['level'] / factor)}{'*' if level['beyond_data'] else ''} "
-            f"({pair(level['level_95'], factor)})")
+    value, ends = text_table.level(found["level"], found["level_95"], factor)
+    return f"{value}{'*' if found['beyond_data'] else ''} ({ends})"

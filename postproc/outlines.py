@@ -231,15 +231,6 @@ def geojson(floes, found, plane):
     return json.dumps(head)[:-1] + ', "features": [\n' + ",\n".join(lines) + "\n]}\n"
 
 
-def plain(value):
-    """Numbers of numpy as those of Python."""
-    if isinstance(value, dict):
-        return {key: plain(v) for key, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(v) for v in value]
-    return value.item() if isinstance(value, np.generic) else value
-
-
 def main(argv=None):
     p, a = arguments(sys.argv[1:] if argv is None else argv)
     check_files(p, a)
@@ -274,7 +265,7 @@ def main(argv=None):
     print(a.output)
     if a.record:
         record = map_text.record(found, plane, crs, told, bend, book, rules, numbers)
-        command.write_json(plain(record), a.record, a.force)
+        command.write_json(record, a.record, a.force)
         print(a.record)
     if a.picture:
         import map_picture

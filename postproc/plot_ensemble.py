@@ -355,8 +355,9 @@ def draw_scatter(e, key):
     return figure
 
 
-def draw_exceedance(e, options):
-    """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks."""
+def draw_exceedance(e, options, tails=None):
+    """Figure of the exceedance of peaks, a line a condition, the GPD tail over it; None where there are no peaks.
+    tails: fitted tails by the index of their condition, where they are known."""
     some = [c for c in e.conditions() if len(c.finished)]
     step = max(1, -(-len(some) // MOST_LINES))
     figure, axes = plt.subplots(figsize=(9.2, 5.4))
@@ -376,7 +377,7 @@ def draw_exceedance(e, options):
                   drawstyle="steps-post",
                   linewidth=1.4,
                   label=f"{c.label}\n{len(peaks)} collisions, {sum(h[3] for h in hits):.3g} h")
-        tail = extremes(e, c.finished, options)["over_threshold"]
+        tail = tails[c.index] if tails else extremes(e, c.finished, options)["over_threshold"]
         if "refused" not in tail:
             z = np.geomspace(tail["threshold"] * 1.0001, 3 * peaks[0], 200)
             beyond = np.maximum(1 + tail["shape"] * (z - tail["threshold"]) / tail["scale"], 0)
@@ -573,8 +574,8 @@ def conditions_with_loads(e, options):
 
 
 def pictures(e, options, conditions):
-    """(name, function that draws it) of the pictures that the study supports. conditions: with "label" and "loads", as
-    ensemble.py has them."""
+    """(name, function that draws it) of the pictures that the study supports. conditions: with "label" and "loads", and
+    "extremes" if it is known, as ensemble.py has them."""
     keys = numeric(e)
     names = dict.fromkeys(name for c in conditions for name, x in c["loads"].items()
                           if "refused" not in x["over_threshold"])
@@ -588,7 +589,8 @@ def pictures(e, options, conditions):
     if plot_variants.KEY in e.parameters and not e.sampled:
         out.append(("variants", lambda: plot_variants.draw(e, headline)))
     if not e.sampled or len(e.conditions()) <= MOST_LINES:
-        out.append(("exceedance", lambda: draw_exceedance(e, options)))
+        tails = {c["index"]: c["extremes"].get("over_threshold") for c in conditions if "extremes" in c}
+        out.append(("exceedance", lambda: draw_exceedance(e, options, tails)))
     return out
 
 

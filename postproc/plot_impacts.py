@@ -154,8 +154,8 @@ def draw(run):
             raise RunError(run.result, f"has no /panels/{name}: the run has not ended",
                            "wait for it, or run the case again")
     figure = plt.figure(figsize=(11, 8.6))
-    grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.88, bottom=0.09, hspace=0.24, wspace=0.16)
-    window = f"over the window from {style.short(panels['from'], 4)} s on" if np.isfinite(
+    grid = figure.add_gridspec(2, 2, left=0.07, right=0.975, top=0.855, bottom=0.09, hspace=0.26, wspace=0.16)
+    window = f"over the window from {style.short(panels['from'])} s on" if np.isfinite(
         panels["from"]) else "no window"
     draw_hull(figure.add_subplot(grid[0, 0]), run, panels["mean_load"], MEAN, f"mean load by panel, {window}")
     draw_hull(figure.add_subplot(grid[0, 1]), run, panels["max_load"], LARGEST,

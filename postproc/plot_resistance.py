@@ -153,7 +153,7 @@ def draw_estimates(axes, points, factor):
         inside = (a >= low) & (a <= high)
         with_force = np.where(force > 0, force, np.nan) / factor
         axes.plot(a, np.where(inside, with_force, np.nan), color=colour, linewidth=2, label=label)
-        axes.plot(a, with_force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5)
+        axes.plot(a, with_force, color=colour, linewidth=1, dashes=(1, 1.6), zorder=1.5, label=label)
         spans = [p.estimates[name].numbers for p in points if name in p.estimates and p.estimates[name].force]
         spans = [s for s in spans if None not in (s["force_n"], s["low_n"], s["high_n"])]
         if spans and spans[0]["high_n"] > spans[0]["low_n"]:

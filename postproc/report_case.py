@@ -27,6 +27,8 @@ KINDS = {
     "study": "study", "default": "default", "field": "as read", "unused": "not used"
 }
 
+ZERO = 1e-12  #: no value of a key is so small
+
 #: keys of ice that is made, which mean nothing where it is read
 MADE = ("ice.concentration", "ice.shape", "ice.sides", "ice.aspect", "ice.size", "ice.size_law", "ice.size_spread",
         "ice.size_min", "ice.size_max", "ice.size_exponent", "ice.shake")
@@ -218,9 +220,11 @@ def scrubbed(text):
 
 
 def short(value):
-    """A value as the resolved case has it, with six digits in place of all."""
-    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", lambda x: x[0] if len(x[0]) < 8 else
-                  f"{float(x[0]):.6g}", value)
+    """A value as the resolved case has it, with six digits in place of all; what rounding left of zero is zero."""
+    def digits(found):
+        number = float(found[0])
+        return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"
+    return re.sub(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])", digits, value)
 
 
 def _range(key):

@@ -13,13 +13,13 @@ from itertools import groupby
 
 import ensemble
 import ensemble_text
+import findings
 import loads
 import loads_text
 import plot_design
 import plot_ensemble
 import report_case
 import report_method
-import report_parts
 import report_run
 import stat_fit
 import statement
@@ -221,7 +221,7 @@ def parts(found, drawn):
 
 
 def of_part(name, part):
-    """(heading, blocks) of a part of report_parts.py."""
+    """(heading, blocks) of a chapter of findings.py."""
     figure = part.get("figure")
     drawn = report_run.picture(name, part["heading"], figure) if figure else None
     return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
@@ -229,16 +229,11 @@ def of_part(name, part):
 
 def beside(folders):
     """Chapters that other scripts left in one of the folders; convergence is named even where nothing was."""
-    out = [part for part in (report_parts.convergence(f) for f in folders) if part][:1]
-    found = [of_part("convergence", out[0])] if out else [("Convergence", [lines(
+    parts = {name: next(filter(None, (findings.chapter(name, f) for f in folders)), None) for name in findings.KINDS}
+    found = [of_part(name, part) for name, part in parts.items() if part]
+    return found if parts["converge"] else [("Convergence", [lines(
         "Not studied: no converge.json stands beside this ensemble. bergtow converge CASE.yml says what of the "
-        "computation (width, length, time step, tolerance, start) the result depends on.")])]
-    seen = set()
-    for part in (part for f in folders for part in report_parts.others(f)):
-        if part["heading"] not in seen:
-            seen.add(part["heading"])
-            found.append(of_part(f"part{len(seen)}", part))
-    return found
+        "computation (width, length, time step, tolerance, start) the result depends on.")]), *found]
 
 
 def first_run(e):

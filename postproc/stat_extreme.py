@@ -138,8 +138,8 @@ def over_threshold(fields, hours_of_levels, gap, threshold=None, resamples=RESAM
                                         hours_of_levels)
     def refit(y):
         s, k = gpd(y)
-        return stats.genpareto(k, scale=s)
-    frozen = stats.genpareto(shape, scale=scale)
+        return stat_fit.Frozen(stats.genpareto, k, scale=s)
+    frozen = stat_fit.Frozen(stats.genpareto, shape, scale=scale)
     statistic = stat_fit.anderson_darling(excess, frozen.cdf)
     return {
         "threshold": threshold, "excesses": raw, "clusters": len(excess), "gap_s": gap,

@@ -20,7 +20,7 @@ LEAST_SHAPE = -0.95  # of GEV and GPD: the likelihood has no maximum at -1 and b
 
 @dataclass(frozen=True)
 class Fit:
-    """One fitted distribution; `frozen` is SciPy's."""
+    """One fitted distribution."""
 
     name: str
     parameters: dict
@@ -34,14 +34,32 @@ class Fit:
     refused: str = ""  #: why there is no fit; all else is empty then
 
 
+class Frozen:
+    """A distribution of SciPy with its parameters. SciPy's own way makes its documentation anew each time, which took a
+    sixth of the time of a report."""
+
+    def __init__(self, family, *shapes, **scales):
+        self._family, self._shapes, self._scales = family, shapes, scales
+
+    def cdf(self, x):
+        return self._family.cdf(x, *self._shapes, **self._scales)
+
+    def logpdf(self, x):
+        return self._family.logpdf(x, *self._shapes, **self._scales)
+
+    def rvs(self, size, random_state):
+        return self._family.rvs(*self._shapes, **self._scales, size=size, random_state=random_state)
+
+
 def _normal(x):
     sd = np.std(x)
-    return {"mean": np.mean(x), "sd": sd}, stats.norm(np.mean(x), sd)
+    return {"mean": np.mean(x), "sd": sd}, Frozen(stats.norm, np.mean(x), sd)
 
 
 def _lognormal(x):
     logs = np.log(x)
-    return {"median": np.exp(logs.mean()), "sd_log": logs.std()}, stats.lognorm(logs.std(), scale=np.exp(logs.mean()))
+    return {"median": np.exp(logs.mean()), "sd_log": logs.std()}, Frozen(stats.lognorm, logs.std(),
+                                                                                      scale=np.exp(logs.mean()))
 
 
 def _weibull(x):
@@ -59,7 +77,7 @@ def _weibull(x):
         low /= 2
     c = optimize.brentq(equation, low, high, rtol=1e-10)
     scale = np.exp(top + np.log(np.mean(np.exp(c * (logs - top)))) / c)
-    return {"shape": c, "scale": scale}, stats.weibull_min(c, scale=scale)
+    return {"shape": c, "scale": scale}, Frozen(stats.weibull_min, c, scale=scale)
 
 
 def _gamma(x):
@@ -67,7 +85,7 @@ def _gamma(x):
     s = np.log(np.mean(x)) - np.mean(np.log(x))
     start = (3 - s + np.sqrt((s - 3) ** 2 + 24 * s)) / (12 * s)
     a = optimize.brentq(lambda a: np.log(a) - special.digamma(a) - s, start / 3, 3 * start, rtol=1e-10)
-    return {"shape": a, "scale": np.mean(x) / a}, stats.gamma(a, scale=np.mean(x) / a)
+    return {"shape": a, "scale": np.mean(x) / a}, Frozen(stats.gamma, a, scale=np.mean(x) / a)
 
 
 def gev_moments(x):
@@ -116,7 +134,8 @@ def gev(x):
 
 def _gev(x):
     location, scale, shape = gev(x)
-    return {"location": location, "scale": scale, "shape": shape}, stats.genextreme(-shape, loc=location, scale=scale)
+    return {"location": location, "scale": scale, "shape": shape}, Frozen(stats.genextreme, -shape, loc=location,
+                                                                               scale=scale)
 
 
 #: name: (fit, parameters, only of positive values)

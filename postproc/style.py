@@ -160,15 +160,15 @@ def in_sight(axes, line):
 
 
 def legend_of(axes):
-    """(handles, labels) of what is in sight, and the labels of the lines that are not. Limits must be set."""
-    handles, labels, lost = [], [], []
+    """(handles, labels) of what is in sight, and the labels of which nothing is. Limits must be set. Of lines with the
+    same label the first in sight stands for all."""
+    shown, all_labels = {}, {}
     for handle, label in zip(*axes.get_legend_handles_labels()):
-        if isinstance(handle, Line2D) and handle.get_transform() == axes.transData and not in_sight(axes, handle):
-            lost.append(label)
-        else:
-            handles.append(handle)
-            labels.append(label)
-    return handles, labels, lost
+        all_labels[label] = None
+        of_data = isinstance(handle, Line2D) and handle.get_transform() == axes.transData
+        if label not in shown and (not of_data or in_sight(axes, handle)):
+            shown[label] = handle
+    return list(shown.values()), list(shown), [label for label in all_labels if label not in shown]
 
 
 def head(figure, words, below, left=0.02):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Tables of text or Markdown, how numbers stand in them, and the files that they are made from."""
-import json
-
+"""Tables of text or Markdown, and how numbers stand in them."""
 import numpy as np
+
+FAR = 100.0  # times a level
 
 
 def table(head, rows, markdown):
@@ -14,14 +14,6 @@ def table(head, rows, markdown):
     def line(cells):
         return "  ".join([cells[0].ljust(width[0])] + [c.rjust(w) for c, w in zip(cells[1:], width[1:])]).rstrip()
     return "\n".join([line(head), "  ".join("-" * w for w in width), *map(line, rows)])
-
-
-def read_json(path):
-    """What a command left in a file, None where there is none, or it cannot be read."""
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
 
 
 def scale(values, unit):
@@ -39,6 +31,7 @@ def short(value, digits=3):
     """A number to so many significant digits, without exponent where that can be avoided."""
     if value == 0 or not np.isfinite(value):
         return f"{value:g}"
+    value = float(f"{value:.{digits - 1}e}")  # 99.96 has as many digits as 100
     decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
     return f"{value:.{decimals}f}" if decimals < 7 else f"{value:.{digits}g}"
 
@@ -50,8 +43,19 @@ def quantity(value, unit):
 
 
 def number(value, digits=3):
-    return "–" if value is None or not np.isfinite(value) else short(
-        value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+    """A number to so many digits, "–" where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    return short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
+
+
+def level(value, ends, factor=1.0):
+    """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds
+    nothing: it says that the sample does not know the tail."""
+    low, high = ends
+    if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
+        high = np.inf
+    return number(value / factor), pair((low, high), factor)
 
 
 def pair(values, factor=1.0):

@@ -18,9 +18,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import budget  # noqa: E402
 import budget_text  # noqa: E402
+import findings  # noqa: E402
 import stat_budget  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
-from case_runs import plain  # noqa: E402
+from command import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 
@@ -172,7 +173,7 @@ def test_a_study_end_to_end(small):
     assert found["mean"] == pytest.approx(y.mean())
     assert found["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(pairs, axis=1, ddof=1)))
     assert (folder / "out/budget.png").stat().st_size > 15_000
-    block = budget_text.block(folder / "out")
+    block = findings.chapter("budget", folder / "out")
     assert block["markdown"].startswith("| part |") and len(block["figure"]().axes) == 2
     (folder / "converge.json").write_text(json.dumps({"rows": [{"name": "dt", "interval_95": [-0.1, 0.2]}]}))
     again = subprocess.run([BERGTOW, "budget", "study.yml", "-o", "out", "--converge", "converge.json"], cwd=folder,

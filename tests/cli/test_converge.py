@@ -146,7 +146,7 @@ def test_its_block_stands_in_the_report_of_an_ensemble(tmp_path):
     (folder / "converge.json").write_text(json.dumps(found))
     text = script("ensemble.py", folder, "--resamples", 1).stdout
     assert "\nConvergence\n" in text and "10 m -> 20 m" in text and "-40 % (-50 % to -30 %)" in text
-    assert "take 20 m, or wider" in text and converge_text.verdicts(found) in text
+    assert "take 20 m, or wider" in text and converge_text.text(found) in text
 
 
 def test_what_one_quantity_leaves_of_the_budget_goes_to_those_that_are_open(monkeypatch):

@@ -22,6 +22,7 @@ import report_case  # noqa: E402
 import report_ensemble  # noqa: E402
 import report_run  # noqa: E402
 import style  # noqa: E402
+import text_table  # noqa: E402
 from bergtow_read import Run, RunError  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
@@ -83,6 +84,23 @@ def test_the_study_that_it_makes(made):
 ])
 def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
     assert report_ensemble.worth(value, low, high) == words
+
+
+@pytest.mark.parametrize("title, left", [
+    ("Berg in 80 % broken ice", "Berg in broken ice: ice of 60 to 90 %"),
+    ("Tow at 80 % of its speed", "Tow at 80 % of its speed: ice of 60 to 90 %"), (None, "berg: ice of 60 to 90 %")
+])
+def test_the_title_names_no_other_concentration(title, left):
+    assert design.title_of({"run": {"title": title}}, "berg", [0.6, 0.9]) == left
+    assert design.title_of({"run": {"title": title}}, "berg", []) == (title or "berg")
+
+
+def test_levels_have_the_digits_that_they_are_worth():
+    some = (99.96, 1642.0, 0.09996, 1.5e7, None)
+    assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
+    assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "87.4 to 10000")
+    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.0874 to no bound")
+    assert report_case.short("2.60245e-16 m") == "0 m" and report_case.short("-3.24837e-17 m") == "0 m"
 
 
 def test_what_is_refused(made, tmp_path, monkeypatch):
@@ -294,8 +312,11 @@ def test_only_what_is_in_sight_is_in_the_legend():
     axes.plot([3], [0.5], "o", label="beside")
     axes.plot([0.5, np.nan, 0.6], [-9, np.nan, 9], label="never joined")
     axes.axhline(0.5, label="level")
+    axes.plot(x, x + 30, label="in part")  # an estimate: beyond its range it is dotted, under the same name
+    axes.plot(x, x / 2, ":", label="in part")
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
-    _, labels, lost = style.legend_of(axes)
-    assert labels == ["through it", "across", "level"] and lost == ["above", "beside", "never joined"]
+    handles, labels, lost = style.legend_of(axes)
+    assert labels == ["through it", "across", "level", "in part"] and lost == ["above", "beside", "never joined"]
+    assert handles[-1].get_linestyle() == ":"
     plt.close(figure)

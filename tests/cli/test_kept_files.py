@@ -24,6 +24,7 @@ import command  # noqa: E402
 import converge  # noqa: E402
 import design  # noqa: E402
 import ensemble  # noqa: E402
+import findings  # noqa: E402
 import outlines  # noqa: E402
 import plot_chains  # noqa: E402
 import plot_ensemble  # noqa: E402
@@ -90,7 +91,7 @@ def quick(places, tmp_path, monkeypatch):
                                  tow__line__breaking_load=1e5), "line.yml")
     monkeypatch.setenv("BERGTOW", str(BERGTOW))
     monkeypatch.setattr(converge, "converge", work_of(tmp_path / "converge.json"))
-    monkeypatch.setattr(converge.converge_text, "verdicts", lambda _: "")
+    monkeypatch.setattr(findings.converge_text, "text", lambda _: "")
     monkeypatch.setattr(report_run, "pictures", lambda _: [])
     monkeypatch.setattr(report_ensemble, "OPTIONS", report_ensemble.OPTIONS | {"resamples": 1})
     return {"RUN": str(places / "run"), "ALL": str(places / "all")}

@@ -265,6 +265,40 @@ def test_a_force_may_be_returned_and_is_part_of_the_balance():
         assert math.isclose(sim["tow_force"], rest + 7, rel_tol=1e-9)
 
 
+def test_a_drag_pulls_towards_its_velocity():
+    """So strong that a step takes every floe there; of each its own velocity."""
+    def drag(bodies):
+        bodies.drag(1e9, np.stack([np.full(len(bodies.id), 0.03), -0.01 * (1 + bodies.id % 3)], 1))
+
+    with bergtow.Simulation(changed(SHORT, ice__concentration=0.2), threads=1, forces={"strong": drag}) as sim:
+        sim.step()
+        free = np.flatnonzero(sim.motions == 0)
+        wanted = np.stack([np.full(len(free), 0.03), -0.01 * (1 + free % 3)], 1)
+        near = np.abs(sim.velocities[free, :2] - wanted).max(axis=1) < 1e-4
+        assert len(free) > 10 and near.mean() > 0.8  # the others are in contact
+
+
+def test_a_moment_may_be_returned():
+    def returned(bodies):
+        answer = np.zeros((len(bodies.id), 3))
+        answer[:, 2] = 0.5 * bodies.inertia
+        return answer
+
+    def added(bodies):
+        bodies.moment[:] += 0.5 * bodies.inertia
+
+    hashes = []
+    for function in (returned, added):
+        with bergtow.Simulation(changed(SHORT, ice__concentration=0.2), threads=1, forces={"turn": function}) as sim:
+            before = sim.velocities[:, 2]
+            sim.step()
+            free = sim.motions == 0
+            gained = (sim.velocities[:, 2] - before)[free] / sim.dt
+            assert np.median(gained) == pytest.approx(0.5, rel=0.05)
+            hashes.append(sim.state_hash)
+    assert hashes[0] == hashes[1]
+
+
 def test_what_goes_wrong_in_a_force_is_told():
     class Own(Exception):
         pass
@@ -510,7 +544,7 @@ def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
     assert "<table" in e._repr_html_() and "&lt;bergtow.Ensemble" in e._repr_html_()
 
 
-def test_an_ensemble_with_a_hole(tmp_path, monkeypatch):
+def test_an_ensemble_with_a_hole(tmp_path, monkeypatch, capfd):
     """A member that fails is told, its numbers are NaN, and the others are there."""
     path = study(tmp_path, parameters={"output.window_start": [0.5, 9]})
     with pytest.raises(bergtow.BergtowError, match="c002-r001.*output.window_start"):
@@ -520,6 +554,11 @@ def test_an_ensemble_with_a_hole(tmp_path, monkeypatch):
     table = e.dataframe
     assert list(table["mean_ice_resistance_n"].isna()) == [False, False, True, True]
     assert "output.window_start" in table["reason"]["c002-r001"]
+    for retry in (False, True):
+        capfd.readouterr()
+        with pytest.raises(bergtow.BergtowError, match="c002-r001"):
+            bergtow.Ensemble.run(path, tmp_path / "out", retry_failed=retry)
+        assert ("c002-r001 FAILED" in capfd.readouterr().out) == retry
     with pytest.raises(bergtow.BergtowError, match="holds no ensemble.h5"):
         bergtow.Ensemble(tmp_path)
     with pytest.raises(bergtow.BergtowError, match="no member"):

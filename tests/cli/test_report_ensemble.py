@@ -23,7 +23,7 @@ import report  # noqa: E402
 import report_ensemble  # noqa: E402
 import stat_budget  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
-from case_runs import plain  # noqa: E402
+from command import plain  # noqa: E402
 from ensemble_read import Ensemble  # noqa: E402
 
 TITLE = "<script>window.hacked = 1</script> study & 50 %"

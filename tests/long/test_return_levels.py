@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Do 95 % intervals of return levels hold the levels of signals whose extremes are known? The table of
-postproc/README.md (make test-long; half an hour on one core)."""
+postproc/README.md (make test-long; a quarter of an hour on one core)."""
 import pytest
 
 from signals_known import AR1, EAR1, POISSON, coverage

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: MIT
+"""What converge.py, budget.py and capability.py find: NAME.json in a folder, NAME.png where something can be drawn, a
+text at the terminal, and a chapter of the report.
+
+The words of NAME stand in NAME_text.py: text(found, markdown=False), and figure(found) where something can be drawn;
+`found` as it comes back from the file, where what is not finite is None.
+"""
+import json
+import os
+from pathlib import Path
+
+import budget_text
+import capability_text
+import command
+import converge_text
+from case_runs import above_zero
+
+#: heading and words, in the order of a report
+KINDS = {"converge": ("Convergence", converge_text), "budget": ("Uncertainty budget", budget_text),
+         "capability": ("Towing capability", capability_text)}
+
+
+# ---- command line
+
+
+def add_options(p, minutes):
+    """--budget, --set, --jobs, --force."""
+    p.add_argument("--budget", type=above_zero, default=minutes, metavar="MIN",
+                   help=f"wall time, min (default {minutes:g}); the same call goes on")
+    p.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="replace a value of the case")
+    p.add_argument("--jobs", type=_jobs, default=len(os.sched_getaffinity(0)), metavar="N",
+                   help="runs at a time (default: the cores)")
+    command.add_force(p)
+
+
+def _jobs(text):
+    return max(1, int(text))
+
+
+def _files(name, folder):
+    return [folder / f"{name}{end}" for end in ((".json", ".png") if hasattr(KINDS[name][1], "figure") else (".json",))]
+
+
+def begin(name, file, kind, folder, force):
+    """Is there a case or study, and a place for what is found? Errors: RunError."""
+    if not file.is_file():
+        raise command.RunError(file, "no such file", f"name a {kind} file")
+    for path in _files(name, folder):
+        command.may_write(path, force)
+
+
+def keep(name, found, folder, force):
+    """Write what was found and say it. Errors: RunError."""
+    words, found = KINDS[name][1], command.plain(found)
+    data, *pictures = _files(name, folder)
+    command.write_json(found, data, force)
+    print(words.text(found))
+    print()
+    for picture in pictures:
+        command.save(words.figure(found), picture, force)
+    print(data)
+
+
+# ---- reports
+
+
+def read(name, folder):
+    """What a command left in a folder, None where there is nothing, or it cannot be read."""
+    try:
+        return json.loads((Path(folder) / f"{name}.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def chapter(name, folder):
+    """{"heading", "markdown", "figure"} for a report; figure is a function without arguments, or None. None where the
+    command has left nothing."""
+    found, (heading, words) = read(name, folder), KINDS[name]
+    if found is None:
+        return None
+    draw = getattr(words, "figure", None)
+    return {"heading": heading, "markdown": words.text(found, True), "figure": draw and (lambda: draw(found))}
