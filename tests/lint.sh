@@ -17,6 +17,11 @@ lib=build/release/libbergtow.a
 others=$(nm --defined-only -g $lib | awk 'NF == 3 && $3 !~ /^bt_/ {print $3}' | sort -u)
 [ -z "$others" ] || complain "external symbols without the prefix bt_: $others"
 
+# A library does not end the program. Two exceptions, which bergtow/simulation.h names: memory, and MPI.
+ends=$(nm -A -u $lib 2>/dev/null | sed -n 's/^[^:]*:\([^:]*\): *U \(exit\|_exit\|_Exit\|quick_exit\|abort\)$/\1 \2/p' |
+    grep -vx 'base.o _Exit\|comm.o _Exit')
+[ -z "$ends" ] || complain "the library ends the program: $ends"
+
 # Names without blanks; what is new and not yet in git is looked at, too.
 files() { git ls-files --cached --others --exclude-standard "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
 

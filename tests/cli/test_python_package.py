@@ -13,7 +13,8 @@ import time
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, CASE, ROOT, TOW, call, changed, differing, environment, run, write_case
+from harness import (BERGTOW, CASE, CLOSING, NUMERIC, ROOT, TOW, call, changed, differing, environment, run,
+                     write_case)
 
 LIBRARY = ROOT / "build/release/libbergtow.so"
 sys.path.insert(0, str(ROOT / "postproc"))
@@ -263,6 +264,34 @@ def test_a_force_may_be_returned_and_is_part_of_the_balance():
         assert math.isclose(sim["hold_back_force"], 7, rel_tol=1e-12)
         rest = sim["ice_resistance"] + sim["drag_force"] + sim["inertia_force"]
         assert math.isclose(sim["tow_force"], rest + 7, rel_tol=1e-9)
+
+
+def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
+    """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
+    theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")
+
+    def fails(name, between=lambda sim: None, **more):
+        with pytest.raises(bergtow.BergtowError) as raised:
+            with bergtow.Simulation(CLOSING, tmp_path / name, **more) as sim:
+                sim.step(9)
+                between(sim)
+                sim.step(sim.steps_left)
+        file = tmp_path / name / "failure.h5"
+        assert raised.value.status == NUMERIC and (str(file) in str(raised.value)) == file.exists()
+        return file, re.search(r"step \d+: floe", str(raised.value))[0]
+
+    def push(sim):
+        sim.set_velocity(0, 0.5, 0)
+
+    for name, between in {"begun": lambda sim: None, "kept": bergtow.Simulation.checkpoint,
+                          "pushed": lambda sim: (push(sim), sim.checkpoint())}.items():
+        file, step = fails(name, between)
+        assert step in call("resume", file, "--quiet").stderr
+        there = [n for n in differing(theirs.dir / "failure.h5", file)
+                 if not n.startswith(("/about", "/case", "/clock"))]
+        assert (there == []) == (name != "pushed")
+    assert not fails("changed", push)[0].exists()
+    assert not fails("forced", forces={"nothing": lambda bodies: None})[0].exists()
 
 
 def test_what_goes_wrong_in_a_force_is_told():
