@@ -14,8 +14,8 @@ import subprocess
 import time
 from pathlib import Path
 
+import command  # first: it has words for packages that are missing
 import budget_text
-import command
 import converge_text
 import stat_budget
 from bergtow_read import RunError

@@ -18,9 +18,9 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import command  # first: it has words for packages that are missing
 import bracket
 import capability_text
-import command
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case
 from case_runs import SPENT, CaseRuns, above_zero, plain, program

@@ -18,7 +18,11 @@ import sys
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from bergtow_read import RunError
+import lacking
+
+sys.excepthook = lacking.hook  # before what follows, which needs more than Python itself
+
+from bergtow_read import RunError  # noqa: E402
 
 PICTURES = (".png", ".pdf", ".svg")
 MARK = "made by bergtow postproc, which may replace it"
