@@ -215,7 +215,7 @@ DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
 DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
              chromium chromium-driver ffmpeg poppler-utils python3-hypothesis python3-xarray python3-h5netcdf \
              python3-netcdf4 python3-pip python3-setuptools python3-wheel python3-gdal gdal-bin python3-pyproj \
-             python3-shapely python3-distributed $(DEPS_DOCS)
+             python3-shapely python3-distributed zsh $(DEPS_DOCS)
 
 # SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
 SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'
@@ -235,7 +235,7 @@ deps: ## install the Debian packages that are missing, for all but the tests
 	  -o APT::Keep-Downloaded-Packages=false $$missing >/dev/null
 
 # For make lint, and for the other checks of developers; make test needs none of them.
-DEPS_LINT := cppcheck shellcheck pyflakes3
+DEPS_LINT := cppcheck shellcheck pyflakes3 mypy
 DEPS_DEV  := $(DEPS_LINT) clang-14 clang-tidy-14 llvm-14 libclang-rt-14-dev libomp-14-dev valgrind gcovr
 
 deps-lint: ## install what make lint can use

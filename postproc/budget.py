@@ -14,7 +14,7 @@ import subprocess
 import time
 from pathlib import Path
 
-import command
+import command  # first: it has words for packages that are missing
 import findings
 import stat_budget
 from bergtow_read import RunError

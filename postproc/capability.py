@@ -17,8 +17,8 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import command  # first: it has words for packages that are missing
 import bracket
-import command
 import findings
 import stat_mean
 from bergtow_read import Run, RunError, case_value, parse_case

@@ -19,7 +19,11 @@ import sys
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from bergtow_read import RunError
+import lacking
+
+sys.excepthook = lacking.hook  # before what follows, which needs more than Python itself
+
+from bergtow_read import RunError  # noqa: E402
 
 import numpy as np
 

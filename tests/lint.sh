@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # House rules that a machine can check: names of external symbols, licence lines, include guards, length of lines, and
-# what cppcheck, shellcheck and pyflakes find. A checker that is not installed is left out and named; where CI=true it
-# must be there. clang-tidy takes minutes: make tidy.
+# what cppcheck, shellcheck, pyflakes and mypy find. A checker that is not installed is left out and named; where
+# CI=true it must be there. clang-tidy takes minutes: make tidy.
 bad=0
 complain() { echo "lint: $*"; bad=1; }
 have() {
@@ -16,6 +16,11 @@ lib=build/release/libbergtow.a
 [ -f $lib ] || { echo "lint: $lib is missing; run make first"; exit 1; }
 others=$(nm --defined-only -g $lib | awk 'NF == 3 && $3 !~ /^bt_/ {print $3}' | sort -u)
 [ -z "$others" ] || complain "external symbols without the prefix bt_: $others"
+
+# A library does not end the program. Two exceptions, which bergtow/simulation.h names: memory, and MPI.
+ends=$(nm -A -u $lib 2>/dev/null | sed -n 's/^[^:]*:\([^:]*\): *U \(exit\|_exit\|_Exit\|quick_exit\|abort\)$/\1 \2/p' |
+    grep -vx 'base.o _Exit\|comm.o _Exit')
+[ -z "$ends" ] || complain "the library ends the program: $ends"
 
 # Names without blanks; what is new and not yet in git is looked at, too.
 files() { git ls-files --cached --others --exclude-standard "$@" | while read -r f; do [ -f "$f" ] && echo "$f"; done; }
@@ -43,6 +48,11 @@ later=$(git grep -nwE 'TO''DO|FIX''ME' -- ':!*.md') && complain "something is le
 if have shellcheck; then shellcheck $(files '*.sh' .ci/run) || complain "shellcheck: see above"; fi
 # shellcheck disable=SC2046
 if have pyflakes3; then pyflakes3 $(files '*.py') || complain "pyflakes: see above"; fi
+# The package alone: what it imports is taken as it comes, and the scripts beside it are not annotated throughout.
+if have mypy; then
+    mypy --no-error-summary --cache-dir=/dev/null --ignore-missing-imports --follow-imports=skip \
+        --disallow-untyped-defs --check-untyped-defs postproc/bergtow || complain "mypy: see above"
+fi
 if have cppcheck; then
     cppcheck --enable=warning,performance,portability --std=c11 --quiet --error-exitcode=1 -j "${J:-2}" \
         --suppressions-list=tests/cppcheck.supp --suppress=missingIncludeSystem \

@@ -51,6 +51,9 @@ typedef int bt_applied_force(const bt_applied *a, void *user);
 /// Errors: BT_ERR_USAGE, with reason and remedy in err.
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err);
 
+/// Is there a force with a function?
+bool bt_force_is_applied(void);
+
 #ifdef __cplusplus
 }
 #endif

@@ -12,8 +12,9 @@
 // Errors. Whatever can fail returns a bt_status; bt_last_error has the texts, one a line, each with the reason and the
 // remedy. No call ends the program, with two exceptions that leave nothing to return to: memory that runs out
 // (bt_on_out_of_memory is called first) and an MPI call that fails (all ranks are ended). After a step that failed, the
-// state is for looking at; end the simulation. The command makes the state before such a step again, from the last
-// checkpoint (failure.h5); the library does not, for it does not know what the program has done in between.
+// state is for looking at; end the simulation. With a folder, end and drop then make the state before that step again,
+// from the last checkpoint or the start, and keep it in failure.h5, as the command does; but not where a force was
+// applied, or bodies were changed by hand since that checkpoint, for this cannot be made again.
 //
 // Threads. One thread of the program makes all calls, of all simulations; a simulation uses threads of OpenMP within a
 // step. Functions that a program adds to the table of force laws are called by those threads at once; applied forces

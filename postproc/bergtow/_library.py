@@ -3,12 +3,18 @@
 
 Rejected: cffi and pybind11, which need a compiler at installation, or a package that Debian's Python lacks.
 """
+from __future__ import annotations
+
 import ctypes
 import ctypes.util
 import functools
 import os
 from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_int64, c_size_t, c_uint64, c_void_p
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .case import Case
 
 SONAME = "libbergtow.so.0"
 OK, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
@@ -19,7 +25,7 @@ CONTACT_COLUMNS = 12  # BT_CONTACT_COLUMNS
 class BergtowError(Exception):
     """A call of the library that failed. status: the exit code that the command `bergtow` ends with."""
 
-    def __init__(self, text, status=USAGE):
+    def __init__(self, text: str, status: int = USAGE) -> None:
         super().__init__(text)
         self.status = status
 
@@ -83,7 +89,7 @@ _SIGNATURES = {
 }
 
 
-def _candidates():
+def _candidates() -> list[str]:
     """Where the library may be: BERGTOW_LIB alone, if that is set; else the source tree or the prefix that this package
     lies in, then wherever the linker looks."""
     named = os.environ.get("BERGTOW_LIB")
@@ -97,13 +103,13 @@ def _candidates():
     return [str(p) for p in found if p.exists()] + [SONAME, ctypes.util.find_library("bergtow") or SONAME]
 
 
-def library_path():
+def library_path() -> str:
     """The file of libbergtow that is in use."""
     return load()[1]
 
 
 @functools.cache
-def load():
+def load() -> tuple[ctypes.CDLL, str]:
     """The library with the types of its functions, and its file. Errors: BergtowError, which says what to do."""
     # Threads that spin at a barrier make a busy machine many times slower (src/app/main.c); libgomp reads this when it
     # is loaded, and what the user has set wins.
@@ -130,31 +136,32 @@ def load():
     return lib, path
 
 
-def library():
+def library() -> ctypes.CDLL:
     return load()[0]
 
 
-def check(status):
+def check(status: int) -> None:
     """Raise what the library says of a call that failed."""
     if status != OK:
         text = library().bt_last_error().decode(errors="replace") or f"the library failed with status {status}"
         raise (CaseError if status == CASE else BergtowError)(text, status)
 
 
-def take_text(address):
+def take_text(address: int | None) -> str:
     """A text that the library has allocated."""
+    assert address
     text = ctypes.string_at(address).decode()
     library().bt_release(address)
     return text
 
 
-def start_mpi():
+def start_mpi() -> None:
     """Let simulations use all ranks of mpirun or srun, with MPI as it has been started (mpi4py), or start it."""
     if library().bt_comm_start(None, None) != OK:
         raise BergtowError("MPI cannot be started; check the mpirun call")
 
 
-def options(case, **more):
+def options(case: Case | None, **more: Any) -> Options:
     """bt_simulation_options of a Case, or None."""
     texts = {k: os.fsencode(v) if v is not None else None for k, v in more.items()
              if k in ("dir", "command_line", "from_")}

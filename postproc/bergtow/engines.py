@@ -6,12 +6,15 @@ program, as the jobs of an array do (cases/studies/slurm-array.sh). Rejected: a 
 a second list of members, second rules of what is finished, and a start of the program for each of them; what it would
 give, that Dask moves a member from one worker to another, the locks do as well.
 """
+from __future__ import annotations
+
 import os
 import signal
 import subprocess
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 from ._library import IO, BergtowError
 
@@ -19,7 +22,7 @@ from ._library import IO, BergtowError
 _LOOK = 0.2
 
 
-def _share(command, stop):
+def _share(command: list[str], stop: str) -> tuple[int, str]:
     """On a worker: a call of the program. stop: a file that asks it to end with checkpoints when it goes away. Returns
     exit code and messages."""
     with tempfile.TemporaryFile("w+") as errors:
@@ -35,11 +38,12 @@ def _share(command, stop):
         return process.returncode, errors.read().strip()
 
 
-def _finished(out):
+def _finished(out: Path) -> int:
     return sum(1 for _ in Path(out).glob("members/*/finished"))
 
 
-def on_workers(client, command, out, tasks, threads, progress):
+def on_workers(client: Any, command: list[str], out: str | os.PathLike[str], tasks: int, threads: int,
+               progress: bool) -> None:
     """Run calls of the program on the workers, until nothing is left to begin. What has become of the members the last
     call of the caller says. Errors: BergtowError when no call could be made at all."""
     if not client.nthreads():

@@ -1,24 +1,33 @@
 # SPDX-License-Identifier: MIT
 """Ensembles: many runs of a study in one folder, as a Dataset and as a table."""
+from __future__ import annotations
+
 import html
 import os
 import shutil
 import signal
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from . import _library
 from ._library import IO, OK, BergtowError
 from .engines import on_workers
-from .pictures import plot_ensemble, report, statistics
+from .pictures import Picture, plot_ensemble, report, statistics
 from .results import Result, _imported, _text, _wrapper
+
+if TYPE_CHECKING:
+    import h5py
+    import pandas
+    import xarray
 
 #: status of a member
 STATUS = {1: "finished", 2: "failed", 0: "waiting"}
 
 
-def program_path():
+def program_path() -> str:
     """The program `bergtow`: BERGTOW, or the one beside the library that is in use, or that of PATH."""
     named = os.environ.get("BERGTOW")
     if named:
@@ -47,14 +56,16 @@ class Ensemble:
     Members that have failed or wait are in it, too; their numbers are NaN.
     """
 
-    def __init__(self, folder):
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
         if not (self.folder / "ensemble.h5").is_file():
             raise BergtowError(f"{self.folder}: holds no ensemble.h5; give the folder that `bergtow ensemble` has left",
                                IO)
 
     @classmethod
-    def run(cls, study, out, *, overrides=None, threads=0, retry_failed=False, progress=True, client=None, tasks=0):
+    def run(cls, study: str | os.PathLike[str], out: str | os.PathLike[str], *,
+            overrides: Mapping[str, Any] | None = None, threads: int = 0, retry_failed: bool = False,
+            progress: bool = True, client: Any = None, tasks: int = 0) -> Ensemble:
         """Run the members of a study that are open, and return the Ensemble.
 
         out: the folder, made or gone on with. overrides: {key: value} for all members. progress: print a line for each
@@ -78,6 +89,7 @@ class Ensemble:
             with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, text=True,
                                   start_new_session=True) as process:
                 try:
+                    assert process.stdout
                     for line in process.stdout:
                         if progress:
                             print(line, end="", flush=True)
@@ -91,7 +103,7 @@ class Ensemble:
                                    process.returncode)
         return cls(out)
 
-    def _open(self):
+    def _open(self) -> h5py.File:
         h5py = _imported("h5py")
         path = self.folder / "ensemble.h5"
         try:
@@ -100,13 +112,13 @@ class Ensemble:
             raise BergtowError(f"{path}: cannot be read ({error})", IO) from None
 
     @property
-    def counts(self):
+    def counts(self) -> dict[str, int]:
         """How many members there are of each status: {"finished": 8, "failed": 0, "waiting": 0}."""
         with self._open() as file:
             status = file["members/status"][()].tolist()
         return {word: status.count(code) for code, word in STATUS.items()}
 
-    def result(self, name):
+    def result(self, name: str) -> Result:
         """The Result of a member by its name, as "c001-r001"."""
         folder = self.folder / "members" / name
         if not folder.is_dir():
@@ -114,7 +126,7 @@ class Ensemble:
         return Result(folder)
 
     @property
-    def dataset(self):
+    def dataset(self) -> xarray.Dataset:
         """An xarray.Dataset, read when it is used: close it as any.
 
         Dimensions: member, and sample (entries of the series). Coordinates: name, condition, repeat, seed of each
@@ -123,7 +135,8 @@ class Ensemble:
         """
         xarray, file = _imported("xarray"), self._open()
         stored = _wrapper(xarray)
-        variables, coordinates = {}, []
+        variables: dict[str, Any] = {}
+        coordinates: list[str] = []
         for group in ("members", "parameters", "summary", "series"):
             for name, dataset in file.get(group, {}).items():
                 if name == "id":
@@ -142,7 +155,7 @@ class Ensemble:
         return dataset
 
     @property
-    def dataframe(self):
+    def dataframe(self) -> pandas.DataFrame:
         """A pandas.DataFrame: a row for each member, by its name; what varies, then the numbers of summary.json."""
         pandas = _imported("pandas")
         with self.dataset as d:
@@ -151,23 +164,23 @@ class Ensemble:
         rest = [name for name in flat if name not in first and name != "name"]
         return pandas.DataFrame({n: flat[n] for n in first + rest}, index=pandas.Index(flat["name"], name="member"))
 
-    def statistics(self, **options):
+    def statistics(self, **options: Any) -> dict[str, Any]:
         """bergtow.statistics(self, ...)"""
         return statistics(self, **options)
 
-    def plot(self, **options):
+    def plot(self, **options: Any) -> dict[str, Picture]:
         """bergtow.plot_ensemble(self, ...)"""
         return plot_ensemble(self, **options)
 
-    def report(self, file=None, **options):
+    def report(self, file: str | os.PathLike[str] | None = None, **options: Any) -> Path:
         """bergtow.report(self, file, ...)"""
         return report(self, file, **options)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         said = ", ".join(f"{n} {word}" for word, n in self.counts.items())
         return f"<bergtow.Ensemble {self.folder}: {said}>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         with self.dataset as d:
             varied = [name for name in d.coords if name not in ("name", "condition", "repeat")]
         shown = "mean_ice_resistance_n", "mean_tow_force_n", "peak_tow_force_n", "unconverged_steps"

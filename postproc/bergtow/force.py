@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: MIT
 """Forces as Python functions, called once a step with arrays of all bodies (bergtow/applied.h)."""
+from __future__ import annotations
+
 import ctypes
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _library
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
 _FX, _FY, _MOMENT, _G, _GX, _GY, _GW, _JX, _JY, _JW = range(_library.LOADS)
 
 
-def _view(pointer, *shape, writeable=False):
+def _view(pointer: Any, *shape: int, writeable: bool = False) -> np.ndarray:
     view = np.ctypeslib.as_array(pointer, shape)
     view.flags.writeable = writeable
     return view
@@ -26,7 +33,7 @@ class Bodies:
     [n, 10], the rows of bergtow/applied.h, for what falls with the velocity.
     """
 
-    def __init__(self, a):
+    def __init__(self, a: _library.Applied) -> None:
         n = a.n
         self.id = _view(a.id, n)
         self.place, self.velocity = _view(a.place, n, 3), _view(a.velocity, n, 3)
@@ -36,9 +43,9 @@ class Bodies:
         self.time, self.dt = a.time, a.dt
         self.water, self.air = np.array(a.water), np.array(a.air)
         rows = np.flatnonzero(self.id == a.towed)
-        self.towed = int(rows[0]) if len(rows) else None
+        self.towed: int | None = int(rows[0]) if len(rows) else None
 
-    def drag(self, k, velocity):
+    def drag(self, k: npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """The linear force k (velocity − U), taken at the end of the step, so that no step is too long for it. k: one
         number or [n], kg/s; velocity: [2] or [n, 2], m/s. A quadratic drag has k = c |velocity − U|."""
         u = np.broadcast_to(velocity, (len(self.id), 2))
@@ -47,17 +54,21 @@ class Bodies:
         self.load[:, _JY] += k * u[:, 1]
 
 
+#: fills in what acts on the bodies, or returns forces [n, 2], or with moments [n, 3]
+Force = Callable[[Bodies], "npt.ArrayLike | None"]
+
+
 class Forces:
     """The forces of one simulation. Laws are of the process: one that belongs to another simulation, which is stepped
     in turn with this one, does nothing in the steps of this."""
 
-    _callbacks = {}  # name -> the C function; kept for ever, as the library keeps its address
-    _owner = {}      # name -> the Forces that have it now
-    stepping = None  # whose simulation is in a step
+    _callbacks: dict[str, Any] = {}  # name -> the C function; kept for ever, as the library keeps its address
+    _owner: dict[str, Forces] = {}      # name -> the Forces that have it now
+    stepping: Forces | None = None  # whose simulation is in a step
 
-    def __init__(self, functions):
+    def __init__(self, functions: Mapping[str, Force] | None) -> None:
         self.functions = dict(functions or {})
-        self.raised = None
+        self.raised: BaseException | None = None
         for name in self.functions:
             if name in self._owner:
                 raise _library.BergtowError(f"force {name}: belongs to a simulation that has not ended; end it, or "
@@ -73,7 +84,7 @@ class Forces:
             raise
         self._owner.update(dict.fromkeys(self.functions, self))
 
-    def _register(self, name):
+    def _register(self, name: str) -> None:
         if name not in self._callbacks:
             callback = _library.APPLIED_FORCE(lambda a, user: Forces._call(name, a))
         else:
@@ -84,7 +95,7 @@ class Forces:
         self._callbacks[name] = callback
 
     @staticmethod
-    def _apply(name, callback, doc):
+    def _apply(name: str, callback: Any, doc: str) -> None:
         err = _library.Errors()
         status = _library.library().bt_force_apply(name.encode(), doc.encode(), callback, None, ctypes.byref(err))
         text = "\n".join(err.text[k].decode() for k in range(err.n))
@@ -93,7 +104,7 @@ class Forces:
             raise _library.BergtowError(text, status)
 
     @classmethod
-    def _call(cls, name, a):
+    def _call(cls, name: str, a: Any) -> int:
         forces = cls.stepping
         if forces is None or name not in forces.functions:
             return 0
@@ -108,8 +119,8 @@ class Forces:
             forces.raised = error
             return 1
 
-    def release(self):
+    def release(self) -> None:
         for name in self.functions:
             if self._owner.get(name) is self:
                 del self._owner[name]
-                self._apply(name, _library.APPLIED_FORCE(), "")
+                self._apply(name, _library.APPLIED_FORCE(0), "")

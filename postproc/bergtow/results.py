@@ -1,23 +1,32 @@
 # SPDX-License-Identifier: MIT
 """Result folders of runs: the summary, and result.h5 as an xarray.Dataset that is read when it is used."""
+from __future__ import annotations
+
 import html
 import json
+import os
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ._library import IO, BergtowError
 from .pictures import report
 
+if TYPE_CHECKING:
+    import h5py
+    import xarray
+
 
 class Result:
     """The folder that a run has left."""
 
-    def __init__(self, folder):
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
 
     @property
-    def summary(self):
+    def summary(self) -> dict[str, Any]:
         """summary.json as a dictionary."""
         path = self.folder / "summary.json"
         try:
@@ -26,18 +35,18 @@ class Result:
             raise BergtowError(f"{path}: is not there: the run has not ended; go on with it by `bergtow resume "
                                f"{self.folder}`", IO) from None
 
-    def open(self):
+    def open(self) -> xarray.Dataset:
         """open_result(folder)"""
         return open_result(self.folder)
 
-    def report(self, file=None, **options):
+    def report(self, file: str | os.PathLike[str] | None = None, **options: Any) -> Path:
         """bergtow.report(self, file, ...)"""
         return report(self, file, **options)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f"<bergtow.Result {self.folder}>"
 
-    def _repr_html_(self):
+    def _repr_html_(self) -> str:
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in _shown(self.summary))
         return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
 
@@ -47,7 +56,7 @@ _SHOWN = ("title", "n_floes", "concentration", "sim_time_s", "mean_ice_resistanc
           "peak_tow_force_n", "mean_line_tension_n", "unconverged_steps", "state_hash")
 
 
-def _shown(summary):
+def _shown(summary: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """(name, text) of what a notebook shows; ± is one standard error, as in the report."""
     for name in _SHOWN:
         value = summary.get(name)
@@ -60,7 +69,7 @@ def _shown(summary):
         yield "warning", html.escape(str(warning))
 
 
-def _imported(name):
+def _imported(name: str) -> Any:
     try:
         return __import__(name)
     except ImportError:
@@ -68,38 +77,38 @@ def _imported(name):
                            f"`pip install {name}`", IO) from None
 
 
-def _wrapper(xarray):
+def _wrapper(xarray: Any) -> Callable[..., Any]:
     """A function that makes arrays which read an HDF5 dataset when they are indexed."""
     from xarray.backends import BackendArray
     from xarray.core import indexing
 
     class Stored(BackendArray):
-        def __init__(self, dataset, column, part):
+        def __init__(self, dataset: h5py.Dataset, column: int | None, part: slice | None) -> None:
             self.dataset, self.column, self.part = dataset, column, part
             shape = dataset.shape if column is None else dataset.shape[:-1]
             self.shape = shape if part is None else (shape[0], part.stop - part.start, *shape[2:])
             self.dtype = dataset.dtype
 
-        def __getitem__(self, key):
+        def __getitem__(self, key: Any) -> Any:
             return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER_1VECTOR,
                                                       self._get)
 
-        def _get(self, key):
+        def _get(self, key: Any) -> Any:
             if self.part is not None:
-                key = (key[0], self._moved(key[1]), *key[2:])
+                key = (key[0], self._moved(key[1], self.part), *key[2:])
             return self.dataset[key if self.column is None else (*key, self.column)]
 
-        def _moved(self, key):
+        def _moved(self, key: Any, part: slice) -> Any:
             """An index into the part of the second axis, as one into the dataset."""
             if isinstance(key, slice):
                 start, stop, step = key.indices(self.shape[1])
-                return slice(start + self.part.start, max(stop, 0) + self.part.start, step)
-            return key + self.part.start
+                return slice(start + part.start, max(stop, 0) + part.start, step)
+            return key + part.start
 
     return lambda dataset, column=None, part=None: indexing.LazilyIndexedArray(Stored(dataset, column, part))
 
 
-def _text(value):
+def _text(value: Any) -> Any:
     value = value.decode() if isinstance(value, bytes) else value
     return value.item() if isinstance(value, np.generic) else value
 
@@ -117,7 +126,7 @@ _FIRST = {"series": "time", "floes": "floe", "bodies": "other_body", "impacts": 
 _POSE = (("x", "m", "x of the centroid"), ("y", "m", "y of the centroid"), ("yaw", "rad", "angle from the x axis"))
 
 
-def _dims(group, dataset):
+def _dims(group: str, dataset: h5py.Dataset) -> tuple[str, ...] | None:
     """Names of the dimensions of a dataset, None for one that has none in a file of an earlier version."""
     if all(len(axis) for axis in dataset.dims):
         scales = [axis[0].name for axis in dataset.dims]
@@ -128,7 +137,7 @@ def _dims(group, dataset):
     return (first,) if dataset.ndim == 1 and not dataset.name.endswith(("offsets", "names", "towed")) else None
 
 
-def open_result(folder):
+def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
     """The result of a run as an xarray.Dataset.
 
     Dimensions: time (entries of the series), frame, floe, other_body (the towed body, walls), collision, event, and
@@ -138,17 +147,18 @@ def open_result(folder):
     the file when they are used; close it as any Dataset. The text of summary.json is the attribute `summary`. Errors:
     BergtowError.
     """
-    xarray, h5py = _imported("xarray"), _imported("h5py")
+    xarray, hdf5 = _imported("xarray"), _imported("h5py")
     path = Path(folder)
     path = path / "result.h5" if path.is_dir() else path
     try:
-        file = h5py.File(path)
+        file = hdf5.File(path)
     except OSError as error:
         raise BergtowError(f"{path}: cannot be read ({error}); give the folder that a run has left", IO) from None
     stored = _wrapper(xarray)
-    variables = {}
+    variables: dict[str, Any] = {}
 
-    def put(name, dims, dataset, column=None, part=None, units=None, long_name=None):
+    def put(name: str, dims: tuple[str, ...], dataset: h5py.Dataset, column: int | None = None,
+            part: slice | None = None, units: str | None = None, long_name: str | None = None) -> None:
         a = dict(dataset.attrs)
         attributes = {"units": units or _text(a.get("units", "1")),
                       "long_name": long_name or _text(a.get("description", name.replace("_", " ")))}

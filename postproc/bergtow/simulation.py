@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: MIT
 """Simulations that are stepped, and runs from case to result folder."""
+from __future__ import annotations
+
 import ctypes
+import html
 import math
 import os
 import sys
 import time
+from collections.abc import Callable, Mapping
 from ctypes import POINTER, c_double, c_void_p
+from typing import Any
 
 import numpy as np
 
 from . import _library
 from ._library import BergtowError
 from .case import Case
-from .force import Forces
+from .force import Force, Forces
 from .results import Result
 
 _KINDS = {"place": (0, 3), "velocity": (1, 3), "mass": (2, 2), "inertia": (3, 1), "area": (4, 1), "radius": (5, 1),
@@ -23,7 +28,7 @@ CONTACT = np.dtype([("a", "i8"), ("b", "i8"), ("n_points", "i8"), ("point", "f8"
                     ("normal_impulse", "f8", 2), ("tangential_impulse", "f8")])
 
 
-def _pointer(array):
+def _pointer(array: np.ndarray) -> Any:
     return array.ctypes.data_as(POINTER(c_double))
 
 
@@ -39,12 +44,15 @@ class Simulation:
     summary. Arrays are copies, in the order of the ids: floes, the towed body, walls.
     """
 
-    def __init__(self, case, out=None, *, forces=None, threads=0, replace=False, progress=False):
+    def __init__(self, case: Case | str | os.PathLike[str] | Mapping[str, Any],
+                 out: str | os.PathLike[str] | None = None, *, forces: Mapping[str, Force] | None = None,
+                 threads: int = 0, replace: bool = False, progress: bool = False) -> None:
         case = case if isinstance(case, Case) else Case(case)
         self._begin("bt_simulation_create", case, out, forces, threads=threads, replace=replace, progress=progress)
 
     @classmethod
-    def resume(cls, folder, *, checkpoint=None, forces=None, threads=0, progress=False):
+    def resume(cls, folder: str | os.PathLike[str], *, checkpoint: str | os.PathLike[str] | None = None,
+               forces: Mapping[str, Force] | None = None, threads: int = 0, progress: bool = False) -> Simulation:
         """Go on with a run in its folder, from its last checkpoint or the one that is named.
 
             with Simulation.resume("out/my-run", forces={"my_drag": my_drag}) as sim: ...
@@ -56,8 +64,9 @@ class Simulation:
         self._begin("bt_simulation_resume", None, folder, forces, threads=threads, progress=progress, from_=checkpoint)
         return self
 
-    def _begin(self, function, case, out, forces, **more):
-        self._address = None
+    def _begin(self, function: str, case: Case | None, out: str | os.PathLike[str] | None,
+               forces: Mapping[str, Force] | None, **more: Any) -> None:
+        self._address: c_void_p | None = None
         self._library = _library.library()
         self._forces = Forces(forces)
         self.folder = None if out is None else os.fspath(out)
@@ -65,28 +74,28 @@ class Simulation:
             if case is not None and forces:
                 case = case.copy()
             address = c_void_p()
-            o = _library.options(case, dir=self.folder,
-                                 command_line=" ".join(["python", *map(os.path.basename, sys.argv[:1])]), **more)
+            command_line = " ".join(["python", *(os.path.basename(a) for a in sys.argv[:1])])
+            o = _library.options(case, dir=self.folder, command_line=command_line, **more)
             _library.check(getattr(self._library, function)(ctypes.byref(address), ctypes.byref(o)))
         except BaseException:
             self._forces.release()
             raise
         self._address = address
-        self.case = Case(os.path.join(self.folder, "case.resolved.yml")) if case is None else case
+        self.case = case if case is not None else Case(os.path.join(self.folder or "", "case.resolved.yml"))
         #: id of the towed body, None without
-        self.towed = None if (towed := self._library.bt_simulation_towed(address)) < 0 else towed
-        self.n_bodies = self._library.bt_simulation_bodies(address)
-        self.dt = self._library.bt_simulation_dt(address)
+        self.towed: int | None = None if (towed := self._library.bt_simulation_towed(address)) < 0 else towed
+        self.n_bodies: int = self._library.bt_simulation_bodies(address)
+        self.dt: float = self._library.bt_simulation_dt(address)
 
     @property
-    def _s(self):
+    def _s(self) -> c_void_p:
         if self._address is None:
             raise BergtowError("the simulation has ended")
         return self._address
 
     # --- steps --------------------------------------------------------------------------------------------------------
 
-    def step(self, n=1):
+    def step(self, n: int = 1) -> None:
         """Make n steps, or as many as are left. An exception of a force comes out of here."""
         self._forces.raised = None
         Forces.stepping = self._forces
@@ -98,7 +107,7 @@ class Simulation:
             raise self._forces.raised
         _library.check(status)
 
-    def end(self):
+    def end(self) -> Result | None:
         """Summary and last checkpoint, where there is a folder. Returns its Result, None without."""
         address, self._address = self._s, None
         try:
@@ -107,90 +116,123 @@ class Simulation:
             self._forces.release()
         return None if self.folder is None else Result(self.folder)
 
-    def drop(self):
+    def drop(self) -> None:
         """End without summary."""
         if self._address is not None:
             address, self._address = self._address, None
             self._library.bt_simulation_drop(address)
             self._forces.release()
 
-    def __enter__(self):
+    def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(self, kind, error, trace):
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: Any) -> None:
         if kind is not None:
             self.drop()
         elif self._address is not None:
             self.end()
 
-    def __del__(self):
+    def __del__(self) -> None:
         if getattr(self, "_address", None) is not None:
             self.drop()
 
-    def checkpoint(self):
+    def checkpoint(self) -> None:
         """Write a checkpoint into the folder, from which `bergtow resume` goes on."""
         _library.check(self._library.bt_simulation_checkpoint(self._s))
 
-    def frame(self):
+    def frame(self) -> None:
         """Write a frame of the bodies as they are, beside those by output.frame_interval."""
         _library.check(self._library.bt_simulation_frame(self._s))
 
     @property
-    def steps(self):
+    def steps(self) -> int:
         return self._library.bt_simulation_steps(self._s)
 
     @property
-    def steps_left(self):
+    def steps_left(self) -> int:
         return self._library.bt_simulation_steps_left(self._s)
 
     @property
-    def time(self):
+    def time(self) -> float:
         """s"""
         return self._library.bt_simulation_time(self._s)
 
     @property
-    def state_hash(self):
+    def state_hash(self) -> str:
         """The same text as in summary.json."""
         return f"{self._library.bt_simulation_hash(self._s):016x}"
 
     # --- bodies -------------------------------------------------------------------------------------------------------
 
-    def _read(self, name):
+    def _read(self, name: str) -> np.ndarray:
         kind, width = _KINDS[name]
         out = np.empty((self.n_bodies, width))
         _library.check(self._library.bt_simulation_read(self._s, kind, _pointer(out)))
         return out[:, 0] if width == 1 else out
 
-    positions = property(lambda self: self._read("place"), doc="[n, 3] x, y, yaw, m, m, rad")
-    velocities = property(lambda self: self._read("velocity"), doc="[n, 3] m/s, m/s, rad/s")
-    masses = property(lambda self: self._read("mass"), doc="[n, 2] with and without added mass, kg")
-    inertias = property(lambda self: self._read("inertia"), doc="[n] kg m²")
-    areas = property(lambda self: self._read("area"), doc="[n] m²")
-    radii = property(lambda self: self._read("radius"), doc="[n] of the circle about the outline, m")
-    thicknesses = property(lambda self: self._read("thickness"), doc="[n] of ice, m")
-    motions = property(lambda self: self._read("motion").astype(int),
-                       doc="[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever")
-    drags = property(lambda self: self._read("drag"),
-                     doc="[n, 5] skin (kg/m) and form (kg/m²) drag of the water, of the air, drag of turning (kg m²)")
+    @property
+    def positions(self) -> np.ndarray:
+        """[n, 3] x, y, yaw, m, m, rad"""
+        return self._read("place")
 
-    def outline(self, body):
+    @property
+    def velocities(self) -> np.ndarray:
+        """[n, 3] m/s, m/s, rad/s"""
+        return self._read("velocity")
+
+    @property
+    def masses(self) -> np.ndarray:
+        """[n, 2] with and without added mass, kg"""
+        return self._read("mass")
+
+    @property
+    def inertias(self) -> np.ndarray:
+        """[n] kg m²"""
+        return self._read("inertia")
+
+    @property
+    def areas(self) -> np.ndarray:
+        """[n] m²"""
+        return self._read("area")
+
+    @property
+    def radii(self) -> np.ndarray:
+        """[n] of the circle about the outline, m"""
+        return self._read("radius")
+
+    @property
+    def thicknesses(self) -> np.ndarray:
+        """[n] of ice, m"""
+        return self._read("thickness")
+
+    @property
+    def motions(self) -> np.ndarray:
+        """[n] 0 moved by forces, 1 velocity prescribed, 2 at rest for ever"""
+        return self._read("motion").astype(int)
+
+    @property
+    def drags(self) -> np.ndarray:
+        """[n, 5] skin (kg/m) and form (kg/m²) drag of the water, of the air, drag of turning (kg m²)"""
+        return self._read("drag")
+
+    def outline(self, body: int) -> np.ndarray:
         """[n, 2] m, anticlockwise, where the body is."""
         n = self._library.bt_simulation_outline(self._s, body, None, 0)
         out = np.empty((n, 2))
         self._library.bt_simulation_outline(self._s, body, _pointer(out), n)
         return out
 
-    def set_velocity(self, body, x, y, rate=0.0):
+    def set_velocity(self, body: int, x: float, y: float, rate: float = 0.0) -> None:
         """m/s, m/s, rad/s. Refused for a body whose velocity is prescribed."""
         _library.check(self._library.bt_simulation_set_velocity(self._s, body, x, y, rate))
 
-    def set_position(self, body, x, y, yaw):
+    def set_position(self, body: int, x: float, y: float, yaw: float) -> None:
         """m, m, rad. Refused outside of the domain, over another body, and for a body that is towed."""
         _library.check(self._library.bt_simulation_set_place(self._s, body, x, y, yaw))
 
     # --- numbers ------------------------------------------------------------------------------------------------------
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> float:
         """A number of the last step by the name of its series, in SI units; NaN where it does not apply."""
         value = c_double()
         status = self._library.bt_simulation_quantity(self._s, name.encode(), ctypes.byref(value))
@@ -199,7 +241,7 @@ class Simulation:
         return value.value
 
     @property
-    def contacts(self):
+    def contacts(self) -> np.ndarray:
         """Contacts of the last step, an array of the type CONTACT; those without impulse might have come about."""
         n = self._library.bt_simulation_contacts(self._s, None, 0)
         rows = np.empty((n, _library.CONTACT_COLUMNS))
@@ -210,13 +252,24 @@ class Simulation:
         out["normal_impulse"], out["tangential_impulse"] = rows[:, 9:11], rows[:, 11]
         return out
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         if self._address is None:
             return "<bergtow.Simulation, ended>"
         return f"<bergtow.Simulation of {self.n_bodies} bodies at {self.time:g} s, {self.steps_left} steps left>"
 
+    def _repr_html_(self) -> str:
+        if self._address is None:
+            return f"<p>{html.escape(repr(self))}</p>"
+        said = [("time", f"{self.time:.6g} s"), ("steps", f"{self.steps} made, {self.steps_left} left")]
+        said += [(name, f"{value:.4g} N") for name in ("ice_resistance", "tow_force", "line_tension")
+                 if not math.isnan(value := self[name])]
+        rows = "".join(f"<tr><td>{name}</td><td>{text}</td></tr>" for name, text in said)
+        return f"<p>{html.escape(repr(self))}</p><table>{rows}</table>"
 
-def run(case, out, *, forces=None, threads=0, replace=False, progress=False):
+
+def run(case: Case | str | os.PathLike[str] | Mapping[str, Any], out: str | os.PathLike[str], *,
+        forces: Mapping[str, Force] | None = None, threads: int = 0, replace: bool = False,
+        progress: bool | Callable[[Simulation], Any] = False) -> Result:
     """Run a case to its end and return its Result. out: the result folder. It can be interrupted between steps.
 
     progress: True for a line that the run renews a few times a second, in notebooks too; or a function, called as
@@ -233,10 +286,10 @@ def run(case, out, *, forces=None, threads=0, replace=False, progress=False):
                 show(sim)
         if progress is True:
             print()
-        return sim.end()
+        return sim.end() or Result(out)
 
 
-def _line(sim):
+def _line(sim: Simulation) -> None:
     """Standard output of Python, which a notebook shows; that of the library goes past it."""
     share = sim.steps / (sim.steps + sim.steps_left)
     load = sim["ice_resistance"]

@@ -309,6 +309,7 @@ static bt_status read_text(bt_case *c, size_t size, bool alone, const char *cons
                            const char *const *place, int n, bt_errors *err)
 {
     const size_t before = err->n;
+    if (!bt_keys_sound(err)) return BT_ERR_CASE;
     bt_case_files files;
     bt_status status = bt_case_files_read(&files, c->path, c->text, size, alone, err);
     free(c->text);

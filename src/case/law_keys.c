@@ -16,6 +16,20 @@ static int unit_of(const char *symbol)
     return -1;
 }
 
+static bt_errors faults;
+
+void bt_keys_fault(bt_errors *err)
+{
+    for (size_t k = 0; k < err->n; k++) bt_errors_add(&faults, "%s", err->text[k]);
+    bt_errors_free(err);
+}
+
+bool bt_keys_sound(bt_errors *err)
+{
+    for (size_t k = 0; k < faults.n; k++) bt_errors_add(err, "%s", faults.text[k]);
+    return faults.n == 0;
+}
+
 bool bt_keys_add(const char *section, const bt_law_key *keys, int n, bt_errors *err)
 {
     bool all = true;

@@ -43,6 +43,11 @@ extern const int bt_n_study_keys;
 /// err: no room, or the name, its section, preset, range or sentence will not do.
 int bt_schema_add(const bt_key *k, bt_errors *err);
 
+/// Tables that do not fit together, a fault of the program: every case is refused with these texts. Takes them over.
+void bt_keys_fault(bt_errors *err);
+/// Add those texts to err. False where there are any.
+bool bt_keys_sound(bt_errors *err);
+
 /// Index of a key by its dotted name, or −1.
 int bt_schema_find(const bt_key *keys, int n, const char *name);
 

@@ -137,6 +137,13 @@ static slot *find(const char *name)
     return NULL;
 }
 
+bool bt_force_is_applied(void)
+{
+    for (int k = 0; k < n_slots; k++)
+        if (slots[k]->force) return true;
+    return false;
+}
+
 bt_status bt_force_apply(const char *name, const char *doc, bt_applied_force *force, void *user, bt_errors *err)
 {
     slot *s = name ? find(name) : NULL;

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "base/name.h"
+#include "case/schema.h"
 #include "force/laws.h"
 
 #define POINTER(name) &bt_law_##name,
@@ -55,8 +56,7 @@ __attribute__((constructor(101))) static void begin(void)
 {
     bt_errors err = {0};
     for (int k = 0; k < bt_n_force_laws; k++) add_keys(bt_force_laws[k], &err);
-    bt_errors_print(&err);
-    if (err.n > 0) exit(BT_ERR_CASE);
+    bt_keys_fault(&err);
     find_series();
 }
 

@@ -23,9 +23,8 @@ static bt_status run_case(const bt_comm *comm, const bt_case *c, const bt_run_op
     return status;
 }
 
-/// Collective. A step was not sound: the state before it, made again from the last checkpoint (or the one of o->from,
-/// or the start), goes to failure.h5.
-static void keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, bt_errors *err)
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step,
+                         bt_errors *err)
 {
     bt_run_options quiet = *o;
     quiet.quiet = true;
@@ -64,7 +63,7 @@ static bt_status run_guarded(const bt_comm *comm, const bt_case *c, const bt_run
     bt_run_manner m = {.kept = kept, .start = start, .until = -1, .held = held, .lock = -1};
     int64_t failed;
     const bt_status status = run_case(comm, c, o, &m, &failed, err);
-    if (failed >= 0) keep_failure(comm, c, o, failed, err);
+    if (failed >= 0) bt_run_keep_failure(comm, c, o, failed, err);
     if (status != BT_OK && m.lock >= 0 && bt_folder_keeps(o->dir))
         bt_errors_add(err, "what %s held before is in %s/%s until a new result stands", o->dir, o->dir,
                       BT_FOLDER_REPLACED);

@@ -90,6 +90,10 @@ bt_status bt_running_load_field(bt_field *f, bt_lead_stats *lead, bt_snapshot *s
 /// Collective. State of the world and counters of the run, into a world that was set up; distributes it over the ranks.
 bt_status bt_running_load(bt_running *r, bt_snapshot *s, bt_errors *err);
 
+/// Collective, after bt_running_end, with the folder still held. A step was not sound: the state before it, made again
+/// from the last checkpoint (or the one of o->from, or the start), goes to failure.h5. What has come of it goes to err.
+void bt_run_keep_failure(const bt_comm *comm, const bt_case *c, const bt_run_options *o, int64_t step, bt_errors *err);
+
 // --- going on --------------------------------------------------------------------------------------------------------
 
 typedef struct bt_resume {

@@ -24,6 +24,8 @@ struct bt_simulation {
     bt_running r;
     bt_run_manner m;
     bt_status status;         ///< of the last step
+    bool edited;              ///< bodies were changed by hand since the last checkpoint
+    bool alone;               ///< no force was applied in any step
 };
 
 // --- texts of errors -------------------------------------------------------------------------------------------------
@@ -97,6 +99,7 @@ static bt_simulation *simulation_of(const bt_simulation_options *o)
                             .dump_step = -1,
                             .command_line = s->command_line,
                             .leave_signals = !o->signals};
+    s->alone = true;
     s->m = (bt_run_manner){.start = bt_clock(), .until = -1, .lock = -1};
     return s;
 }
@@ -155,16 +158,36 @@ bt_status bt_simulation_resume(bt_simulation **out, const bt_simulation_options 
     return hand_out(out, s, status, &err);
 }
 
+/// Can the state before the step that failed be made again from what the folder holds, and nothing else?
+static bool keeps_failure(const bt_simulation *s)
+{
+    const bool unsound = s->status == BT_ERR_NUMERIC && s->r.w->step > s->r.first_step;
+    return unsound && s->dir && s->alone && !s->edited;
+}
+
 bt_status bt_simulation_step(bt_simulation *s, int64_t n)
 {
     bt_errors err = {0};
     if (s->status != BT_OK) return refuse("a step has failed before; end the simulation");
+    s->alone = s->alone && !bt_force_is_applied();
     for (; n > 0 && s->status == BT_OK && bt_running_goes_on(&s->r); n--) s->status = bt_running_step(&s->r, &err);
     if (s->status == BT_OK && bt_halt_stops(s->r.asked)) {
         bt_errors_add(&err, "asked to stop after step %lld; end the simulation", (long long)s->r.w->step);
         s->status = BT_ERR_SIGNAL;
     }
+    if (keeps_failure(s))
+        bt_errors_add(&err, "the end of the simulation writes the state before that step to %s/%s", s->dir,
+                      BT_FAILURE_FILE);
     return reported(s->status, &err);
+}
+
+/// Collective. The parts, and the state before a step that was not sound.
+static bt_status close_parts(bt_simulation *s, bt_status status, bt_errors *err)
+{
+    const bool keep = keeps_failure(s);
+    status = bt_running_end(&s->r, status, err);
+    if (keep) bt_run_keep_failure(bt_comm_world(), &s->c, &s->o, s->r.failed, err);
+    return status;
 }
 
 bt_status bt_simulation_end(bt_simulation *s)
@@ -172,7 +195,7 @@ bt_status bt_simulation_end(bt_simulation *s)
     bt_errors err = {0};
     bt_status status = s->status == BT_ERR_SIGNAL ? BT_OK : s->status;
     if (s->status == BT_OK) status = bt_running_stop(&s->r, &err);
-    status = bt_running_end(&s->r, status, &err);
+    status = close_parts(s, status, &err);
     release(s);
     return reported(status, &err);
 }
@@ -181,7 +204,7 @@ void bt_simulation_drop(bt_simulation *s)
 {
     if (!s) return;
     bt_errors err = {0};
-    bt_running_end(&s->r, s->status == BT_OK ? BT_ERR_USAGE : s->status, &err);
+    close_parts(s, s->status == BT_OK ? BT_ERR_USAGE : s->status, &err);
     bt_errors_free(&err);
     release(s);
 }
@@ -191,7 +214,9 @@ bt_status bt_simulation_checkpoint(bt_simulation *s)
     bt_errors err = {0};
     if (!s->dir) return refuse("there is no folder for a checkpoint; name one in the options (dir)");
     if (s->status != BT_OK) return refuse("a step has failed: its state is not kept");
-    return reported(bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err), &err);
+    const bt_status status = bt_running_checkpoint(&s->r, BT_CHECKPOINT_FILE, &err);
+    if (status == BT_OK) s->edited = false;
+    return reported(status, &err);
 }
 
 bt_status bt_simulation_frame(bt_simulation *s)
@@ -273,6 +298,7 @@ int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, in
 bt_status bt_simulation_set_velocity(bt_simulation *s, int64_t id, double x, double y, double rate)
 {
     bt_errors err = {0};
+    s->edited = true;
     return reported(bt_edit_velocity(s->r.w, id, (const double[]){x, y, rate}, &err), &err);
 }
 
@@ -288,6 +314,7 @@ bt_status bt_simulation_set_place(bt_simulation *s, int64_t id, double x, double
                       y, length, width, p->x0, p->y0);
         return reported(BT_ERR_USAGE, &err);
     }
+    s->edited = true;
     return reported(bt_edit_place(s->r.w, id, (const double[]){x, y, yaw}, &err), &err);
 }
 

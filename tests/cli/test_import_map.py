@@ -506,6 +506,25 @@ def test_a_missing_library_is_named(tmp_path):
     assert r.returncode == IO and "apt-get install python3-gdal" in r.stderr and "Traceback" not in r.stderr
 
 
+def test_from_python(tmp_path):
+    """The same file and numbers as the command's; what is not understood is its message."""
+    sys.path.insert(0, str(ROOT / "postproc"))
+    import bergtow
+    write(tmp_path / "map.geojson", [places(RINGS[0])])
+    r = call("outlines", "map.geojson", "-o", "theirs.geojson", f"--centre={LON},{LAT}", "--record", "theirs.json",
+             cwd=tmp_path)
+    assert r.returncode == 0, r.stderr
+    made = bergtow.outlines(tmp_path / "map.geojson", tmp_path / "ours.geojson", centre=(LON, LAT))
+    assert made.file.read_text() == (tmp_path / "theirs.geojson").read_text()
+    theirs = json.loads((tmp_path / "theirs.json").read_text())
+    theirs["map"]["file"] = str(tmp_path / "map.geojson")
+    assert made.record == theirs
+    assert "in a case beside it" in made.text and "changes:" in made._repr_html_()
+    assert made.picture()._repr_png_().startswith(b"\x89PNG")
+    with pytest.raises(bergtow.BergtowError, match="crs"):
+        bergtow.outlines(tmp_path / "map.geojson", tmp_path / "ours.geojson", crs="EPSG:0", replace=True)
+
+
 # ---- the page
 
 

@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: MIT
 """libbergtow as a program outside of the tree meets it: installed, found by pkg-config, stepped, taken away again."""
 import os
+import pty
 import re
+import select
+import shutil
+import signal
 import subprocess
+import time
 
 import h5py
 import numpy as np
@@ -225,6 +230,38 @@ def test_completion_offers_commands_and_options(prefix):
     assert offered("bergtow", "re") == ["resume"]
     assert offered("bergtow", "run", "--st") == ["--steps"]
     assert offered("bergtow", "check", "--st") == []
+
+
+@pytest.mark.skipif(not shutil.which("zsh"), reason="zsh is missing (make deps-test)")
+def test_zsh_reads_its_completion(prefix):
+    """In a shell on a terminal, found by compinit: what a tab makes of the beginning of a word."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.execvpe("zsh", ["zsh", "-f", "-i"], os.environ | {"TERM": "dumb"})
+    seen = ""
+
+    def typed(text, answer):
+        nonlocal seen
+        os.write(terminal, text.encode())
+        seen, end = "", time.monotonic() + 60
+        while not re.search(answer, seen):
+            assert time.monotonic() < end, f"{text!r} gave {seen!r}, not {answer}"
+            if select.select([terminal], [], [], 1)[0]:
+                seen += os.read(terminal, 65536).decode(errors="replace")
+
+    try:
+        typed(f"fpath=({prefix}/share/zsh/site-functions $fpath); autoload -Uz compinit && compinit -D -u; "
+              "print $_comps[bergtow] is read\n", r"(?m)^_bergtow is read")
+        for begun, whole in {"bergtow re": "bergtow resume ", "bergtow run --st": "bergtow run --steps=",
+                             "bergtow check --st": "bergtow check --stX"}.items():
+            typed(begun, re.escape(begun))
+            typed("\tX" if whole.endswith("X") else "\t", re.escape(whole.removeprefix(begun)))
+            assert "_arguments" not in seen and "_describe" not in seen, seen  # what they say of a wrong table
+            typed("\x15", "")
+    finally:
+        os.kill(pid, signal.SIGKILL)
+        os.waitpid(pid, 0)
+        os.close(terminal)
 
 
 def test_installed_commands_find_their_scripts(prefix, tmp_path):
