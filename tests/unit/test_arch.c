@@ -36,7 +36,7 @@ static void the_width_counts_in_bodies_and_floes(void **state)
     assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 20) < 1e-9);
 }
 
-/// The disc of moved ice grows with the way: π (w/2)² 0.0095 = way/width, both in body widths.
+/// The disc of moved ice grows with the way: π (w/2)² δ = way/width, both in body widths.
 static void a_long_tow_needs_more_width(void **state)
 {
     (void)state;
@@ -46,7 +46,8 @@ static void a_long_tow_needs_more_width(void **state)
     assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 60);
     c.run.duration = 210; // 200 m, 100 body widths
     assert_true(bt_arch_of(&c, 0.89, 0.5).widths == 60);
-    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 116); // 115.8
+    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 116);  // 115.8
+    assert_true(bt_arch_of(&c, 0.95, 0.5).widths == 207); // 206.01, δ = 0.003
     c.domain.width = 231;
     assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
     c.domain.width = 232;
