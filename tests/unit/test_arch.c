@@ -36,6 +36,26 @@ static void the_width_counts_in_bodies_and_floes(void **state)
     assert_true(fabs(bt_arch_of(&c, 0.8, 0.5).bodies - 20) < 1e-9);
 }
 
+/// The disc of moved ice grows with the way: π (w/2)² δ = way/width, both in body widths.
+static void a_long_tow_needs_more_width(void **state)
+{
+    (void)state;
+    bt_case c = narrow();
+    c.tow.mode = BT_TOW_SPEED, c.tow.speed = 1, c.tow.ramp = 20;
+    c.run.duration = 40; // 30 m
+    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 60);
+    c.run.duration = 210; // 200 m, 100 body widths
+    assert_true(bt_arch_of(&c, 0.89, 0.5).widths == 60);
+    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 116);  // 115.8
+    assert_true(bt_arch_of(&c, 0.95, 0.5).widths == 207); // 206.01, δ = 0.003
+    c.domain.width = 231;
+    assert_true(bt_arch_of(&c, 0.9, 0.5).possible);
+    c.domain.width = 232;
+    assert_false(bt_arch_of(&c, 0.9, 0.5).possible);
+    c.tow.mode = BT_TOW_NONE;
+    assert_true(bt_arch_of(&c, 0.9, 0.5).widths == 60);
+}
+
 static void dense_ice_between_near_sides_can_arch(void **state)
 {
     (void)state;
@@ -68,6 +88,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_width_counts_in_bodies_and_floes),
+        cmocka_unit_test(a_long_tow_needs_more_width),
         cmocka_unit_test(dense_ice_between_near_sides_can_arch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
