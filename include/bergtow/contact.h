@@ -69,8 +69,8 @@ typedef struct bt_contact_law {
 } bt_contact_law;
 
 /// Add a law to the table, for a program that uses the library: before it reads a case or makes a world, from one
-/// thread, on all ranks alike and in the same order in every program that resumes its runs. The law and its texts
-/// remain the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with the reason.
+/// thread, on all ranks alike and in the same order in every program that resumes its runs: a checkpoint of others is
+/// refused. The law and its texts remain the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with the reason.
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err);
 
 /// Those added, in their order.
