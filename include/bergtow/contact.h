@@ -73,8 +73,9 @@ typedef struct bt_contact_law {
 /// refused. The law and its texts remain the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with the reason.
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err);
 
-/// Those added, in their order.
+/// How many have been added.
 int bt_n_contact_laws(void);
+/// The k-th of them from 0, in the order of their registration.
 const bt_contact_law *bt_contact_law_of(int k);
 
 #ifdef __cplusplus

@@ -209,8 +209,9 @@ typedef struct bt_world {
     bt_step_stats stats;
 } bt_world;
 
-/// An empty world; release with bt_world_free.
+/// An empty world; release with bt_world_free. The constants of the step are copied.
 bt_world *bt_world_create(const bt_params *p);
+/// Release a world and all that it holds. NULL is ignored.
 void bt_world_free(bt_world *w);
 
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition
