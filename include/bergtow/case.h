@@ -232,7 +232,7 @@ typedef struct bt_case {
         double pressure;         ///< p of crushed ice, Pa
         bt_corner corner;        ///< which angle the crushed corner has
         double corner_angle;     ///< φ when given, or without a corner, rad
-        double least_speed;      ///< approach below this is a push, m/s
+        double least_speed;      ///< approach below this is quasi-static, m/s
         int64_t panels;          ///< pieces of the hull's perimeter
     } impact;
     struct {

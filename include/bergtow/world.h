@@ -201,7 +201,7 @@ typedef struct bt_world {
     struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
-    struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
+    struct bt_impacts *impacts; ///< loads of the towed body by collisions and without (impact.h), NULL = as a whole
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
     bt_events events;        ///< what happened when, the same on all ranks

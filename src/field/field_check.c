@@ -23,7 +23,7 @@ static void depth_of_pair(void *context, bt_idx i, bt_idx j, double dx, double d
 
 double bt_field_overlap(const bt_case *c, const bt_field *f)
 {
-    // The yard of the whole domain, without clearance; its ice area and so its status do not matter here.
+    // The placement region of the whole domain, without clearance; its ice area and so its status do not matter here.
     bt_case whole = *c;
     whole.ice.x_min = c->domain.x0, whole.ice.x_max = c->domain.x0 + c->domain.length;
     whole.ice.y_min = c->domain.y0, whole.ice.y_max = c->domain.y0 + c->domain.width;

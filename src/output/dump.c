@@ -18,7 +18,7 @@
 typedef struct {
     int32_t contact; ///< in the order of the manifolds
     int side;        ///< −1: the body is a, +1: it is b
-} touch;
+} incidence;
 
 /// One contact point.
 typedef struct {
@@ -144,7 +144,7 @@ static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
 
 static int by_contact(const void *a, const void *b)
 {
-    const touch *p = a, *q = b;
+    const incidence *p = a, *q = b;
     return (p->contact > q->contact) - (p->contact < q->contact);
 }
 
@@ -161,12 +161,12 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
     }
     for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
-    touch *at = bt_alloc((size_t)first[b->n], sizeof *at);
+    incidence *at = bt_alloc((size_t)first[b->n], sizeof *at);
     int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
     for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
     for (int k = 0; k < n; k++) {
-        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (touch){k, -1};
-        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (touch){k, 1};
+        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (incidence){k, -1};
+        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (incidence){k, 1};
     }
 
     int64_t most = 0;
@@ -193,7 +193,7 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
         disc[k] = p->disc;
     }
     // Neighbours of a contact: the union of the contacts at its two bodies, in the order of the contacts.
-    touch *near = NULL;
+    incidence *near = NULL;
     size_t cap = 0;
     for (int k = 0; k < n; k++) {
         const row *p = &rows[k];

@@ -270,10 +270,10 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 
 // --- contacts --------------------------------------------------------------------------------------------------------
 
-enum { TRACE_WIDTH = sizeof(bt_memory) / sizeof(double) };
-_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a trace is a row of doubles");
+enum { MEMORY_WIDTH = sizeof(bt_memory) / sizeof(double) };
+_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a record is a row of doubles");
 
-static const bt_state_row trace_columns[] = {
+static const bt_state_row memory_columns[] = {
     MEMBER(bt_memory, "a", I64, 1, a),
     MEMBER(bt_memory, "b", I64, 1, b),
     MEMBER(bt_memory, "part", U16, 2, part),
@@ -339,17 +339,18 @@ static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
     bt_memory *mine = bt_cells_take_memory(w, &n);
-    bt_memory *trace = (bt_memory *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
+    const double *rows = (const double *)(const void *)mine;
+    bt_memory *memory = (bt_memory *)(void *)bt_comm_gather(c, n, MEMORY_WIDTH, rows, &all);
     free(mine);
     if (c->rank == 0) {
-        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_memory_by_names);
-        for (int64_t k = 0; k < all; k++) blank(&trace[k]);
-        save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
+        if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
+        for (int64_t k = 0; k < all; k++) blank(&memory[k]);
+        save_columns(s, "contacts", memory_columns, N_OF(memory_columns), memory, sizeof *memory, all);
         char *laws = added_laws();
         if (*laws) bt_snapshot_add_text(s, ADDED_LAWS, laws);
         free(laws);
     }
-    free(trace);
+    free(memory);
 }
 
 // --- collisions, events ----------------------------------------------------------------------------------------------
@@ -458,8 +459,8 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     int64_t n = -1;
     renew_contacts(s);
     if (!s->faulty) check_added_laws(s);
-    bt_memory *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
-    if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
+    bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
+    if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
         bt_errors_add(err,
@@ -469,11 +470,11 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
         status = BT_ERR_CASE;
     }
     if (status != BT_OK) {
-        free(trace);
+        free(memory);
         return status;
     }
     bt_domain_create(w, c);
-    bt_cells_restore(w, trace, n);
+    bt_cells_restore(w, memory, n);
     if (bt_world_hash(w) == hash) return BT_OK;
     bt_errors_add(err,
                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64
