@@ -39,9 +39,7 @@ void bt_domain_note(bt_world *w);
 /// Wall time spent waiting for other ranks since the last call, s.
 double bt_domain_exchange_time(const bt_world *w);
 /// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what
-/// its cells need?
-bool bt_domain_is_valid(bt_world *w);
-/// Collective. Ends the run with the id of a body if it is not. With -DBT_VALIDATE after every migration and every
+/// its cells need? Ends the run with the id of a body if not. With -DBT_VALIDATE after every migration and every
 /// BT_VALIDATE_STEPS steps.
 void bt_domain_validate(bt_world *w);
 enum { BT_VALIDATE_STEPS = 20 };

@@ -324,8 +324,6 @@ static bt_gid find_fault(const bt_world *w)
     return least > -(double)INT64_MAX ? (bt_gid)-least : -1;
 }
 
-bool bt_domain_is_valid(bt_world *w) { return !w->domain || find_fault(w) < 0; }
-
 void bt_domain_validate(bt_world *w)
 {
     if (!w->domain) return;

@@ -97,10 +97,6 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err);
 /// The same, with outlines that are not convex as `nonconvex` says, and counted.
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err);
 
-/// Largest overlap depth of any two floes, and of any floe with the closed walls, the towed body and the floes given by
-/// hand, m (0 = none). By separating axes, independent of the contact detection.
-double bt_field_overlap(const bt_case *c, const bt_field *f);
-
 #ifdef __cplusplus
 }
 #endif

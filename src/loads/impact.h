@@ -103,7 +103,7 @@ typedef struct bt_impacts {
     double largest_push;  ///< (λ − λ_c) / Δt of one manifold, N
     // carried on
     bt_impact_open *open; ///< [n_open] by gid
-    int64_t n_open, cap_open;
+    int64_t n_open;
 } bt_impacts;
 
 /// For the towed body of world w; NULL when the case asks for none, or there is no body.
