@@ -357,7 +357,7 @@ bt_key bt_case_keys[] = {
          "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]",
         "limit of the work of a step, which is then left and counted as not converged: six updates of every contact "
-        "for each of so many sweeps, looks at contacts counted as updates; assumed"),
+        "for each of so many sweeps, residual passes counted as updates; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
         "times a cell that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",
@@ -376,7 +376,7 @@ bt_key bt_case_keys[] = {
          "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the "
          "projection]"),
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]",
-        "limit of the work of the position projection: so many updates of every contact, looks counted as updates; "
+        "limit of the work of the position projection: so many updates of every contact, residual passes counted too; "
         "assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]",
          "approach below this speed has no restitution, assumed"),
