@@ -511,7 +511,7 @@ def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
 
 
 def test_an_ensemble_with_a_hole(tmp_path, monkeypatch):
-    """A member that fails is reported, its numbers are NaN, and the others are there."""
+    """A member that fails is told, its numbers are NaN, and the others are there."""
     path = study(tmp_path, parameters={"output.window_start": [0.5, 9]})
     with pytest.raises(bergtow.BergtowError, match="c002-r001.*output.window_start"):
         bergtow.Ensemble.run(path, tmp_path / "out", progress=False)
