@@ -140,7 +140,7 @@ static void cut_map(bt_world *w)
     bt_domain *d = w->domain;
     const int n = d->n_x * d->n_y;
     int64_t *work = gather_work(w);
-    double dealt = 0;
+    double fresh = 0;
     if (d->comm->rank == 0) {
         int *start = bt_alloc((size_t)n + 1, sizeof *start), *to = bt_alloc(8 * (size_t)n, sizeof *to),
             *group = bt_alloc((size_t)n, sizeof *group);
@@ -172,7 +172,7 @@ static void cut_map(bt_world *w)
                             .group = group};
         bt_cut_quality q;
         bt_cut(&g, d->comm->size, TOLERANCE, d->owner, &q);
-        dealt = q.imbalance;
+        fresh = q.imbalance;
         for (int p = 0; p < n; p++)
             for (int i = start[p]; i < start[p + 1]; i++) {
                 all += edge[i];
@@ -185,10 +185,10 @@ static void cut_map(bt_world *w)
     free(work);
     MPI_Bcast(d->owner, n, MPI_INT, 0, d->comm->mpi);
     MPI_Bcast(&d->stats.cut, 1, MPI_DOUBLE, 0, d->comm->mpi);
-    MPI_Bcast(&dealt, 1, MPI_DOUBLE, 0, d->comm->mpi);
+    MPI_Bcast(&fresh, 1, MPI_DOUBLE, 0, d->comm->mpi);
     if (d->distributed) { // the first division knew no work yet
-        d->stats.dealt_imbalance += dealt;
-        d->stats.worst_dealt_imbalance = bt_max(d->stats.worst_dealt_imbalance, dealt);
+        d->stats.dealt_imbalance += fresh;
+        d->stats.worst_dealt_imbalance = bt_max(d->stats.worst_dealt_imbalance, fresh);
     }
     d->stats.divisions++;
 }

@@ -27,7 +27,8 @@ typedef struct bt_domain_stats {
     int64_t moved;           ///< bodies that went to another rank
 } bt_domain_stats;
 
-/// Collective. Deal a world that all ranks hold in full, before its first step or between steps. Nothing for one rank.
+/// Collective. Distribute a world that all ranks hold in full, before its first step or between steps. Nothing for one
+/// rank.
 void bt_domain_create(bt_world *w, const bt_comm *comm);
 void bt_domain_free(bt_domain *d);
 
@@ -38,9 +39,7 @@ void bt_domain_note(bt_world *w);
 /// Wall time spent waiting for other ranks since the last call, s.
 double bt_domain_exchange_time(const bt_world *w);
 /// Collective. Do all ranks that hold a body have it bit for bit, is every body owned once, does every rank hold what
-/// its cells need?
-bool bt_domain_is_valid(bt_world *w);
-/// Collective. Ends the run with the id of a body if it is not. With -DBT_VALIDATE after every migration and every
+/// its cells need? Ends the run with the id of a body if not. With -DBT_VALIDATE after every migration and every
 /// BT_VALIDATE_STEPS steps.
 void bt_domain_validate(bt_world *w);
 enum { BT_VALIDATE_STEPS = 20 };
@@ -62,15 +61,15 @@ double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *
 
 /// Is a new division due?
 bool bt_domain_due(const bt_world *w);
-/// After labelling: choose owners, move bodies (owned and ghosts) and traces to where they belong now. Takes and
-/// returns the traces. Collective.
-bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n);
+/// After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong now. Takes
+/// and returns the memory. Collective.
+bt_memory *bt_domain_migrate(bt_world *w, bt_memory *memory, int64_t *n);
 /// After the cells have been made: what is exchanged with whom. Collective.
 void bt_domain_connect(bt_world *w);
 
 /// What is to be done with the value, above 0, of a cell of another rank.
 typedef void bt_take_cell(bt_cells *t, int32_t x, int32_t y, double value);
-/// Tell a value [n cells] of the cells of this rank to the ranks that have cells within two of them, and take theirs.
+/// Send a value [n cells] of the cells of this rank to the ranks that have cells within two of them, and take theirs.
 /// Collective.
 void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take);
 /// After the detection: which bodies the contacts of this step touch. Collective.

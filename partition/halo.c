@@ -67,8 +67,8 @@ static void list_bodies(bt_world *w)
     for (bt_idx k = 0; k < t->n - 1; k++) {
         const bt_cell *cell = &t->cell[k];
         if (cell->end == cell->first) continue;
-        int holder[BT_MAX_SHARERS];
-        const int n = bt_division_sharers(w, cell->x, cell->y, holder);
+        int sharer[BT_MAX_SHARERS];
+        const int n = bt_division_sharers(w, cell->x, cell->y, sharer);
         for (int p = 0; p < BT_PHASES; p++) {
             int32_t at[2];
             int solver = -1;
@@ -76,11 +76,11 @@ static void list_bodies(bt_world *w)
             else if (bt_division_toucher(w, p, cell->x, cell->y, at)) solver = bt_division_owner(w, at[0], at[1]);
             if (solver < 0) continue;
             for (int h = 0; h < n; h++) {
-                if (holder[h] == me && solver != me) {
+                if (sharer[h] == me && solver != me) {
                     bt_link *l = link_to(d, solver);
                     append(&l->receive[p], &l->n_receive[p], w, cell);
-                } else if (holder[h] != me && solver == me) {
-                    bt_link *l = link_to(d, holder[h]);
+                } else if (sharer[h] != me && solver == me) {
+                    bt_link *l = link_to(d, sharer[h]);
                     append(&l->send[p], &l->n_send[p], w, cell);
                 }
             }
@@ -97,9 +97,9 @@ static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
     for (int32_t dy = -2; dy <= 2; dy++)
         for (int32_t dx = -2; dx <= 2; dx++) {
             if ((t->wrap_x == 1 && dx) || (t->wrap_y == 1 && dy)) continue;
-            int holder[BT_MAX_SHARERS];
-            const int n = bt_division_sharers(w, x + dx, y + dy, holder);
-            for (int h = 0; h < n; h++) near[holder[h]] = 1;
+            int sharer[BT_MAX_SHARERS];
+            const int n = bt_division_sharers(w, x + dx, y + dy, sharer);
+            for (int h = 0; h < n; h++) near[sharer[h]] = 1;
         }
 }
 
@@ -153,8 +153,8 @@ static void mark_owned(bt_world *w)
         for (int j = 0; j < 4 && cell->own && k < t->n - 1; j++) {
             if (block[j] < 0) continue;
             const bt_cell *other = &t->cell[block[j]];
-            int holder[BT_MAX_SHARERS];
-            if (bt_division_sharers(w, other->x, other->y, holder) > 1) cell->border = true;
+            int sharer[BT_MAX_SHARERS];
+            if (bt_division_sharers(w, other->x, other->y, sharer) > 1) cell->border = true;
         }
     }
     bt_sum sums[2] = {{0}, {0}};

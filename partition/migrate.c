@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Bodies and traces of contacts to the ranks that own or hold them.
+// Bodies and contact memory to the ranks that own or hold them.
 //
 // Every owned body is sent, complete, to all ranks that hold its cell under the new map; ghosts are dropped first and
 // come back the same way. So after a migration every copy of a body is that of its owner.
@@ -196,7 +196,7 @@ static void move_bodies(bt_world *w)
     shrink(b);
 }
 
-// --- traces ----------------------------------------------------------------------------------------------------------
+// --- contact memory --------------------------------------------------------------------------------------------------
 
 /// Rank that solves the contacts of a and b, both held here, under the new map and labels.
 static int solver_of(const bt_world *w, bt_idx a, bt_idx b)
@@ -209,35 +209,35 @@ static int solver_of(const bt_world *w, bt_idx a, bt_idx b)
     return bt_division_owner(w, at[0], at[1]);
 }
 
-/// Traces by the rank they go to; those that stay are kept in trace [*n].
-static void sort_traces(const bt_world *w, bt_memory *trace, int64_t *n, parcels *p)
+/// Records by the rank they go to; those that stay are kept in memory [*n].
+static void sort_memory(const bt_world *w, bt_memory *memory, int64_t *n, parcels *p)
 {
     const bt_domain *d = w->domain;
     int64_t kept = 0;
     for (int64_t k = 0; k < *n; k++) {
-        const int to = solver_of(w, bt_world_index(w, trace[k].a), bt_world_index(w, trace[k].b));
-        if (to == d->comm->rank) trace[kept++] = trace[k];
-        else if (d->distributed) add(p, to, &trace[k], sizeof *trace);
+        const int to = solver_of(w, bt_world_index(w, memory[k].a), bt_world_index(w, memory[k].b));
+        if (to == d->comm->rank) memory[kept++] = memory[k];
+        else if (d->distributed) add(p, to, &memory[k], sizeof *memory);
     }
     *n = kept;
 }
 
-bt_memory *bt_domain_migrate(bt_world *w, bt_memory *trace, int64_t *n)
+bt_memory *bt_domain_migrate(bt_world *w, bt_memory *memory, int64_t *n)
 {
     bt_domain *d = w->domain;
-    if (!d) return trace;
+    if (!d) return memory;
     bt_division_map(w, d->due);
     parcels p = new_parcels(d->comm->size);
-    sort_traces(w, trace, n, &p);
+    sort_memory(w, memory, n, &p);
     move_bodies(w);
     size_t n_in;
     char *in = deliver(d->comm, &p, 2, &n_in);
     free_parcels(&p);
-    const int64_t more = (int64_t)(n_in / sizeof *trace);
-    trace = bt_realloc(trace, (size_t)(*n + more) + 1, sizeof *trace);
-    if (more) memcpy(trace + *n, in, n_in);
+    const int64_t more = (int64_t)(n_in / sizeof *memory);
+    memory = bt_realloc(memory, (size_t)(*n + more) + 1, sizeof *memory);
+    if (more) memcpy(memory + *n, in, n_in);
     *n += more;
     free(in);
     d->distributed = true;
-    return trace;
+    return memory;
 }

@@ -74,8 +74,8 @@ void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t
 /// Is body i held by another rank too?
 static bool shared(const bt_world *w, bt_idx i)
 {
-    int holder[BT_MAX_SHARERS];
-    return w->bodies.large[i] || bt_division_sharers(w, w->bodies.cell[i][0], w->bodies.cell[i][1], holder) > 1;
+    int sharer[BT_MAX_SHARERS];
+    return w->bodies.large[i] || bt_division_sharers(w, w->bodies.cell[i][0], w->bodies.cell[i][1], sharer) > 1;
 }
 
 typedef struct { bt_gid gid; double x; } value;
@@ -207,8 +207,8 @@ void bt_domain_add_by_name(const bt_world *w, const bt_idx *up, const bt_gid *na
 
 // --- checks ----------------------------------------------------------------------------------------------------------
 
-/// Collective. Ends the run, after rank 0 has told why: a rank that leaves at once would take it down in the middle of
-/// its message.
+/// Collective. Ends the run, after rank 0 has reported why: a rank that leaves at once would take it down in the middle
+/// of its message.
 static _Noreturn void end_all(const bt_comm *c, bt_errors *err)
 {
     bt_comm_errors(c, err);
@@ -254,7 +254,7 @@ void bt_domain_check(bt_world *w)
 #endif
 }
 
-typedef struct { bt_gid gid; int64_t holders; uint64_t state; } copy;
+typedef struct { bt_gid gid; int64_t sharers; uint64_t state; } copy;
 
 static int by_copy(const void *p, const void *q)
 {
@@ -288,9 +288,9 @@ static bt_gid find_fault(const bt_world *w)
     copy *mine = bt_alloc((size_t)b->n, sizeof *mine);
     size_t n = 0, n_all;
     for (bt_idx i = 0; i < b->n; i++) {
-        int holder[BT_MAX_SHARERS];
-        const int holders = b->large[i] ? d->comm->size : bt_division_sharers(w, b->cell[i][0], b->cell[i][1], holder);
-        if (holders == 1) continue;
+        int sharer[BT_MAX_SHARERS];
+        const int sharers = b->large[i] ? d->comm->size : bt_division_sharers(w, b->cell[i][0], b->cell[i][1], sharer);
+        if (sharers == 1) continue;
         const bt_vel *v = &b->vel[i];
         const bt_pose *p = &b->pose[i];
         const double state[] = {
@@ -305,15 +305,15 @@ static bt_gid find_fault(const bt_world *w)
             h ^= h >> 29;
         }
         if (b->gid[i] == w->towed && w->tow) h ^= bt_tow_hash(w->tow);
-        mine[n++] = (copy){b->gid[i], holders, h};
+        mine[n++] = (copy){b->gid[i], sharers, h};
     }
     copy *all = gather(d->comm, mine, n, sizeof *mine, &n_all);
     if (n_all) qsort(all, n_all, sizeof *all, by_copy);
     for (size_t k = 0, same = 0; k < n_all; k++) {
         same = k > 0 && all[k].gid == all[k - 1].gid ? same + 1 : 1;
         const bool last = k + 1 == n_all || all[k + 1].gid != all[k].gid;
-        const bool sound = (same == 1 || (all[k].state == all[k - 1].state && all[k].holders == all[k - 1].holders)) &&
-                           (!last || (int64_t)same == all[k].holders);
+        const bool sound = (same == 1 || (all[k].state == all[k - 1].state && all[k].sharers == all[k - 1].sharers)) &&
+                           (!last || (int64_t)same == all[k].sharers);
         if (!sound && all[k].gid < bad) bad = all[k].gid;
     }
     free(mine);
@@ -323,8 +323,6 @@ static bt_gid find_fault(const bt_world *w)
     bt_comm_reduce(d->comm, NULL, 0, &least, 1, NULL, 0);
     return least > -(double)INT64_MAX ? (bt_gid)-least : -1;
 }
-
-bool bt_domain_is_valid(bt_world *w) { return !w->domain || find_fault(w) < 0; }
 
 void bt_domain_validate(bt_world *w)
 {

@@ -20,19 +20,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-# Units of a case file, as (up, down): the SI value is number * up / down. A bare angle is in degrees.
-_UNITS = {
-    "": (1, 1), "%": (1, 100),
-    "m": (1, 1), "km": (1000, 1), "cm": (1, 100), "mm": (1, 1000), "nmi": (1852, 1), "ft": (3048, 10000),
-    "m/s": (1, 1), "cm/s": (1, 100), "mm/s": (1, 1000), "km/h": (1000, 3600), "kn": (1852, 3600),
-    "ft/s": (3048, 10000),
-    "s": (1, 1), "ms": (1, 1000), "min": (60, 1), "h": (3600, 1), "d": (86400, 1),
-    "rad": (1, 1), "deg": (np.pi, 180), "°": (np.pi, 180),
-    "N": (1, 1), "kN": (1e3, 1), "MN": (1e6, 1), "GN": (1e9, 1), "tf": (9806.65, 1),
-    "Pa": (1, 1), "kPa": (1e3, 1), "MPa": (1e6, 1),
-}
-_ANGLES = ("tow.direction", "body.yaw", "water.latitude", "impact.corner_angle")
-
 
 class RunError(Exception):
     """A run folder or one of its files cannot be used. str() reads "path: reason; remedy"."""
@@ -131,13 +118,11 @@ def parse_case(text):
 
 
 def case_value(case, key, default=np.nan):
-    """Number of a key of parse_case in SI units and radians; default where it is missing or no number."""
-    match = re.match(r"^([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)", case.get(key, ""))
-    if not match or match[2] not in _UNITS:
-        return default
-    up, down = _UNITS[match[2] or ("deg" if key in _ANGLES else "")]
+    """Number of a key of parse_case, in SI units and radians as bergtow writes it; default where it is missing or no
+    number."""
+    match = re.fullmatch(r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)(?: [^\d].*)?", case.get(key, ""))
     try:
-        return float(match[1]) * up / down
+        return float(match[1]) if match else default
     except ValueError:
         return default
 

@@ -2,7 +2,7 @@
 """The loads of an ensemble that something is designed for, member by member and condition by condition.
 
     tow_force, ice_resistance     and every series that the program registers as a load of line or vessel
-    floe_force                    largest force of one floe on the hull in a step, a push or the peak of a collision
+    floe_force                    largest force of one floe on the hull in a step, or the peak of a collision
     panel_load                    load on that panel of the hull where it is largest (cases with output.panels)
 
 Names, units and labels come from the members' files. All but floe_force are filtered (stat_load.py); that one is local,
@@ -50,7 +50,7 @@ def _floe_force(run):
         return None
     conversion = str(run.impacts["conversion"])
     return Load("floe_force", "force of one floe", run.units("largest_push"),
-                "largest force of one floe on the towed body: a push as the mean over a step, or the peak of a "
+                "largest force of one floe on the towed body: as the mean over a step, or the peak of a "
                 "collision", conversion), np.maximum(push, peak)
 
 

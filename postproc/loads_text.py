@@ -128,10 +128,10 @@ def signals(s, markdown):
 
 
 def conversions(s):
-    told = sorted({(x["label"], x["conversion"]) for c in s["conditions"] for x in c["loads"].values()
+    named = sorted({(x["label"], x["conversion"]) for c in s["conditions"] for x in c["loads"].values()
                    if x["conversion"]})
-    return [f"{label[0].upper()}{label[1:]}: a push is the mean over a step, the peak of a collision is by "
-            f"{conversion}." for label, conversion in told]
+    return [f"{label[0].upper()}{label[1:]}: a quasi-static load is the mean over a step, the peak of a collision is "
+            f"by {conversion}." for label, conversion in named]
 
 
 def panel_lines(s):
@@ -176,8 +176,8 @@ def returns(s, markdown):
                              f"{number(f['shape'], 2)}{'!' if f['irregular'] else ''} ({pair(f['shape_95'])})",
                              number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
-    note = ("Levels of the whole signal, pushes and collisions together, that are exceeded once in so many hours of "
-            "tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
+    note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
+            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
             "likelihood. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
             f"than the largest value seen. No bound: the upper end is more than {text_table.FAR:g} times the level.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {load}, {tail}, {several(some)}."

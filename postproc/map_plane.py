@@ -158,7 +158,7 @@ class Plane:
         lon, lat = middle(lonlat)
         around = AreaOfInterest(lon - 1, max(lat - 1, -90), lon + 1, min(lat + 1, 90))
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that a better grid could be fetched is told by the accuracy
+            warnings.simplefilter("ignore")  # that a better grid could be fetched is said by the accuracy
             ways = TransformerGroup(self.crs, WGS84, always_xy=True, area_of_interest=around).transformers
         self._to = ways[0] if ways else first
         known = "ballpark" not in self._to.description.lower() and self._to.accuracy >= 0

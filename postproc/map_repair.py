@@ -35,7 +35,7 @@ except ImportError:  # map_read.need_libraries tells it
 MOST_VERTICES = 128      # src/geometry/shape.h
 SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
 THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
-READER = 1e-3            # overlap that src/field/field_check.c takes, of the mean size
+READER = 1e-3            # overlap that src/field/field_admit.c takes, of the mean size
 GAP = 2e-5               # left between floes, of the mean size
 PASSES, PATIENCE = 40, 8
 NAMED = 20               # of those that are named in the record

@@ -123,7 +123,7 @@ def draw_exceedance(axes, run):
     push = run.number("impacts.largest_push_n")
     if np.isfinite(push) and push > 0:
         axes.axvline(push, color=LARGEST, linestyle="--", linewidth=1.2)
-        axes.annotate(f"largest push of a floe {style.quantity(push, 'N')}", (push, 0.97),
+        axes.annotate(f"largest quasi-static load of a floe {style.quantity(push, 'N')}", (push, 0.97),
                       xycoords=("data", "axes fraction"),
                       rotation=90,
                       ha="right",

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Statistics of a load as it acts on a thing that is built: of its whole signal, pushes and collisions alike, filtered
-to a time scale.
+"""Statistics of a load as it acts on a thing that is built: of its whole signal, quasi-static loads and
+collisions alike, filtered to a time scale.
 
 A time step gives an impulse, and impulse / dt is a mean over the step: with half the step the largest of them is up to
 twice as large, and no structure ever bears it. So the signal is first averaged over a time scale S, by a moving mean of

@@ -12,7 +12,7 @@ sample's own distribution of it: Legendre-like polynomials where it has many val
 values where it has few (then a full factorial design gives the analysis of variance), names included. Then with y = sum
 c_a psi_a,  S_i = sum of c_a² over terms in i alone / sum of all,  T_i = the same over all terms in i. The estimate c²
 is high by the variance of c, which is taken off. The degree is the one with the best Q² (cross-validated R², each value
-left out in turn). What the expansion does not explain, the scatter of the fields among it, is told as 1 - R²; indices
+left out in turn). What the expansion does not explain, the scatter of the fields too, is reported as 1 - R²; indices
 share out what it does explain.
 """
 import itertools

@@ -16,7 +16,7 @@ from bergtow_read import Run, RunError
 from text_table import quantity, short
 
 RIGID = 0.75        # concentration from which on rigid floes jam and nothing limits the force
-FAR = 10.0          # times the hours simulated: an extrapolation beyond is told
+FAR = 10.0          # times the hours simulated: an extrapolation beyond is reported
 WIDE = 3.0          # upper end of the interval / value: beyond, the value is an order of magnitude
 SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (ensemble_read.DOUBTS) that concern the value

@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
-# House rules that a machine can check: names of external symbols, licence lines, include guards, length of lines, and
-# what cppcheck, shellcheck, pyflakes and mypy find. A checker that is not installed is left out and named; where
-# CI=true it must be there. clang-tidy takes minutes: make tidy.
+# House rules that a machine can check: names of external symbols, licence lines, include guards, layers, comments of
+# public functions, length of lines, and what cppcheck, shellcheck, pyflakes and mypy find. A checker that is not
+# installed is left out and named; where CI=true it must be there. clang-tidy takes minutes: make tidy.
 bad=0
 complain() { echo "lint: $*"; bad=1; }
 have() {
@@ -36,6 +36,7 @@ for f in $(files '*.py'); do
     "$python" -c "import ast, sys; ast.parse(open(sys.argv[1]).read(), sys.argv[1])" "$f" || complain "$f: not Python"
 done
 "$python" tests/layers.py || complain "layers: see above; docs/architecture.md says what may call what"
+"$python" tests/documented.py include/bergtow/*.h || complain "public headers: see above"
 "$python" tests/mutants.py || complain "mutants: their texts have to follow the sources"
 # shellcheck disable=SC2046 # one word a file
 "$python" tests/columns.py $(files '*.c' '*.h' '*.py' '*.md' \

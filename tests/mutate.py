@@ -219,7 +219,7 @@ def worker(k, jobs, done, wide):
         began = time.monotonic()
         try:
             by = killed_by(tree, mutant, wide)
-        except Exception as e:  # told with the mutant; the others go on
+        except Exception as e:  # reported with the mutant; the others go on
             by = f"does not build: {e}"
         done.put((mutant, by, time.monotonic() - began))
 

@@ -38,8 +38,10 @@ typedef struct bt_errors {
 void bt_errors_add(bt_errors *e, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 /// Print every message on stderr, one a line, prefixed "bergtow: ".
 void bt_errors_print(const bt_errors *e);
+/// Release the messages; the list is empty then.
 void bt_errors_free(bt_errors *e);
-void bt_errors_move(bt_errors *to, bt_errors *from); ///< behind those that are there; from is empty then
+/// All messages of `from` behind those of `to`; from is empty then.
+void bt_errors_move(bt_errors *to, bt_errors *from);
 
 /// How the program ends at once, with a code and no return: _Exit, or what ends the other ranks, too.
 void bt_leave_by(void (*by)(int code));
@@ -60,17 +62,23 @@ typedef struct bt_text {
     char *text;
     size_t size;
 } bt_text;
+/// Open t->out, to write to.
 void bt_text_begin(bt_text *t);
-char *bt_text_end(bt_text *t); ///< the text; the caller frees it
+/// Close it. Returns the text, which the caller frees.
+char *bt_text_end(bt_text *t);
 
-/// Copy of a text, or a text as printf makes it; the caller frees it.
+/// Copy of a text; the caller frees it.
 char *bt_text_copy(const char *text);
+/// A text as printf makes it; the caller frees it.
 char *bt_text_of(const char *fmt, ...) __attribute__((format(printf, 1, 2)));
 
 /// Wall clock in seconds from an arbitrary origin (CLOCK_MONOTONIC).
 double bt_clock(void);
 
+/// The smaller and the larger of two; b where one of them is NaN. fmin and fmax are calls, and
+/// return the number there.
 static inline double bt_min(double a, double b) { return a < b ? a : b; }
+/// See bt_min.
 static inline double bt_max(double a, double b) { return a > b ? a : b; }
 
 /// Is work on n things worth a team of threads? In the validation build always, so that small tests reach every

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A case: everything a run depends on, as read from the YAML file, in SI contacts and radians.
+// A case: everything a run depends on, as read from the YAML file, in SI units and radians.
 //
-// The schema table in src/case/schema.c is the one place that names each key with its contact, default, range and one
+// The schema table in src/case/schema.c is the one place that names each key with its unit, default, range and one
 // sentence of documentation; it drives parsing, --set, --list-keys and case.resolved.yml. This header only
 // holds the values. Choices are indices into the name lists of the schema.
 #ifndef BERGTOW_CASE_H
@@ -232,7 +232,7 @@ typedef struct bt_case {
         double pressure;         ///< p of crushed ice, Pa
         bt_corner corner;        ///< which angle the crushed corner has
         double corner_angle;     ///< φ when given, or without a corner, rad
-        double least_speed;      ///< approach below this is a push, m/s
+        double least_speed;      ///< approach below this is quasi-static, m/s
         int64_t panels;          ///< pieces of the hull's perimeter
     } impact;
     struct {
@@ -286,7 +286,7 @@ void bt_case_defaults(bt_case *c);
 /// Checks across keys, and defaults that follow from other keys; called by bt_case_read. Errors: BT_ERR_CASE.
 bt_status bt_case_finish(bt_case *c, bt_errors *err);
 
-/// Every key with its value and contact as YAML that reads back to the same bits (17 digits). Caller frees.
+/// Every key with its value and unit as YAML that reads back to the same bits (17 digits). Caller frees.
 char *bt_case_resolved(const bt_case *c);
 #define BT_CASE_RESOLVED_HEAD                                                                                          \
     "# A case with every key, its value in SI units, and what it means. Running this file gives the same result.\n"
@@ -330,13 +330,14 @@ double bt_case_earliest_window(const bt_case *c);
 /// Reference speed of the solver tolerance, m/s (> 0).
 double bt_case_reference_speed(const bt_case *c);
 
+/// Release what a case holds; c itself is the caller's.
 void bt_case_free(bt_case *c);
 
-/// Table of keys for --list-keys: key, contact, default, range, one sentence. Printed to the stream.
+/// Table of keys for --list-keys: key, unit, default, range, one sentence. Printed to the stream (FILE *).
 void bt_case_list_keys(void *stream);
 
 /// The same as JSON: {"keys": [...], "floe_keys": [...]}, each with name, type, default (or the rule it follows),
-/// contact, range, choices and meaning; numbers of the range in the contact of a number written without one.
+/// unit, range, choices and meaning; numbers of the range in the unit of a number written without one.
 void bt_case_list_keys_json(void *stream);
 
 #ifdef __cplusplus

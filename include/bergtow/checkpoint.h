@@ -28,8 +28,8 @@
 //                       decide which cell owns a contact, and so the order of the sweeps. They are older than the
 //                       poses, and cannot be made from them
 //                     D cell array, at, n_in_cells, labelled
-//                     - moved, moved_any, speed, bound, awake, order, run, still
-//                     not needed: rest (a cell that rests is found to do so again), n_listings
+//                     - moved, moved_any, speed, bound, awake, busy, order, share, still
+//                     not needed: asleep (a cell that rests is found to do so again), n_listings
 //   bt_pair           S of those in contact: part, n_points, feature, ln, lt (warm start; reference edge)
 //                     not needed: axis, reach, the lists themselves: shortcuts that cannot change the contacts
 //                     (contacts.h)
@@ -47,7 +47,7 @@
 //                     - stats
 //   bt_impacts        S open
 //                     D rule, panels' places
-//                     - touch, closed, collision, largest_push, panels' loads
+//                     - contact, closed, collision, largest_push, panels' loads
 //   bt_record         S history, numbers of entries and frames, the entry under way
 //                     in result.h5: the entries and frames themselves
 //   bt_impact_store   S numbers of rows, panel loads of the entry under way and by blocks (src/loads/panel_blocks.h)
@@ -90,10 +90,11 @@ bool bt_checkpoint_there(const char *dir);
 /// Remove the checkpoints of dir; what cannot be removed stays.
 void bt_checkpoint_remove(const char *dir);
 
-/// Print what a checkpoint holds, an array a line, on stdout.
+/// Print what a checkpoint holds, an array a line, on stdout. Errors as for bt_checkpoint_read.
 bt_status bt_checkpoint_print(const char *path, bt_errors *err);
 
-/// Compare two checkpoints; *difference: the first, in words, NULL = none. The caller frees it.
+/// Compare two checkpoints; *difference: the first, in words, NULL = none. The caller frees it. Errors as for
+/// bt_checkpoint_read: a difference is none.
 bt_status bt_checkpoint_compare(const char *a, const char *b, char **difference, bt_errors *err);
 
 #ifdef __cplusplus

@@ -50,13 +50,15 @@ int bt_comm_end(int code);
 /// Ends all ranks now, from any one, without waiting for the others. Flushes stdout and stderr first.
 void bt_comm_abort(int code) __attribute__((noreturn));
 
-/// Collective. The ranks of c that name the same group, as ranks of their own. Release with bt_comm_split_end
-/// (collective over the group).
+/// Collective. The ranks of c that name the same group, as ranks of their own. Release with
+/// bt_comm_split_end.
 void bt_comm_split(const bt_comm *c, int group, bt_comm *part);
+/// Collective over the group. The end of what bt_comm_split has made.
 void bt_comm_split_end(bt_comm *part);
 
-/// Collective. The worst status of all ranks. From bad to worse: done, signal, usage, case, numeric, input/output: a
-/// file that cannot be written decides how the run may end, and what the user has to do first.
+/// Collective. Returns the worst status of all ranks, BT_OK where all are done. From bad to worse: done, signal, usage,
+/// case, numeric, input/output: a file that cannot be written decides how the run may end, and what the user has to do
+/// first.
 bt_status bt_comm_agree(const bt_comm *c, bt_status status);
 
 /// Collective. All ranks' messages to rank 0, each text once, in the order of the ranks; the others' lists become

@@ -23,7 +23,7 @@ extern "C" {
 #endif
 
 /// A contact of two bodies, as a law sees it.
-typedef struct bt_touch {
+typedef struct bt_law_contact {
     const bt_world *w;
     bt_idx a, b;              ///< indices into w->bodies; gid[a] < gid[b]
     const double *own;        ///< [BT_MAX_CONTACT_OWN] numbers of the law
@@ -34,7 +34,7 @@ typedef struct bt_touch {
     // after the solve; 0 before
     double load[2];           ///< mean normal load of the points over the step, N
     double grown[2];          ///< by how much the bodies go into each other in this step, at this law's bound, m
-} bt_touch;
+} bt_law_contact;
 
 /// A number of a law, summed over all pairs in a step: a series, and a number of the summary.
 typedef struct bt_contact_number {
@@ -59,22 +59,24 @@ typedef struct bt_contact_law {
     bool (*applies)(const bt_world *w, bt_idx a, bt_idx b, const double *own);
     /// load[i]: the most that point i bears in this step, N, INFINITY before; given[i]: by how much what
     /// stood at point i has receded, m, 0 before: the bodies meet when they overlap by that
-    void (*bound)(const bt_touch *t, double load[2], double given[2]);
+    void (*bound)(const bt_law_contact *t, double load[2], double given[2]);
     /// After the solve, of contacts in cells at work: t->value for the next step, from load and grown; adds to the
     /// numbers that are no state. Does the pair remember anything? It does so until the outlines part by a tenth of
     /// the mean floe size. NULL = never
-    bool (*remember)(bt_touch *t, double *number);
+    bool (*remember)(bt_law_contact *t, double *number);
     /// What one pair that remembers adds to the numbers that are a state. NULL = nothing
     void (*count)(const double value[4], const double *own, double *number);
 } bt_contact_law;
 
 /// Add a law to the table, for a program that uses the library: before it reads a case or makes a world, from one
-/// thread, on all ranks alike and in the same order in every program that resumes its runs. The law and its texts
-/// remain the caller's and must stay where they are to the end of the program. Errors: BT_ERR_USAGE with the reason.
+/// thread, on all ranks alike and in the same order in every program that resumes its runs: a checkpoint of others is
+/// refused. The law and its texts remain the caller's and must stay where they are to the end of the program. Errors:
+/// BT_ERR_USAGE with the reason.
 bt_status bt_contact_register(const bt_contact_law *law, bt_errors *err);
 
-/// Those added, in their order.
+/// How many have been added.
 int bt_n_contact_laws(void);
+/// The k-th of them from 0, in the order of their registration.
 const bt_contact_law *bt_contact_law_of(int k);
 
 #ifdef __cplusplus

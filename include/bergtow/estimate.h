@@ -113,7 +113,9 @@ typedef struct bt_estimate_def {
 /// Errors: BT_ERR_USAGE, with the reason in err.
 bt_status bt_estimate_register(const bt_estimate_def *d, bt_errors *err);
 
+/// How many estimates there are: the program's own, then those registered.
 int bt_n_estimates(void);
+/// The k-th of them, from 0.
 const bt_estimate_def *bt_estimate_of(int k);
 
 /// Strength of the ice P, N/m.

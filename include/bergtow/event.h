@@ -32,7 +32,9 @@ typedef struct bt_events {
     int64_t n, cap;
 } bt_events;
 
+/// Append an event: the end of its step, s, its kind, and what the kind says of subject and value.
 void bt_events_add(bt_events *e, double time, bt_event_kind kind, int64_t subject, double value);
+/// Release the events; the list is empty then.
 void bt_events_free(bt_events *e);
 
 /// "line_broken", ...: BT_EVENT_KINDS names.

@@ -9,22 +9,6 @@
 extern "C" {
 #endif
 
-/// Write the local problem in two dimensions: find u, r with
-///     u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= mu r_n, r_t against u_t,
-/// two rows a contact: normal, then tangent; u in m/s, r in N s. (FCLIB: Acary, Brémond, Koziara, Pérignon 2014,
-/// "FCLIB: a collection of discrete 3D frictional contact problems", INRIA RT-444.)
-///   w_ptr [2n+1], w_col, w_val   W (1/kg), compressed rows, at most 2^31 − 1 entries
-///   q [2n] m/s, mu [n]
-///   guess_r [2n]                 start of the iteration (its velocity is stored as W r + q), or NULL
-///   solution_u, solution_r [2n]  solution, or both NULL
-///   title, description           free text, or NULL
-/// The file appears complete under its name, or not at all. Errors: BT_ERR_USAGE (a problem that the format cannot
-/// hold, among them one without contacts), BT_ERR_IO.
-bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                               const double *w_val, const double *q, const double *mu, const double *guess_r,
-                               const double *solution_u, const double *solution_r, const char *title,
-                               const char *description, bt_errors *err);
-
 /// Where the contacts and the bodies of a problem are, which FCLIB's format does not know: for pictures. Normals point
 /// from the first body of a contact to the second, levers from the centroid of each to the contact point, all in the
 /// world frame.
@@ -37,15 +21,28 @@ typedef struct bt_fclib_places {
     const double *pose;    ///< [n_bodies][3] x m, y m, yaw rad at the end of the step, by id
 } bt_fclib_places;
 
-/// The same with an upper bound of the normal impulses, 0 <= r_n <= bound [n] N s (u_n < 0 where it holds): what
-/// FCLIB's format does not know, stored as /bound beside it, and with contacts whose two components both lie in a disc
-/// about 0 of this radius, N s, stored as /disc (NaN: no such contact). NULL: none. Places, or NULL, are stored as
-/// /places.
-bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                                 const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound,
-                                 const double *disc, const bt_fclib_places *places, const char *title,
-                                 const char *description, bt_errors *err);
+/// A local problem in two dimensions: find u, r with
+///     u = W r + q,   0 <= r_n ⟂ u_n >= 0,   |r_t| <= mu r_n, r_t against u_t,
+/// two rows a contact: normal, then tangent; u in m/s, r in N s. (FCLIB: Acary, Brémond, Koziara, Pérignon 2014,
+/// "FCLIB: a collection of discrete 3D frictional contact problems", INRIA RT-444.)
+typedef struct bt_fclib_problem {
+    int n;                 ///< contacts
+    const int64_t *w_ptr;  ///< [2n + 1] W in compressed rows, at most 2^31 − 1 entries
+    const int32_t *w_col;
+    const double *w_val;   ///< 1/kg
+    const double *q, *mu;  ///< [2n] m/s, [n]
+    const double *u, *r;   ///< [2n] solution, or both NULL
+    // What the format does not know, stored beside it as /bound, /disc and /places; each may be NULL.
+    const double *bound;   ///< [n] N s, 0 <= r_n <= bound; u_n < 0 where it holds
+    /// [n] N s, radius of the disc about 0 in which both components of a contact lie; NaN: no such contact
+    const double *disc;
+    const bt_fclib_places *places;
+    const char *title, *description; ///< free text, or NULL
+} bt_fclib_problem;
+
+/// Write a problem. The file appears complete under its name, or not at all. Errors: BT_ERR_USAGE (a problem that the
+/// format cannot hold, among them one without contacts), BT_ERR_IO.
+bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors *err);
 
 #ifdef __cplusplus
 }

@@ -45,7 +45,9 @@ typedef struct bt_field {
     int64_t cap_vertices;  ///< vertices they have room for
 } bt_field;
 
+/// An empty field. To be called before any other function of a field; release with bt_field_free.
 void bt_field_init(bt_field *f);
+/// Release what a field holds; f itself is the caller's.
 void bt_field_free(bt_field *f);
 
 /// Append one floe; vertices [nv][2] are moved so that their centroid is the origin and (x, y) is shifted with them.
@@ -68,7 +70,7 @@ bt_status bt_field_read_outlines(const bt_case *c, bt_field *f, bt_errors *err);
 /// Outlines where they lie, as GeoJSON that ice.outlines reads back: longitude and latitude where the place of x = y =
 /// 0 on the earth is known (of outlines that were read in degrees, or ice.origin_lon and ice.origin_lat), the crs of
 /// outlines that were read in another, and otherwise metres [east, north] of x = y = 0, with a crs that says that they
-/// are local. A complete file or none.
+/// are local. A complete file or none. Errors: BT_ERR_IO.
 bt_status bt_field_write_outlines(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
 
 /// Has bt_field_write_outlines written this file?
@@ -84,18 +86,16 @@ double bt_field_thickness(const bt_case *c, bt_idx i);
 /// Collective. The field of rank 0 to all ranks; f has been initialised.
 void bt_field_share(const bt_comm *c, bt_field *f);
 
-/// Write to / read from an HDF5 file: /floes/{vertices,offsets,pose,thickness,area}, attributes on /floes.
-/// The writer leaves a complete file or none. The reader checks every value (finite, convex, sizes, offsets) and names
-/// file and floe in its errors; f has been initialised, what it held is released, and it is empty after an error.
-/// Errors: BT_ERR_IO from the system, BT_ERR_CASE for what the file holds.
+/// Write to an HDF5 file: /floes/{vertices,offsets,pose,thickness,area}, attributes on /floes. A complete file or none.
+/// Errors: BT_ERR_IO.
 bt_status bt_field_write(const bt_field *f, const bt_case *c, const char *path, bt_errors *err);
+
+/// Read such a file. Every value is checked (finite, convex, sizes, offsets), and errors name file and floe; f has been
+/// initialised, what it held is released, and it is empty after an error. Errors: BT_ERR_IO from the system,
+/// BT_ERR_CASE for what the file holds.
 bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err);
 /// The same, with outlines that are not convex as `nonconvex` says, and counted.
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err);
-
-/// Largest overlap depth of any two floes, and of any floe with the closed walls, the towed body and the floes given by
-/// hand, m (0 = none). By separating axes, independent of the contact detection.
-double bt_field_overlap(const bt_case *c, const bt_field *f);
 
 #ifdef __cplusplus
 }

@@ -123,7 +123,8 @@ typedef struct bt_force_body {
 
 /// of the circle about the outline, m
 static inline double bt_force_radius(const bt_force_body *b) { return b->all->radius[b->i]; }
-static inline double bt_force_area(const bt_force_body *b) { return b->all->area[b->i]; }     ///< m²
+/// of its outline, m²
+static inline double bt_force_area(const bt_force_body *b) { return b->all->area[b->i]; }
 /// of ice, m; 0 = no ice
 static inline double bt_force_thickness(const bt_force_body *b) { return b->all->thickness[b->i]; }
 
@@ -201,7 +202,9 @@ typedef struct bt_forces {
     bt_impulse series[BT_MAX_FORCE_SERIES];
 } bt_forces;
 
+/// For a world that begins: the force laws that there are now, all their numbers 0.
 bt_forces *bt_forces_create(void);
+/// Release them; NULL is ignored.
 void bt_forces_free(bt_forces *f);
 
 /// The numbers of all laws from a case. Without a case a program sets w->forces->own itself; they are 0 before.

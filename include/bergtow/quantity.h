@@ -71,14 +71,16 @@ typedef struct bt_quantity {
 /// room.
 bt_status bt_quantity_register(const bt_quantity *q, bt_errors *err);
 
-/// All series, in the order of the file: the program's own, then those registered.
+/// How many series there are: the program's own, then those registered.
 int bt_n_series(void);
+/// The k-th of them from 0, in the order of the file.
 const bt_quantity *bt_series(int k);
 /// By name, NULL where there is none.
 const bt_quantity *bt_series_find(const char *name);
 
 /// How many of them are registered beside the program's own: the last ones.
 int bt_n_added(void);
+/// The k-th of these, from 0.
 const bt_quantity *bt_added(int k);
 
 /// "tow - drag - Coriolis - tilt - ... - inertia": what the ice resistance is by the balance of the towed body, in the

@@ -23,6 +23,7 @@ typedef struct bt_roster {
 /// BT_ERR_CASE (a floe outside the domain or overlapping the body, from a field that was read).
 bt_status bt_setup_world(const bt_case *c, const bt_field *f, bt_world **w, bt_roster *r, bt_errors *err);
 
+/// Release what a roster holds.
 void bt_roster_free(bt_roster *r);
 
 /// Free drift at time zero (force/drift.h) of a round floe of this size and thickness (m) into floe, and of the towed

@@ -80,10 +80,10 @@ void bt_simulation_drop(bt_simulation *s);
 /// Errors: BT_ERR_USAGE without a folder, BT_ERR_IO.
 bt_status bt_simulation_frame(bt_simulation *s);
 
-int64_t bt_simulation_steps(const bt_simulation *s);
-int64_t bt_simulation_steps_left(const bt_simulation *s);
-double bt_simulation_time(const bt_simulation *s); ///< s
-double bt_simulation_dt(const bt_simulation *s);   ///< s
+int64_t bt_simulation_steps(const bt_simulation *s);      ///< steps done
+int64_t bt_simulation_steps_left(const bt_simulation *s); ///< to the end; 0 after an error
+double bt_simulation_time(const bt_simulation *s);        ///< at the end of the last step, s
+double bt_simulation_dt(const bt_simulation *s);          ///< Δt, s
 
 /// Hash of the state, as state_hash of summary.json.
 uint64_t bt_simulation_hash(const bt_simulation *s);
@@ -159,6 +159,8 @@ bt_status bt_case_check_text(const bt_simulation_options *o, char **resolved);
 /// "keys" of a case, or "quantities" of a run, as JSON (bergtow --list-keys --json); NULL for another word. Release
 /// with bt_release.
 char *bt_list_json(const char *what);
+
+/// Release a text that bt_case_check_text or bt_list_json has given. NULL is ignored.
 void bt_release(char *text);
 
 /// "0.1.0"

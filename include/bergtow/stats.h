@@ -20,7 +20,7 @@ typedef struct bt_mean {
 
 /// A straight line through a series.
 typedef struct bt_trend {
-    /// of the line from the first sample to the last, in the contact of the series; NaN when n < BT_TREND_LEAST
+    /// of the line from the first sample to the last, in the unit of the series; NaN when n < BT_TREND_LEAST
     double change;
     double se;          ///< its standard error with correlation
     double low, high;   ///< the interval that a series without drift leaves in 5 % of all cases
@@ -40,10 +40,11 @@ bt_trend bt_stats_trend(const double *x, int64_t n);
 /// Means of the four quarters of x[n]; NaN where a quarter has no sample.
 void bt_stats_quarters(const double *x, int64_t n, double quarter[4]);
 
+enum { BT_STATS_STARTS = 4096 }; ///< starts of a window that are looked at, at most
+
 /// Steps between the starts of a window that are looked at in n samples: 5, twice that as often as it takes to have at
 /// most BT_STATS_STARTS of them. What needs a sum between any two starts so takes bounded memory, and a start of a long
 /// series is put off by n / BT_STATS_STARTS at most.
-enum { BT_STATS_STARTS = 4096 };
 int64_t bt_stats_start_step(int64_t n);
 
 /// Start of the steady window of x[n]: MSER-5 (White 1997, Simulation 69): the truncation point that minimises the

@@ -105,6 +105,8 @@ bt_status bt_study_read(bt_study *s, const char *path, bt_errors *err);
 /// Values in place of those that the study or its base says, [n] "key=value", for all members. It is another study
 /// then. Errors: BT_ERR_CASE, also for a key that the study varies.
 bt_status bt_study_override(bt_study *s, const char *const *set, int n, bt_errors *err);
+
+/// Release what a study holds.
 void bt_study_free(bt_study *s);
 
 /// The distribution of a parameter in words, "" for one without; the caller frees it.
@@ -113,17 +115,19 @@ char *bt_study_distribution(const bt_study_parameter *p);
 /// Are there ranks enough for a member? Errors: BT_ERR_CASE.
 bt_status bt_study_fits(const bt_study *s, int ranks, bt_errors *err);
 
+/// Members of a study: its conditions times its repeats.
 static inline int64_t bt_study_n_members(const bt_study *s) { return s->n_conditions * s->repeats; }
 
 /// Member m of 0 ... n − 1: repeats of condition 0 first, then those of condition 1. Release with bt_member_free.
 void bt_study_member(const bt_study *s, int64_t m, bt_member *out);
+/// Release what a member holds.
 void bt_member_free(bt_member *m);
 
 /// The case of a member: the base with its overrides; messages name where in the study these stand. Errors:
 /// BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_member_case(const bt_study *s, const bt_member *m, bt_case *c, bt_errors *err);
 
-/// The base with `set` alone.
+/// The base with `set` alone. Errors: BT_ERR_CASE, BT_ERR_IO.
 bt_status bt_study_base_case(const bt_study *s, bt_case *c, bt_errors *err);
 
 /// Everything that decides what a member is, without the number of repeats: the study's text as understood and the base

@@ -25,6 +25,7 @@ typedef struct bt_sum {
     bool bad;
 } bt_sum;
 
+/// Add a term; one of 2⁶² and more, or a NaN, makes the sum NaN. An empty sum is {0}.
 static inline void bt_sum_add(bt_sum *s, double x)
 {
     if (!(fabs(x) < 0x1p62)) {
@@ -39,12 +40,14 @@ static inline void bt_sum_add(bt_sum *s, double x)
     s->v = (bt_int128)((bt_uint128)s->v + (x < 0 ? -v : v));
 }
 
+/// Add another sum.
 static inline void bt_sum_join(bt_sum *s, const bt_sum *more)
 {
     s->v = (bt_int128)((bt_uint128)s->v + (bt_uint128)more->v);
     s->bad = s->bad || more->bad;
 }
 
+/// The sum as a double, rounded once; NaN where a term was bad.
 static inline double bt_sum_value(const bt_sum *s) { return s->bad ? (double)NAN : (double)s->v * 0x1p-64; }
 
 #ifdef __cplusplus

@@ -201,7 +201,7 @@ typedef struct bt_world {
     struct bt_forces *forces; ///< numbers of the force laws, and what they did to the towed body (forces.h)
     struct bt_domain *domain;///< division among ranks, NULL = all here (domain.h)
     const struct bt_exchange *exchange; ///< what the division does for space (exchange.h), NULL with it
-    struct bt_impacts *impacts; ///< pushes and collisions of the towed body (impact.h), NULL = not told apart
+    struct bt_impacts *impacts; ///< loads of the towed body by collisions and without (impact.h), NULL = as a whole
     bt_gid towed;            ///< gid of the towed body, −1 = none
     int64_t step;            ///< steps done
     bt_events events;        ///< what happened when, the same on all ranks
@@ -209,8 +209,9 @@ typedef struct bt_world {
     bt_step_stats stats;
 } bt_world;
 
-/// An empty world; release with bt_world_free.
+/// An empty world; release with bt_world_free. The constants of the step are copied.
 bt_world *bt_world_create(const bt_params *p);
+/// Release a world and all that it holds. NULL is ignored.
 void bt_world_free(bt_world *w);
 
 /// Add a body; returns its gid: bodies are numbered in the order in which they are added, floes first. The definition

@@ -57,10 +57,9 @@ static const struct argp ensemble_argp = {
     .args_doc = "STUDY.yml",
     .children = children,
     .doc = "Run the members of a study, or those that are left of it: the same call goes on where an earlier one "
-           "ended, however it "
-           "ended. Results that are missing or damaged are run again; the exit code is 0 only when every member is "
-           "finished and sound. Under mpirun the members are dealt to groups of ranks (`ranks` of the study); several "
-           "calls may work on one folder."};
+           "ended, however it ended. Results that are missing or damaged are run again; the exit code is 0 only when "
+           "every member is finished and sound. Under mpirun the members are assigned to groups of ranks (`ranks` of "
+           "the study); several calls may work on one folder."};
 
 int bt_cmd_ensemble(int argc, char **argv)
 {

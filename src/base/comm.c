@@ -338,7 +338,7 @@ int64_t bt_comm_before(const bt_comm *c, int64_t value, int64_t *total)
 // ---- rows by id ----
 
 // The rank whose block holds an id; empty blocks hold none.
-static int holder(const int64_t *first, int size, bt_gid gid)
+static int rank_of(const int64_t *first, int size, bt_gid gid)
 {
     int low = 0, high = size;
     while (high - low > 1) {
@@ -411,7 +411,7 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
     int *numbers = bt_alloc(5 * (size_t)size, sizeof *numbers);
     int *send = numbers, *send_at = numbers + size, *take = numbers + 2 * size, *take_at = numbers + 3 * size,
         *next = numbers + 4 * size;
-    for (bt_idx i = 0; i < n; i++) send[holder(first, size, gid[i])]++;
+    for (bt_idx i = 0; i < n; i++) send[rank_of(first, size, gid[i])]++;
     running_sum(size, send, send_at);
     MPI_Alltoall(send, 1, MPI_INT, take, 1, MPI_INT, c->mpi);
     const int n_take = running_sum(size, take, take_at);
@@ -420,7 +420,7 @@ bt_status bt_comm_rows_by_gid(const bt_comm *c, const int64_t *first, bt_idx n, 
     double *out = bt_alloc((size_t)n, (size_t)width * sizeof *out);
     memcpy(next, send_at, (size_t)size * sizeof *next);
     for (bt_idx i = 0; i < n; i++) {
-        const int at = next[holder(first, size, gid[i])]++;
+        const int at = next[rank_of(first, size, gid[i])]++;
         gid_out[at] = gid[i];
         memcpy(out + (size_t)at * (size_t)width, rows + (size_t)i * (size_t)width, (size_t)width * sizeof *out);
     }

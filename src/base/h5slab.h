@@ -25,8 +25,8 @@ bt_slab bt_slab_fixed(bt_h5 *h, const char *name, hid_t type, int64_t n, int wid
 bt_slab bt_slab_growing(bt_h5 *h, const char *name, hid_t type, int64_t n, int width);
 /// Make room for one frame after those that are there; `frame` is their number.
 void bt_slab_grow(bt_slab *s, int64_t frame);
-/// Collective. Tell all ranks where the rows of these k datasets lie (of the present frame). Returns the status of rank
-/// 0.
+/// Collective. Inform all ranks where the rows of these k datasets lie (of the present frame). Returns the status of
+/// rank 0.
 bt_status bt_slab_share(const bt_comm *c, bt_slab *const *s, int k);
 /// Write rows first up to first + n. Not collective: each rank writes what it has.
 void bt_slab_write(bt_slab *s, int64_t first, int64_t n, const void *rows);

@@ -75,7 +75,6 @@ static const struct {
 double bt_units_froude(bt_unit kind) { return kinds[kind].froude; }
 const char *bt_units_symbol(bt_unit kind) { return kinds[kind].symbol; }
 const char *bt_units_bare(bt_unit kind) { return kinds[kind].bare; }
-const char *bt_units_noun(bt_unit kind) { return kinds[kind].noun; }
 
 // strtod and printf follow the locale of the program that uses the library; the numbers of a case never do.
 static locale_t c_locale(void)

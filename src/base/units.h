@@ -41,7 +41,6 @@ double bt_units_froude(bt_unit kind);
 
 const char *bt_units_symbol(bt_unit kind); ///< SI symbol, "" for plain numbers; what the formatted value carries
 const char *bt_units_bare(bt_unit kind);   ///< unit of a number written without one, "-" for plain numbers
-const char *bt_units_noun(bt_unit kind);   ///< "a length"
 
 /// A force with a prefix that keeps three digits before the point; returns out.
 const char *bt_force_text(char out[32], double newton);

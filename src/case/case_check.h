@@ -37,7 +37,7 @@ double bt_case_line_period(const bt_case *c);
 /// Is the ramp at least BT_RAMP_PERIODS periods of the body on its line (or the start that of a programme, or without a
 /// line)?
 bool bt_case_start_is_slow(const bt_case *c);
-/// Tell of a start that is not.
+/// Report a start that is not.
 void bt_case_warn_start(const bt_case *c, bt_errors *warnings);
 
 /// The direction that way-points give, where the place of the body is known: a moving window lies by it.

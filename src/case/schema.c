@@ -357,14 +357,14 @@ bt_key bt_case_keys[] = {
          "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]",
         "limit of the work of a step, which is then left and counted as not converged: six updates of every contact "
-        "for each of so many sweeps, looks at contacts counted as updates; assumed"),
+        "for each of so many sweeps, residual passes counted as updates; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
-        "times a tile that still changes is swept before the next has its turn"),
+        "times a cell that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",
         "without effect: sweeps no longer follow each other through large fields; accepted in cases written for "
         "earlier versions, and to be taken out"),
     REAL("solver.tile", solver.cell, RATIO, "5", "[2, 100]",
-         "least side of the tiles / mean floe size: the order of the contacts, and what ranks and threads share out"),
+         "least side of the cells / mean floe size: the order of the contacts, and what ranks and threads share out"),
     BOOL("solver.plain", solver.plain, "false",
          "sweeps over all contacts without momentum, as a reference; max_sweeps and position_sweeps are then counts of "
          "sweeps"),
@@ -376,7 +376,7 @@ bt_key bt_case_keys[] = {
          "overlap that the position projection leaves alone / mean floe size, assumed [Metrikin 2014 for the "
          "projection]"),
     INT("solver.position_sweeps", solver.position_sweeps, "300", "[0, 1e5]",
-        "limit of the work of the position projection: so many updates of every contact, looks counted as updates; "
+        "limit of the work of the position projection: so many updates of every contact, residual passes counted too; "
         "assumed"),
     REAL("solver.rest_speed", solver.rest_speed, SPEED, "1e-3 m/s", "[0, 10]",
          "approach below this speed has no restitution, assumed"),
@@ -403,7 +403,7 @@ bt_key bt_case_keys[] = {
     REAL("impact.corner_angle", impact.corner_angle, ANGLE, "90 deg", "(0, 179]",
          "angle of the crushed corner, assumed"),
     REAL("impact.least_speed", impact.least_speed, SPEED, "= 0.05 x reference speed of the solver", "[0, 100]",
-         "approach of a floe to the body below which its contact counts as a push, assumed"),
+         "approach of a floe to the body below which its contact counts as quasi-static, assumed"),
     INT("impact.panels", impact.panels, "36", "[1, 1000]",
         "pieces of equal length that the hull's perimeter is cut into for loads, the first centred on the body's own x "
         "axis"),

@@ -44,10 +44,10 @@ bool bt_added_applies(const bt_world *w, int law, bt_idx a, bt_idx b)
     return !l->applies || l->applies(w, a, b, own_of(&w->par, law));
 }
 
-static bt_touch touch_of(const bt_world *w, int law, const bt_cell *t, bt_idx j, bt_idx record)
+static bt_law_contact contact_of(const bt_world *w, int law, const bt_cell *t, bt_idx j, bt_idx record)
 {
     const bt_contact *u = &t->contacts[j];
-    bt_touch x = {.w = w, .a = u->a, .b = u->b, .own = own_of(&w->par, law), .n = u->n};
+    bt_law_contact x = {.w = w, .a = u->a, .b = u->b, .own = own_of(&w->par, law), .n = u->n};
     for (int i = 0; i < u->n; i++) x.gap[i] = t->gaps[j].gap[i];
     // ran = ra × n, which changes along the tangent by the distance
     if (u->n == 2) x.length = fabs(u->ran[1] - u->ran[0]);
@@ -59,8 +59,8 @@ void bt_added_bound(const bt_world *w, int law, bt_cell *t, bt_idx j, const bt_p
 {
     bt_limit *l = &t->laws.limits[j];
     const bt_memory names = bt_law_names(w, p, law);
-    l->trace[law] = (int32_t)bt_law_find(t, &names);
-    const bt_touch x = touch_of(w, law, t, j, l->trace[law]);
+    l->record[law] = (int32_t)bt_law_find(t, &names);
+    const bt_law_contact x = contact_of(w, law, t, j, l->record[law]);
     double load[2] = {INFINITY, INFINITY}, given[2] = {0};
     added[law - BT_LAWS]->bound(&x, load, given);
     for (int i = 0; i < x.n; i++) {
@@ -91,7 +91,7 @@ void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_tota
     const bt_contact *u = &t->contacts[j];
     if (!of->remember || u->n == 0 || !bt_added_applies(w, law, u->a, u->b)) return;
     const bt_limit *l = &t->laws.limits[j];
-    bt_touch x = touch_of(w, law, t, j, l->trace[law]);
+    bt_law_contact x = contact_of(w, law, t, j, l->record[law]);
     for (int i = 0; i < x.n; i++) {
         x.load[i] = u->ln[i] / w->par.dt;
         x.grown[i] = bt_added_gives_way(u, l, i, law) ? l->grown[i] : 0;
@@ -103,7 +103,7 @@ void bt_added_remember(const bt_world *w, int law, bt_cell *t, bt_idx j, bt_tota
     bt_memory r = bt_law_names(w, &t->search.pairs[t->gaps[j].pair], law);
     r.n_points = u->n;
     memcpy(r.value, x.value, sizeof r.value);
-    bt_law_put(t, l->trace[law], &r);
+    bt_law_put(t, l->record[law], &r);
 }
 
 void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
@@ -116,7 +116,7 @@ void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals)
 
 int bt_added_sums(void) { return n_added * (1 + BT_MAX_CONTACT_NUMBERS); }
 
-void bt_added_tell(bt_step_stats *st, const bt_totals *t)
+void bt_added_stats(bt_step_stats *st, const bt_totals *t)
 {
     for (int k = 0; k < n_added; k++)
         for (int i = 0; i <= BT_MAX_CONTACT_NUMBERS; i++)

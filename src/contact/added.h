@@ -39,7 +39,7 @@ void bt_added_count(const bt_world *w, const bt_memory *r, bt_totals *totals);
 int bt_added_sums(void);
 
 /// Their sums into the numbers of the step.
-void bt_added_tell(bt_step_stats *st, const bt_totals *t);
+void bt_added_stats(bt_step_stats *st, const bt_totals *t);
 
 /// Their numbers from a case.
 void bt_added_setup(const bt_case *c, double own[BT_MAX_ADDED_LAWS][BT_MAX_CONTACT_OWN]);

@@ -58,7 +58,7 @@ static void inherit(const bt_cell *t, const bt_memory *names, const bt_manifold 
         deepest = bt_max(deepest, depth_of(s));
         if (bt_memory_by_names(s, names) == 0) own = s;
     }
-    if (own) l->trace[BT_LAW_CRUSHING] = (int32_t)(own - t->laws.memory);
+    if (own) l->record[BT_LAW_CRUSHING] = (int32_t)(own - t->laws.memory);
     for (int i = 0; i < m->n_points; i++) {
         l->depth[i] = bt_min(deepest, bt_max(0, -m->p[i].gap));
         for (int j = 0; own && j < own->n_points; j++)
@@ -106,7 +106,7 @@ void bt_crush_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, c
     const double h = thickness_of(s, m->a, m->b), dt = w->par.dt;
     const bt_memory names = bt_law_names(w, p, BT_LAW_CRUSHING);
     // then its edges bear no more than this, and give way as they do when they raft
-    const bool rafts = l->trace[BT_LAW_RAFTING] >= 0;
+    const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
     if (!rafts) inherit(t, &names, m, l);
     double gap = INFINITY, approach = 0;
     for (int i = 0; i < m->n_points; i++) {
@@ -149,11 +149,11 @@ double bt_crush_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
     const bt_limit *l = &t->laws.limits[j];
     double deepest = 0;
     for (int i = 0; i < u->n; i++) deepest = bt_max(deepest, l->depth[i]);
-    if (deepest == 0 || l->trace[BT_LAW_RAFTING] >= 0) return 0;
+    if (deepest == 0 || l->record[BT_LAW_RAFTING] >= 0) return 0;
     const bt_pair *p = &t->search.pairs[t->gaps[j].pair];
     bt_memory r = bt_law_names(w, p, BT_LAW_CRUSHING);
     r.n_points = u->n;
     for (int i = 0; i < u->n; i++) r.feature[i] = p->feature[i], r.value[i] = l->depth[i];
-    bt_law_put(t, l->trace[BT_LAW_CRUSHING], &r);
+    bt_law_put(t, l->record[BT_LAW_CRUSHING], &r);
     return deepest;
 }

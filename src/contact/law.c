@@ -85,7 +85,7 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     bt_limit *l = &t->laws.limits[j];
     *l = (bt_limit){
         .flat = {INFINITY, INFINITY}, .most = {INFINITY, INFINITY}, .cap = {INFINITY, INFINITY}};
-    for (int law = 0; law < BT_ALL_LAWS; law++) l->trace[law] = -1;
+    for (int law = 0; law < BT_ALL_LAWS; law++) l->record[law] = -1;
     // The last first: what has rafted is not measured from what was crushed before.
     for (int law = BT_ALL_LAWS - 1; m->n_points > 0 && law >= BT_LAWS; law--)
         if (bt_law_on(&w->par, law) && bt_added_applies(w, law, m->a, m->b)) bt_added_bound(w, law, t, j, p);
@@ -109,7 +109,7 @@ double bt_laws_overlap(const bt_cell *t)
 // --- growth ----------------------------------------------------------------------------------------------------------
 
 /// Where each number of a step comes from.
-static void tell(bt_step_stats *st, const bt_totals *t, const double most[BT_LAWS])
+static void into_stats(bt_step_stats *st, const bt_totals *t, const double most[BT_LAWS])
 {
     st->crushed_work = bt_sum_value(&t->sum[BT_CRUSHED_WORK]);
     st->n_crushing = (int64_t)bt_sum_value(&t->sum[BT_CRUSHING_POINTS]);
@@ -120,7 +120,7 @@ static void tell(bt_step_stats *st, const bt_totals *t, const double most[BT_LAW
     st->rafted_energy = bt_sum_value(&t->sum[BT_RAFTED_ENERGY]);
     st->crushed_depth = most[BT_LAW_CRUSHING];
     st->rafted_largest = most[BT_LAW_RAFTING];
-    bt_added_tell(st, t);
+    bt_added_stats(st, t);
 }
 
 /// The law at whose bound point i is; the rigid one where it is at none.
@@ -191,5 +191,5 @@ void bt_laws_grow(bt_world *w)
         bt_domain_reduce(w, &t);
         bt_domain_maxima(w, most, BT_LAWS);
     }
-    tell(&w->stats, &t, most);
+    into_stats(&w->stats, &t, most);
 }

@@ -51,7 +51,7 @@ typedef struct bt_limit {
     double depth[2]; ///< crushed so far, m (contact/crush.h)
     double grown[2]; ///< by how much the bodies go into each other in this step, m
     int32_t by[2];   ///< the law that set cap
-    int32_t trace[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
+    int32_t record[BT_ALL_LAWS]; ///< record of each law in the cell, −1 = none
 } bt_limit;
 
 /// Mean floe sizes by which two bodies may have parted and still remember each other; cells always reach that far.

@@ -119,7 +119,7 @@ void bt_raft_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
     bt_limit *l = &t->laws.limits[j];
     const bt_memory names = bt_law_names(w, p, BT_LAW_RAFTING);
     const bt_idx at = bt_law_find(t, &names);
-    l->trace[BT_LAW_RAFTING] = (int32_t)at;
+    l->record[BT_LAW_RAFTING] = (int32_t)at;
     if (m->n_points == 0) {
         bound_sheets(w, t, j, &t->laws.memory[at]);
         return;
@@ -149,7 +149,7 @@ double bt_raft_remember(bt_world *w, bt_cell *t, bt_idx j, bt_totals *totals)
 {
     const bt_contact *u = &t->contacts[j];
     const bt_limit *l = &t->laws.limits[j];
-    const bt_idx at = l->trace[BT_LAW_RAFTING];
+    const bt_idx at = l->record[BT_LAW_RAFTING];
     if (u->n == 0) {
         t->laws.memory[at].value[2] = u->ln[0];
         t->laws.memory[at].value[3] = u->lt;

@@ -34,7 +34,7 @@ typedef struct bt_packing {
 /// lead, no way-points.
 bt_packing bt_packing_of(const bt_case *c, double concentration);
 
-/// Tell of a run (or window) that ends at `end`, s, after the wall has come into it.
+/// Warn of a run (or window) that ends at `end`, s, after the wall has come into it.
 void bt_packing_warn(const bt_packing *p, double end, bt_errors *warnings);
 
 #endif

@@ -67,27 +67,27 @@ void bt_field_scale(bt_field *f, bt_idx i, double s)
     f->area[i] *= s * s;
 }
 
-// Area with every floe scaled by min(room, √λ).
-static double area_at(const bt_field *f, const double *room, double lambda)
+// Area with every floe scaled by min(clearance, √λ).
+static double area_at(const bt_field *f, const double *clearance, double lambda)
 {
     double sum = 0;
-    for (bt_idx i = 0; i < f->n; i++) sum += f->area[i] * bt_min(room[i] * room[i], lambda);
+    for (bt_idx i = 0; i < f->n; i++) sum += f->area[i] * bt_min(clearance[i] * clearance[i], lambda);
     return sum;
 }
 
-double bt_field_fit(bt_field *f, const double *room, double wanted)
+double bt_field_fit(bt_field *f, const double *clearance, double wanted)
 {
     double low = 0, high = 1;
-    for (bt_idx i = 0; i < f->n; i++) high = bt_max(high, room[i] * room[i]);
+    for (bt_idx i = 0; i < f->n; i++) high = bt_max(high, clearance[i] * clearance[i]);
     // area_at grows with λ: bisect. 200 halvings end at neighbouring doubles.
     for (int k = 0; k < 200 && low < high; k++) {
         double mid = low + (high - low) / 2;
         if (mid == low || mid == high) break;
-        *(area_at(f, room, mid) < wanted ? &low : &high) = mid;
+        *(area_at(f, clearance, mid) < wanted ? &low : &high) = mid;
     }
     double sum = 0;
     for (bt_idx i = 0; i < f->n; i++) {
-        double s = bt_min(room[i], sqrt(high));
+        double s = bt_min(clearance[i], sqrt(high));
         if (s != 1) bt_field_scale(f, i, s);
         sum += f->area[i];
     }

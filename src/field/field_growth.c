@@ -126,35 +126,35 @@ void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *o
     free(all);
 }
 
-typedef struct room_search {
+typedef struct clearance_search {
     const bt_field *f;
     const double *outline, *radius;
-    double limit, *room;
-} room_search;
+    double limit, *clearance;
+} clearance_search;
 
 static void room_of_pair(void *context, bt_idx i, bt_idx j, double dx, double dy)
 {
-    room_search *s = context;
+    clearance_search *s = context;
     double reach = s->limit * (s->radius[i] + s->radius[j]);
     if (dx * dx + dy * dy >= reach * reach) return;
     const int64_t *o = s->f->offsets;
     bt_apart a = bt_apart_of((int)(o[i + 1] - o[i]), s->outline + 2 * o[i], (int)(o[j + 1] - o[j]),
                              s->outline + 2 * o[j], dx, dy);
-    s->room[i] = bt_min(s->room[i], a.both);
-    s->room[j] = bt_min(s->room[j], a.both);
+    s->clearance[i] = bt_min(s->clearance[i], a.both);
+    s->clearance[j] = bt_min(s->clearance[j], a.both);
 }
 
-static double room_within(const bt_region *y, double x, double z, int n, const double *v, double room)
+static double clearance_within(const bt_region *y, double x, double z, int n, const double *v, double clearance)
 {
     for (int k = 0; k < n; k++) {
         double px = v[2 * k], pz = v[2 * k + 1];
-        if (!y->periodic_x && px != 0) room = bt_min(room, ((px > 0 ? y->x1 : y->x0) - x) / px);
-        if (!y->periodic_y && pz != 0) room = bt_min(room, ((pz > 0 ? y->y1 : y->y0) - z) / pz);
+        if (!y->periodic_x && px != 0) clearance = bt_min(clearance, ((px > 0 ? y->x1 : y->x0) - x) / px);
+        if (!y->periodic_y && pz != 0) clearance = bt_min(clearance, ((pz > 0 ? y->y1 : y->y0) - z) / pz);
     }
-    return room;
+    return clearance;
 }
 
-void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room)
+void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *clearance)
 {
     double *outline = bt_field_outlines(f), *radius = bt_alloc((size_t)f->n, sizeof *radius);
     for (bt_idx i = 0; i < f->n; i++) {
@@ -162,17 +162,17 @@ void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double
         int n = (int)(f->offsets[i + 1] - f->offsets[i]);
         for (int k = 0; k < n; k++) radius[i] = bt_max(radius[i], bt_hypot(v[2 * k], v[2 * k + 1]));
         double x = f->pose[3 * i], z = f->pose[3 * i + 1];
-        room[i] = room_within(y, x, z, n, v, limit);
+        clearance[i] = clearance_within(y, x, z, n, v, limit);
         for (int o = 0; o < y->n_obstacles; o++) {
             const bt_obstacle *b = &y->obstacles[o];
             double dx = b->x - x, dy = b->y - z, reach = limit * radius[i] + b->radius;
             if (dx * dx + dy * dy >= reach * reach) continue;
             double rel[2 * BT_MAX_VERTICES];
             for (int k = 0; k < b->n; k++) rel[2 * k] = b->v[2 * k] - b->x, rel[2 * k + 1] = b->v[2 * k + 1] - b->y;
-            room[i] = bt_min(room[i], bt_apart_of(n, v, b->n, rel, dx, dy).first);
+            clearance[i] = bt_min(clearance[i], bt_apart_of(n, v, b->n, rel, dx, dy).first);
         }
     }
-    room_search s = {f, outline, radius, limit, room};
+    clearance_search s = {f, outline, radius, limit, clearance};
     bt_field_visit_pairs(y, f, outline, limit, room_of_pair, &s);
     free(outline);
     free(radius);

@@ -262,8 +262,8 @@ bt_status bt_field_read(bt_field *f, const char *path, bt_errors *err)
 bt_status bt_field_read_as(bt_field *f, const char *path, bt_nonconvex nonconvex, bt_errors *err)
 {
     bool bare;
-    const bt_status sealed = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
-    if (sealed != BT_OK) return sealed;
+    const bt_status checked = bt_checksum_check(path, BT_CHECKSUM_FIELD, &bare, err);
+    if (checked != BT_OK) return checked;
     H5Eset_auto2(H5E_DEFAULT, NULL, NULL); // one message, ours
     if (H5Fis_hdf5(path) <= 0) {
         bt_errors_add(err, "%s: is not an HDF5 file; make an ice field with `bergtow field CASE.yml -o FILE.h5`", path);

@@ -17,7 +17,7 @@
 #include "base/rng.h"
 
 static const double CLEARANCE = 2e-3; // water kept around obstacles / mean size
-static const double TOUCH = 1 - 1e-9; // part of the room that is used: round-off must not turn touching into overlap
+static const double TOUCH = 1 - 1e-9; // part of the clearance used: rounding must not turn touching into overlap
 static const double STRIDE = 0.3;     // move of a floe in a step of the shake / mean gap
 static const double PUSH = 1.02;      // growth of a floe that has no room
 static const double GROWN = 1e-3;     // shortfall of area at which a growing floe counts as grown
@@ -111,7 +111,7 @@ static bt_tessellation make_cells(const bt_case *c, const bt_region *y, bt_idx n
 static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt_tessellation *cells, double wanted,
                                   bt_field *f, bt_errors *err)
 {
-    double *room = bt_alloc((size_t)cells->n, sizeof *room);
+    double *clearance = bt_alloc((size_t)cells->n, sizeof *clearance);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
         bt_idx k = f->n;
@@ -119,10 +119,10 @@ static bt_status floes_from_cells(const bt_case *c, const bt_region *y, const bt
         bt_region_wrap(y, &f->pose[3 * k], &f->pose[3 * k + 1]);
         double s = sqrt(cells->target[i] / f->area[k]);
         bt_field_scale(f, k, s);
-        room[k] = (1 - 1e-6) / s;
+        clearance[k] = (1 - 1e-6) / s;
     }
-    double reached = bt_field_fit(f, room, wanted);
-    free(room);
+    double reached = bt_field_fit(f, clearance, wanted);
+    free(clearance);
     return reached > (1 - 1e-6) * wanted ? BT_OK : cannot_pack(c, reached / y->ice_area, err);
 }
 
@@ -153,7 +153,7 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
     double sum = 0, v[2 * 32];
     for (bt_idx i = 0; i < cells->n; i++)
         if (cells->nv[i] >= 3) sum += cells->target[i];
-    double *goal = bt_alloc((size_t)cells->n, sizeof *goal), *room = bt_alloc((size_t)cells->n, sizeof *room);
+    double *goal = bt_alloc((size_t)cells->n, sizeof *goal), *clearance = bt_alloc((size_t)cells->n, sizeof *clearance);
     for (bt_idx i = 0; i < cells->n; i++) {
         if (cells->nv[i] < 3) continue;
         bt_moments m = bt_shape_moments(cells->nv[i], cells->v[i]);
@@ -171,10 +171,10 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
     double best_area = 0, best_least = 0;
     int idle = 0;
     for (int stage = 1; status == BT_OK; stage++) {
-        bt_field_growth(y, f, 2, room);
+        bt_field_growth(y, f, 2, clearance);
         double least = 1; // part of its goal that the smallest floe has
         for (bt_idx i = 0; i < f->n; i++) {
-            if (room[i] < 1) bt_field_scale(f, i, TOUCH * room[i]);
+            if (clearance[i] < 1) bt_field_scale(f, i, TOUCH * clearance[i]);
             least = bt_min(least, f->area[i] / goal[i]);
         }
         double area = total_area(f);
@@ -191,31 +191,31 @@ static bt_status polygons_in_cells(const bt_case *c, const bt_region *y, const b
         for (bt_idx i = 0; i < f->n; i++) {
             // A floe without room still grows a little: the shake's position projection pushes its neighbours away, so
             // that grown floes do not trap it.
-            bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (room[i] - 1))));
+            bt_field_scale(f, i, bt_min(sqrt(goal[i] / f->area[i]), bt_max(PUSH, 1 + 0.8 * (clearance[i] - 1))));
         }
         status = bt_field_shake(c, y, f, 2.5 * gap, bt_min(STRIDE * gap, MOST * size), stage, err);
     }
     free(goal);
-    free(room);
+    free(clearance);
     return status;
 }
 
 // Take out what overlap the shake has left, and bring the area back to what was asked.
 static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, double wanted, bt_errors *err)
 {
-    double *room = bt_alloc((size_t)f->n, sizeof *room);
-    bt_field_growth(y, f, 1.2, room);
+    double *clearance = bt_alloc((size_t)f->n, sizeof *clearance);
+    bt_field_growth(y, f, 1.2, clearance);
     bt_status status = BT_OK;
     for (bt_idx i = 0; i < f->n && status == BT_OK; i++) {
-        room[i] *= TOUCH;
-        if (room[i] > 0.9) continue;
+        clearance[i] *= TOUCH;
+        if (clearance[i] > 0.9) continue;
         bt_errors_add(
             err, "%s: ice field: floe %lld is stuck in another after the shake; change ice.seed, or lower ice.shake",
             path_of(c), (long long)i);
         status = BT_ERR_NUMERIC;
     }
     if (status == BT_OK) {
-        double reached = bt_field_fit(f, room, wanted);
+        double reached = bt_field_fit(f, clearance, wanted);
         if (reached < 0.995 * wanted) {
             bt_errors_add(
                 err, "%s: ice field: concentration %g after the shake, %g wanted; change ice.seed, or lower ice.shake",
@@ -223,7 +223,7 @@ static bt_status settle(const bt_case *c, const bt_region *y, bt_field *f, doubl
             status = BT_ERR_NUMERIC;
         }
     }
-    free(room);
+    free(clearance);
     return status;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the parts of the field generator share: the yard (where ice may lie), sizes, cells, room to grow.
+// What the parts of the field generator share: the placement region, sizes, cells, clearance.
 #ifndef BT_FIELD_MAKE_H
 #define BT_FIELD_MAKE_H
 
@@ -77,14 +77,15 @@ typedef void bt_pair_visit(void *context, bt_idx i, bt_idx j, double dx, double 
 void bt_field_visit_pairs(const bt_region *y, const bt_field *f, const double *outline, double limit,
                           bt_pair_visit *visit, void *context);
 
-/// room[i] <= limit: every floe i may be scaled about its centroid by any factor up to room[i], all at the same time,
-/// without touching another floe, an obstacle or an edge of the region. room[i] < 1: floe i overlaps something.
-void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *room);
+/// clearance[i] <= limit: every floe i may be scaled about its centroid by any factor up to clearance[i], all at the
+/// same time, without touching another floe, an obstacle or an edge of the region. clearance[i] < 1: floe i overlaps
+/// something.
+void bt_field_growth(const bt_region *y, const bt_field *f, double limit, double *clearance);
 
 /// Scale floe i about its centroid.
 void bt_field_scale(bt_field *f, bt_idx i, double s);
-/// Scale floes by common factors λ <= room so that Σ area = wanted; returns the area reached.
-double bt_field_fit(bt_field *f, const double *room, double wanted);
+/// Scale floes by common factors λ <= clearance so that Σ area = wanted; returns the area reached.
+double bt_field_fit(bt_field *f, const double *clearance, double wanted);
 /// Sort floes along a Morton curve.
 void bt_field_sort(bt_field *f, const bt_region *y);
 

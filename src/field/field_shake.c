@@ -71,28 +71,20 @@ static int ascending(const void *a, const void *b)
     return (*p > *q) - (*p < *q);
 }
 
-bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
-                         bt_errors *err)
+static double median_area(const bt_field *f)
 {
-    if (f->n < 1 || !(length > 0) || !(stride > 0)) return BT_OK;
-    double size = 0, largest = 0;
-    for (bt_idx i = 0; i < f->n; i++) {
-        double d = 2 * sqrt(f->area[i] / BT_PI);
-        size += d / f->n;
-        largest = bt_max(largest, d);
-    }
     double *sorted = bt_alloc((size_t)f->n, sizeof *sorted);
     memcpy(sorted, f->area, (size_t)f->n * sizeof *sorted);
     qsort(sorted, (size_t)f->n, sizeof *sorted, ascending);
-    double median = sorted[f->n / 2], steps = ceil(length / stride);
+    const double median = sorted[f->n / 2];
     free(sorted);
-    bt_params par = {
-        .dt = length / steps, .x0 = y->x0, .y0 = y->y0,
-        .period_x = y->periodic_x ? y->x1 - y->x0 : 0, .period_y = y->periodic_y ? y->y1 - y->y0 : 0,
-        .tolerance = 5e-2, .max_sweeps = 6, .plain_sweeps = true, .slop = 2e-5 * size, .position_sweeps = FLIGHT_SWEEPS,
-        .rest_speed = 0, .size = size,
-    };
-    bt_world *w = bt_world_create(&par);
+    return median;
+}
+
+/// The floes as bodies of mass = area, each with a random heading and as much energy as any other. size: their mean.
+static void add_floes(bt_world *w, const bt_case *c, const bt_field *f, double size, int64_t stage)
+{
+    const double median = median_area(f);
     for (bt_idx i = 0; i < f->n; i++) {
         int nv = (int)(f->offsets[i + 1] - f->offsets[i]);
         const double *v = f->vertices + 2 * f->offsets[i];
@@ -116,40 +108,44 @@ bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, doub
                             .restitution = 1,
                         });
     }
-    add_surroundings(w, y, bt_max(4 * largest, size));
+}
 
-    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a
-    // busy machine. The result does not depend on their number.
-    const int threads = omp_get_max_threads();
-    if (f->n < FEW) omp_set_num_threads(1);
+static void fly(bt_world *w, bt_idx n_floes, int64_t steps)
+{
     double energy = 0;
-    for (int64_t k = 0; k < (int64_t)steps; k++) {
+    for (int64_t k = 0; k < steps; k++) {
         bt_world_step(w);
         // Collisions solved to a tolerance gain a little energy: taken out, so that strides stay as asked.
         if (k == 0) energy = w->stats.kinetic_energy;
         if (w->stats.kinetic_energy > 1.1 * energy) {
             double s = sqrt(energy / w->stats.kinetic_energy);
-            for (bt_idx i = 0; i < f->n; i++) {
+            for (bt_idx i = 0; i < n_floes; i++) {
                 bt_vel *v = &w->bodies.vel[bt_world_index(w, i)];
                 v->x *= s, v->y *= s, v->w *= s;
             }
         }
     }
-    // Contacts are linear in the turn of a step: a floe that turns by θ may end θ²/2 radii inside another. At rest the
-    // position projection alone acts, and takes that out.
+}
+
+/// Contacts are linear in the turn of a step: a floe that turns by θ may end θ²/2 radii inside another. At rest the
+/// position projection alone acts, and takes that out.
+static void settle(bt_world *w, bt_idx n_floes)
+{
     w->par.position_sweeps = REST_SWEEPS;
     for (int k = 0; k < REST_STEPS; k++) {
-        for (bt_idx i = 0; i < f->n; i++) {
+        for (bt_idx i = 0; i < n_floes; i++) {
             const bt_idx at = bt_world_index(w, i);
             w->bodies.vel[at] = (bt_vel){0};
             // stopped by hand: its last move may have left an overlap that nothing at rest would be looked at for
             w->bodies.disturbed[at] = 1;
         }
         bt_world_step(w);
-        if (w->stats.overlap <= 3 * par.slop) break;
+        if (w->stats.overlap <= 3 * w->par.slop) break;
     }
-    omp_set_num_threads(threads);
-    bt_status status = BT_OK;
+}
+
+static bt_status take_poses(const bt_world *w, const bt_case *c, const bt_region *y, bt_field *f, bt_errors *err)
+{
     for (bt_idx i = 0; i < f->n; i++) {
         const bt_pose *p = &w->bodies.pose[bt_world_index(w, i)];
         if (!isfinite(p->x) || !isfinite(p->y) || !isfinite(p->yaw)) {
@@ -158,14 +154,45 @@ bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, doub
                 "%s: ice field: floe %lld left the numbers while the field was shaken; report this case with its seed, "
                 "and use ice.shake: 0 meanwhile",
                 c->path ? c->path : "case", (long long)i);
-            status = BT_ERR_NUMERIC;
-            break;
+            return BT_ERR_NUMERIC;
         }
         f->pose[3 * i] = p->x;
         f->pose[3 * i + 1] = p->y;
         f->pose[3 * i + 2] = remainder(p->yaw, 2 * BT_PI);
         bt_region_wrap(y, &f->pose[3 * i], &f->pose[3 * i + 1]);
     }
+    return BT_OK;
+}
+
+bt_status bt_field_shake(const bt_case *c, const bt_region *y, bt_field *f, double length, double stride, int64_t stage,
+                         bt_errors *err)
+{
+    if (f->n < 1 || !(length > 0) || !(stride > 0)) return BT_OK;
+    double size = 0, largest = 0;
+    for (bt_idx i = 0; i < f->n; i++) {
+        double d = 2 * sqrt(f->area[i] / BT_PI);
+        size += d / f->n;
+        largest = bt_max(largest, d);
+    }
+    const double steps = ceil(length / stride);
+    bt_params par = {
+        .dt = length / steps, .x0 = y->x0, .y0 = y->y0,
+        .period_x = y->periodic_x ? y->x1 - y->x0 : 0, .period_y = y->periodic_y ? y->y1 - y->y0 : 0,
+        .tolerance = 5e-2, .max_sweeps = 6, .plain_sweeps = true, .slop = 2e-5 * size, .position_sweeps = FLIGHT_SWEEPS,
+        .rest_speed = 0, .size = size,
+    };
+    bt_world *w = bt_world_create(&par);
+    add_floes(w, c, f, size, stage);
+    add_surroundings(w, y, bt_max(4 * largest, size));
+
+    // Threads that meet at every colour of every sweep cost more than they bring for few floes, and very much more on a
+    // busy machine. The result does not depend on their number.
+    const int threads = omp_get_max_threads();
+    if (f->n < FEW) omp_set_num_threads(1);
+    fly(w, f->n, (int64_t)steps);
+    settle(w, f->n);
+    omp_set_num_threads(threads);
+    const bt_status status = take_poses(w, c, y, f, err);
     bt_world_free(w);
     return status;
 }

@@ -64,7 +64,7 @@ static void images(double x, double reach, double period, int *first, int *last)
 /// Does the convex polygon v, about its centroid at (x, y), overlap the strip?
 static bool overlaps(const strip *s, int n, const double *v, double radius, double x, double y)
 {
-    const double touch = 1e-9 * s->l->width;
+    const double slack = 1e-9 * s->l->width;
     for (int k = 0; k < s->n; k++) {
         const part *p = &s->parts[k];
         const double dx = p->x - x, dy = p->y - y, reach = p->radius + radius;
@@ -74,7 +74,7 @@ static bool overlaps(const strip *s, int n, const double *v, double radius, doub
         for (int i = i0; i <= i1; i++)
             for (int j = j0; j <= j1; j++) {
                 const double ox = dx - i * s->l->period_x, oy = dy - j * s->l->period_y;
-                if (bt_hypot(ox, oy) < reach && bt_apart_of(n, v, p->n, p->v, ox, oy).gap < -touch) return true;
+                if (bt_hypot(ox, oy) < reach && bt_apart_of(n, v, p->n, p->v, ox, oy).gap < -slack) return true;
             }
     }
     return false;

@@ -35,7 +35,7 @@ static const double SHORT_EDGE = 0.07; // shortest edge kept / diameter of equal
 static const double SLIVER = 0.16;     // least inradius / radius of equal area
 
 typedef struct diagram {
-    const bt_region *yard;
+    const bt_region *region;
     bt_idx n;
     double *p;        // [n][2] seeds
     double *w;        // [n] weights, m²
@@ -65,7 +65,7 @@ void bt_tessellation_free(bt_tessellation *c)
 
 static bt_idx bin_of(const diagram *g, double x, double y)
 {
-    int ix = (int)((x - g->yard->x0) / g->bx), iy = (int)((y - g->yard->y0) / g->by);
+    int ix = (int)((x - g->region->x0) / g->bx), iy = (int)((y - g->region->y0) / g->by);
     ix = ix < 0 ? 0 : ix >= g->nx ? g->nx - 1 : ix;
     iy = iy < 0 ? 0 : iy >= g->ny ? g->ny - 1 : iy;
     return iy * g->nx + ix;
@@ -125,7 +125,7 @@ static int cut_by_bin(const diagram *g, bt_idx i, int n, double *v, double *r, b
 // The cell of seed i relative to its seed; returns its number of vertices.
 static int power_cell(const diagram *g, bt_idx i, double *v)
 {
-    const bt_region *y = g->yard;
+    const bt_region *y = g->region;
     double px = g->p[2 * i], py = g->p[2 * i + 1], lx = y->x1 - y->x0, ly = y->y1 - y->y0;
     double x0 = y->periodic_x ? -lx / 2 : y->x0 - px, x1 = y->periodic_x ? lx / 2 : y->x1 - px;
     double y0 = y->periodic_y ? -ly / 2 : y->y0 - py, y1 = y->periodic_y ? ly / 2 : y->y1 - py;
@@ -164,7 +164,7 @@ static int ice_cell(const diagram *g, bt_idx i, double *v)
         v[2 * k] += g->p[2 * i];
         v[2 * k + 1] += g->p[2 * i + 1];
     }
-    return n >= 3 ? bt_tessellation_clear(g->yard, n, v, false) : 0;
+    return n >= 3 ? bt_tessellation_clear(g->region, n, v, false) : 0;
 }
 
 // ---- seeds ----
@@ -180,18 +180,18 @@ typedef struct discs {
 
 // Walk over the bins of the square of half side r about (x, y); (sx, sy) is the period's shift of the bin.
 typedef struct bin_walk {
-    const bt_region *yard;
+    const bt_region *region;
     const discs *dd;
     int ix0, ix1, iy1, ix, iy;
     size_t bin;
     double sx, sy;
 } bin_walk;
 
-static bin_walk walk_bins(const bt_region *yard, const discs *dd, double x, double y, double r)
+static bin_walk walk_bins(const bt_region *region, const discs *dd, double x, double y, double r)
 {
-    bin_walk w = {.yard = yard, .dd = dd};
-    w.ix0 = (int)floor((x - r - yard->x0) / dd->bx), w.ix1 = (int)floor((x + r - yard->x0) / dd->bx);
-    w.iy = (int)floor((y - r - yard->y0) / dd->by), w.iy1 = (int)floor((y + r - yard->y0) / dd->by);
+    bin_walk w = {.region = region, .dd = dd};
+    w.ix0 = (int)floor((x - r - region->x0) / dd->bx), w.ix1 = (int)floor((x + r - region->x0) / dd->bx);
+    w.iy = (int)floor((y - r - region->y0) / dd->by), w.iy1 = (int)floor((y + r - region->y0) / dd->by);
     w.ix = w.ix0 - 1;
     return w;
 }
@@ -206,23 +206,23 @@ static bool next_bin(bin_walk *w)
         if (w->iy > w->iy1) return false;
         // turns round the period
         int tx = (int)floor((double)w->ix / w->dd->nx), ty = (int)floor((double)w->iy / w->dd->ny);
-        if ((tx && !w->yard->periodic_x) || (ty && !w->yard->periodic_y)) continue;
+        if ((tx && !w->region->periodic_x) || (ty && !w->region->periodic_y)) continue;
         w->bin = (size_t)(w->iy - ty * w->dd->ny) * (size_t)w->dd->nx + (size_t)(w->ix - tx * w->dd->nx);
-        w->sx = tx * (w->yard->x1 - w->yard->x0);
-        w->sy = ty * (w->yard->y1 - w->yard->y0);
+        w->sx = tx * (w->region->x1 - w->region->x0);
+        w->sy = ty * (w->region->y1 - w->region->y0);
         return true;
     }
 }
 
 // How deep, relative to their size, a disc at (x, y) lies in others, in walls and in obstacles; <= 0: free.
-static double crowding(const bt_region *yard, const discs *dd, const double *p, const double *radius, double x,
+static double crowding(const bt_region *region, const discs *dd, const double *p, const double *radius, double x,
                        double y, double r)
 {
     double worst = -1;
-    if (!yard->periodic_x) worst = bt_max(worst, 1 - bt_min(x - yard->x0, yard->x1 - x) / (SPACING * r));
-    if (!yard->periodic_y) worst = bt_max(worst, 1 - bt_min(y - yard->y0, yard->y1 - y) / (SPACING * r));
-    for (int k = 0; k < yard->n_obstacles; k++) {
-        const bt_obstacle *o = &yard->obstacles[k];
+    if (!region->periodic_x) worst = bt_max(worst, 1 - bt_min(x - region->x0, region->x1 - x) / (SPACING * r));
+    if (!region->periodic_y) worst = bt_max(worst, 1 - bt_min(y - region->y0, region->y1 - y) / (SPACING * r));
+    for (int k = 0; k < region->n_obstacles; k++) {
+        const bt_obstacle *o = &region->obstacles[k];
         if (bt_hypot(x - o->x, y - o->y) > o->radius + r) continue;
         double out = -INFINITY; // distance to the obstacle, from below
         for (int e = 0; e < o->n; e++) {
@@ -232,7 +232,7 @@ static double crowding(const bt_region *yard, const discs *dd, const double *p, 
         }
         worst = bt_max(worst, 1 - out / (SPACING * r));
     }
-    for (bin_walk w = walk_bins(yard, dd, x, y, SPACING * r); next_bin(&w);)
+    for (bin_walk w = walk_bins(region, dd, x, y, SPACING * r); next_bin(&w);)
         for (int32_t k = dd->head[w.bin]; k >= 0; k = dd->node[k].next) {
             bt_idx j = dd->node[k].i;
             double d = bt_hypot(p[2 * j] + w.sx - x, p[2 * j + 1] + w.sy - y);
@@ -308,7 +308,7 @@ bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const d
         radius[i] = sqrt(target[i] * share / BT_PI);
     }
 
-    diagram g = {.yard = y, .n = n};
+    diagram g = {.region = y, .n = n};
     g.p = bt_alloc(2 * (size_t)n, sizeof *g.p);
     g.w = bt_alloc((size_t)n, sizeof *g.w);
     place_seeds(y, n, radius, seed, g.p);

@@ -13,7 +13,7 @@ typedef struct bt_leg {
     double way;      ///< length of path before it, m
     double length;   ///< m; the last is endless
     double x, y;     ///< where it starts, m
-    double tx, ty;   ///< contact tangent there
+    double tx, ty;   ///< unit tangent there
     double turn;     ///< curvature, 1/m, positive from +x towards +y; 0 = straight
 } bt_leg;
 
@@ -28,7 +28,7 @@ typedef struct bt_path {
 /// points coincide, a rounded corner has no room on its legs, or turns back on itself.
 bool bt_path_make(bt_path *p, double x, double y, int n, const double *points, double radius, char why[200]);
 
-/// Position and contact tangent after `way` m of it (before the start: on the straight line backwards).
+/// Position and unit tangent after `way` m of it (before the start: on the straight line backwards).
 void bt_path_at(const bt_path *p, double way, double at[2], double tangent[2]);
 
 /// Way of the point of the path near to (x, y), sought from `way` on, forwards and backwards, by going along the

@@ -11,13 +11,13 @@
 #include "space/phases.h"
 #include "base/elementary.h"
 
-enum { TOUCH_WIDTH = sizeof(bt_body_contact) / sizeof(double) };
-_Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a touch is a row of doubles");
+enum { CONTACT_WIDTH = sizeof(bt_body_contact) / sizeof(double) };
+_Static_assert(sizeof(bt_body_contact) % sizeof(double) == 0, "a contact is a row of doubles");
 
 typedef struct {
     bt_body_contact *row;
     int64_t n, cap;
-} touches;
+} contact_rows;
 
 /// Interior angle of body i at its vertex v, rad; NaN when there is no such vertex.
 static double interior_angle(const bt_bodies *b, bt_idx i, uint32_t v)
@@ -47,7 +47,7 @@ static bt_inv bare(const bt_bodies *b, bt_idx i)
     return b->inv[i].m > 0 ? (bt_inv){1 / b->mass[i], 1 / b->inertia[i]} : (bt_inv){0};
 }
 
-static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
+static bt_body_contact row_of(const bt_world *w, const bt_impacts *m, const bt_cell *cell, const bt_contact *u,
                                 bt_idx towed)
 {
     const bt_bodies *b = &w->bodies;
@@ -97,7 +97,7 @@ static bt_body_contact touch_of(const bt_world *w, const bt_impacts *m, const bt
     return t;
 }
 
-static void add(touches *t, const bt_body_contact *row)
+static void add(contact_rows *t, const bt_body_contact *row)
 {
     if (t->n == t->cap) t->row = bt_realloc(t->row, (size_t)(t->cap = t->cap ? 2 * t->cap : 64), sizeof *t->row);
     t->row[t->n++] = *row;
@@ -119,17 +119,17 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     // A large movable body has its contacts in the last cell, which comes last of all; one of infinite mass has them in
     // the cells of the floes.
     const bt_idx from = w->bodies.large[towed] && w->bodies.motion[towed] == BT_DYNAMIC ? ts->start[BT_COLOURS] : 0;
-    touches all = {0};
+    contact_rows all = {0};
 #pragma omp parallel if (BT_MANY(ts->n_order - from, BT_FEW_CELLS))
     {
-        touches mine = {0};
+        contact_rows mine = {0};
 #pragma omp for schedule(dynamic, 16)
         for (bt_idx i = from; i < ts->n_order; i++) {
             const bt_cell *cell = &ts->cell[ts->order[i]];
             for (bt_idx j = 0; j < cell->n_contacts; j++) {
                 const bt_contact *u = &cell->contacts[j];
                 if ((u->a != towed && u->b != towed) || u->ln[0] + u->ln[1] == 0) continue;
-                const bt_body_contact t = touch_of(w, m, cell, u, towed);
+                const bt_body_contact t = row_of(w, m, cell, u, towed);
                 add(&mine, &t);
             }
         }
@@ -140,8 +140,8 @@ bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m
     bt_body_contact *rows = all.row;
     *n = all.n;
     if (w->domain) {
-        rows = (bt_body_contact *)(void *)bt_domain_gather(w, all.n, TOUCH_WIDTH, (const double *)(const void *)all.row,
-                                                           n);
+        const double *mine = (const double *)(const void *)all.row;
+        rows = (bt_body_contact *)(void *)bt_domain_gather(w, all.n, CONTACT_WIDTH, mine, n);
         free(all.row);
     }
     if (*n > 0) qsort(rows, (size_t)*n, sizeof *rows, by_gid);

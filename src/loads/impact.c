@@ -38,7 +38,7 @@ void bt_impacts_free(bt_impacts *m)
 {
     if (!m) return;
     bt_panels_free(&m->panels);
-    free(m->touch);
+    free(m->contact);
     free(m->closed);
     free(m->open);
     free(m);
@@ -83,7 +83,7 @@ static void close_event(bt_impacts *m, const bt_impact_open *o)
     bt_impact_convert(&m->rule, e);
 }
 
-/// Touches t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that
+/// Contacts t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that
 /// may go on.
 static bool follow(const bt_impacts *m, bt_body_contact *t, int64_t n, double time, bt_impact_open *o, bool *begun)
 {
@@ -97,7 +97,7 @@ static bool follow(const bt_impacts *m, bt_body_contact *t, int64_t n, double ti
     }
     const bool goes_on = *begun && sum > 0 && approach <= TURNED * o->rest + m->tolerance;
     if (!goes_on && !(sum > 0 && approach >= m->rule.least_speed)) {
-        for (int64_t i = 0; i < n; i++) t[i].collision = 0; // a push
+        for (int64_t i = 0; i < n; i++) t[i].collision = 0; // quasi-static
         return false;
     }
     if (!goes_on) *o = (bt_impact_open){.so_far = {.time = time, .gid = t[0].gid, .approach = approach}};
@@ -113,21 +113,21 @@ static bool follow(const bt_impacts *m, bt_body_contact *t, int64_t n, double ti
     return rest > m->tolerance;
 }
 
-/// Merge this step's touches into the open events; both are in the order of gids.
+/// Merge this step's contacts into the open events; both are in the order of gids.
 static void follow_events(bt_impacts *m, double time)
 {
     bt_impact_open *next = NULL;
     int64_t n_next = 0, at = 0;
-    if (m->n_touch > 0) next = bt_alloc((size_t)m->n_touch, sizeof *next);
-    for (int64_t i = 0; i < m->n_touch;) {
+    if (m->n_contacts > 0) next = bt_alloc((size_t)m->n_contacts, sizeof *next);
+    for (int64_t i = 0; i < m->n_contacts;) {
         int64_t end = i + 1;
-        while (end < m->n_touch && m->touch[end].gid == m->touch[i].gid) end++;
-        while (at < m->n_open && m->open[at].so_far.gid < m->touch[i].gid) close_event(m, &m->open[at++]);
-        const bool was_open = at < m->n_open && m->open[at].so_far.gid == m->touch[i].gid;
+        while (end < m->n_contacts && m->contact[end].gid == m->contact[i].gid) end++;
+        while (at < m->n_open && m->open[at].so_far.gid < m->contact[i].gid) close_event(m, &m->open[at++]);
+        const bool was_open = at < m->n_open && m->open[at].so_far.gid == m->contact[i].gid;
         const bt_impact_open before = was_open ? m->open[at++] : (bt_impact_open){0};
         bt_impact_open o = before;
         bool there = was_open;
-        const bool stays = follow(m, m->touch + i, end - i, time, &o, &there);
+        const bool stays = follow(m, m->contact + i, end - i, time, &o, &there);
         const bool same = was_open && o.so_far.time == before.so_far.time;
         if (was_open && (!same || !stays)) {
             // Closed as it is, with this step's part if there was one; and another may have begun.
@@ -150,8 +150,8 @@ static void add_loads(bt_impacts *m, double c, double s)
 {
     double hit[2] = {0, 0};
     m->largest_push = 0;
-    for (int64_t i = 0; i < m->n_touch; i++) {
-        const bt_body_contact *t = &m->touch[i];
+    for (int64_t i = 0; i < m->n_contacts; i++) {
+        const bt_body_contact *t = &m->contact[i];
         const double fx = t->normal * t->nx - t->friction * t->ny, fy = t->normal * t->ny + t->friction * t->nx,
                      part = t->collision / t->normal;
         hit[0] += part * fx, hit[1] += part * fy;
@@ -171,8 +171,8 @@ void bt_impacts_take(bt_world *w)
     bt_impacts *m = w->impacts;
     if (!m) return;
     const bt_pose *p = &w->bodies.pose[bt_world_towed(w)];
-    free(m->touch);
-    m->touch = bt_body_contacts_collect(w, m, &m->n_touch);
+    free(m->contact);
+    m->contact = bt_body_contacts_collect(w, m, &m->n_contacts);
     m->n_closed = 0;
     follow_events(m, (double)(w->step + 1) * w->par.dt);
     bt_panels_clear(&m->panels);

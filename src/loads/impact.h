@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: MIT
-// Loads on the towed body: contact impulses of a step told apart into pushes and collisions, and collisions as forces.
+// Loads on the towed body: contact impulses of a step separated into quasi-static loads and collisions, and collisions
+// as forces.
 //
 // A step gives impulses. What they mean as forces depends on how long they act, which a rigid contact does not say [Y:
 // Yulmetov & Løset 2017, section 2.2 begins so; formulas derived here]:
 //
-//   push        a contact that has been closed before: F = λ / Δt
-//   collision   a contact whose approach the step cuts: λ_c acts for the time of a collision, T_c, not for a step
+//   quasi-static  a contact that has been closed before: F = λ / Δt
+//   collision     a contact whose approach the step cuts: λ_c acts for the time of a collision, T_c, not for a step
 //
-// Telling them apart. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ +
+// Separation. A manifold's impulse λ acts at its pressure centre, θ_i = λ_i / λ. There, with W = n·(M_a⁻¹ +
 // M_b⁻¹)·n including rotation, W_nt the coupling with the tangent, and ρ = λ_t / λ, an impulse alone changes the normal
 // velocity by λ (W + ρ W_nt). From an approach v1 < 0 at the start of the step to v2 at its end the collision takes
-//     λ_c = min(λ, (v2 − v1) / (W + ρ W_nt)),      λ − λ_c is push,      m_e = 1/W.
+//     λ_c = min(λ, (v2 − v1) / (W + ρ W_nt)),      λ − λ_c is quasi-static,      m_e = 1/W.
 // M is the mass with added mass, without the drag of the step. For one floe that hits by itself this is all of λ; a
 // floe held against the hull by wind, or by others, has v1 = 0 and λ_c = 0. Rejected: the manifold's two points each by
 // itself, λ_i against (v2 − v1)_i / W_ii; a square hit flush then shows 4/5 of its momentum, since the points share it.
-// A blow that comes through a floe already against the hull has no approach there: it is push, and as sharp as Δt makes
-// it. Approaches below a least speed count as push: a contact that has converged to the tolerance still creeps, and one
-// that slides over a corner of the hull meets a new normal every step.
+// A blow that comes through a floe already against the hull has no approach there: it is quasi-static, and as sharp as
+// Δt makes it. Approaches below a least speed count as quasi-static: a contact that has converged to the tolerance
+// still creeps, and one that slides over a corner of the hull meets a new normal every step.
 //
 // Events. The step in which a gap closes leaves the approach gap/Δt (the bias b of solver.h); the next step takes the
 // rest. So a collision goes on into the next step if the last one left a rest of approach above the solver's tolerance
@@ -83,7 +84,7 @@ typedef struct bt_impact_rule {
     double pressure;      ///< p, Pa
     bool real_corner;     ///< φ of the floe's or hull's own corner where there is one
     double corner_angle;  ///< φ otherwise, rad
-    double least_speed;   ///< slower approaches are pushes, m/s
+    double least_speed;   ///< slower approaches are quasi-static, m/s
 } bt_impact_rule;
 
 /// State of this part: on rank 0 everything; on other ranks only rule, panels' geometry and scratch.
@@ -94,15 +95,15 @@ typedef struct bt_impacts {
     double body_height;   ///< thickness of the towed body, for contacts with walls, m
     bt_panels panels;
     // the last step
-    bt_body_contact *touch;      ///< [n_touch] by gid
-    int64_t n_touch;
+    bt_body_contact *contact;    ///< [n_contacts] by gid
+    int64_t n_contacts;
     bt_impact *closed;    ///< [n_closed] collisions that ended in it, by gid
     int64_t n_closed, cap_closed;
     double collision_x, collision_y; ///< share of collisions in the contact impulse on the body, world frame, N s
     double largest_push;  ///< (λ − λ_c) / Δt of one manifold, N
     // carried on
     bt_impact_open *open; ///< [n_open] by gid
-    int64_t n_open, cap_open;
+    int64_t n_open;
 } bt_impacts;
 
 /// For the towed body of world w; NULL when the case asks for none, or there is no body.

@@ -4,7 +4,7 @@
 // The waterline is walked in the order of its vertices (from the body's own +x towards +y). Panel 0 is centred where
 // the body's x axis leaves it, so that a tow along that axis presses on panel 0 and its neighbours. A contact point
 // belongs to the panel of the nearest point of the waterline. The load of a step is impulse / Δt, whatever the contact
-// was: a push, a collision, or both. Vectors are in the body's frame.
+// was: a quasi-static load, a collision, or both. Vectors are in the body's frame.
 #ifndef BERGTOW_PANEL_H
 #define BERGTOW_PANEL_H
 

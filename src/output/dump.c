@@ -18,7 +18,7 @@
 typedef struct {
     int32_t contact; ///< in the order of the manifolds
     int side;        ///< −1: the body is a, +1: it is b
-} touch;
+} incidence;
 
 /// One contact point.
 typedef struct {
@@ -144,8 +144,83 @@ static bt_fclib_places places_of(const bt_world *w, const row *rows, int n)
 
 static int by_contact(const void *a, const void *b)
 {
-    const touch *p = a, *q = b;
+    const incidence *p = a, *q = b;
     return (p->contact > q->contact) - (p->contact < q->contact);
+}
+
+/// The contacts at each movable body: those of body i are at[first[i]] up to at[first[i + 1]].
+static incidence *incidences_of(const bt_bodies *b, const row *rows, int n, int64_t *first)
+{
+    for (int k = 0; k < n; k++) {
+        if (b->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
+        if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
+    }
+    for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
+    incidence *at = bt_alloc((size_t)first[b->n], sizeof *at);
+    int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
+    for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
+    for (int k = 0; k < n; k++) {
+        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (incidence){k, -1};
+        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (incidence){k, 1};
+    }
+    free(next);
+    return at;
+}
+
+/// The problem as it is made; bt_fclib_problem points to these.
+typedef struct {
+    int64_t *ptr;
+    int32_t *col;
+    double *val, *q, *mu, *u, *r, *bound, *disc;
+} problem;
+
+/// most: blocks of W, at most.
+static problem problem_of(const bt_bodies *b, const row *rows, int n, int64_t most)
+{
+    const size_t m = (size_t)n;
+    problem x = {0};
+    x.ptr = bt_alloc(2 * m + 1, sizeof *x.ptr);
+    x.col = bt_alloc(4 * (size_t)most, sizeof *x.col);
+    x.val = bt_alloc(4 * (size_t)most, sizeof *x.val);
+    double **const two[] = {&x.q, &x.u, &x.r}, **const one[] = {&x.mu, &x.bound, &x.disc};
+    for (int i = 0; i < 3; i++) *two[i] = bt_alloc(2 * m, sizeof(double)), *one[i] = bt_alloc(m, sizeof(double));
+    for (int k = 0; k < n; k++) {
+        const row *p = &rows[k];
+        const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
+        const double dx = vb->x - va->x, dy = vb->y - va->y;
+        x.u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
+        x.u[2 * k + 1] = p->nx * dy - p->ny * dx + p->rbt * vb->w - p->rat * va->w;
+        x.r[2 * k] = p->ln;
+        x.r[2 * k + 1] = p->lt;
+        x.mu[k] = p->mu;
+        x.bound[k] = p->bound;
+        x.disc[k] = p->disc;
+    }
+    return x;
+}
+
+/// The two rows of W of contact k. near [m]: the contacts at its two bodies, in the order of the contacts.
+static void couple_all(problem *x, const bt_bodies *b, const row *rows, int k, const incidence *near, size_t m)
+{
+    const row *p = &rows[k];
+    int64_t blocks = 0;
+    for (size_t i = 0; i < m; i++) blocks += i == 0 || near[i].contact != near[i - 1].contact;
+    int64_t e0 = x->ptr[2 * k], e1 = e0 + 2 * blocks;
+    x->ptr[2 * k + 1] = e1;
+    x->ptr[2 * k + 2] = e1 + 2 * blocks;
+    for (size_t i = 0; i < m;) {
+        const int o = near[i].contact;
+        double block[4] = {0};
+        for (; i < m && near[i].contact == o; i++) {
+            const bt_idx body = near[i].side > 0 ? rows[o].b : rows[o].a;
+            couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, b->inv[body], block);
+        }
+        for (int t = 0; t < 2; t++) {
+            x->col[e0] = x->col[e1] = 2 * o + t;
+            x->val[e0++] = block[t];
+            x->val[e1++] = block[2 + t];
+        }
+    }
 }
 
 bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
@@ -153,106 +228,37 @@ bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err)
     const bt_bodies *b = &w->bodies;
     int n;
     row *rows = rows_of(w, &n);
-
-    // Which contacts touch each movable body.
-    int64_t *first = bt_alloc((size_t)b->n + 1, sizeof *first);
+    int64_t *first = bt_alloc((size_t)b->n + 1, sizeof *first), most = 0, widest = 0;
+    incidence *at = incidences_of(b, rows, n, first);
     for (int k = 0; k < n; k++) {
-        if (b->inv[rows[k].a].m > 0) first[rows[k].a + 1]++;
-        if (b->inv[rows[k].b].m > 0) first[rows[k].b + 1]++;
+        const int64_t m = first[rows[k].a + 1] - first[rows[k].a] + first[rows[k].b + 1] - first[rows[k].b];
+        most += m;
+        widest = m > widest ? m : widest;
     }
-    for (bt_idx i = 0; i < b->n; i++) first[i + 1] += first[i];
-    touch *at = bt_alloc((size_t)first[b->n], sizeof *at);
-    int64_t *next = bt_alloc((size_t)b->n, sizeof *next);
-    for (bt_idx i = 0; i < b->n; i++) next[i] = first[i];
-    for (int k = 0; k < n; k++) {
-        if (b->inv[rows[k].a].m > 0) at[next[rows[k].a]++] = (touch){k, -1};
-        if (b->inv[rows[k].b].m > 0) at[next[rows[k].b]++] = (touch){k, 1};
-    }
-
-    int64_t most = 0;
+    problem x = problem_of(b, rows, n, most);
+    incidence *near = bt_alloc((size_t)widest, sizeof *near);
     for (int k = 0; k < n; k++) {
         const bt_idx ends[2] = {rows[k].a, rows[k].b};
-        for (int e = 0; e < 2; e++) most += first[ends[e] + 1] - first[ends[e]];
-    }
-    int64_t *ptr = bt_alloc(2 * (size_t)n + 1, sizeof *ptr);
-    int32_t *col = bt_alloc(4 * (size_t)most, sizeof *col);
-    double *val = bt_alloc(4 * (size_t)most, sizeof *val);
-    double *q = bt_alloc(2 * (size_t)n, sizeof *q), *mu = bt_alloc((size_t)n, sizeof *mu);
-    double *u = bt_alloc(2 * (size_t)n, sizeof *u), *r = bt_alloc(2 * (size_t)n, sizeof *r);
-    double *bound = bt_alloc((size_t)n, sizeof *bound), *disc = bt_alloc((size_t)n, sizeof *disc);
-    for (int k = 0; k < n; k++) {
-        const row *p = &rows[k];
-        const bt_vel *va = &b->vel[p->a], *vb = &b->vel[p->b];
-        const double dx = vb->x - va->x, dy = vb->y - va->y;
-        u[2 * k] = p->nx * dx + p->ny * dy + p->rbn * vb->w - p->ran * va->w + p->bias;
-        u[2 * k + 1] = p->nx * dy - p->ny * dx + p->rbt * vb->w - p->rat * va->w;
-        r[2 * k] = p->ln;
-        r[2 * k + 1] = p->lt;
-        mu[k] = p->mu;
-        bound[k] = p->bound;
-        disc[k] = p->disc;
-    }
-    // Neighbours of a contact: the union of the contacts at its two bodies, in the order of the contacts.
-    touch *near = NULL;
-    size_t cap = 0;
-    for (int k = 0; k < n; k++) {
-        const row *p = &rows[k];
         size_t m = 0;
-        const bt_idx ends[2] = {p->a, p->b};
-        for (int e = 0; e < 2; e++) {
-            const size_t add = (size_t)(first[ends[e] + 1] - first[ends[e]]);
-            if (m + add > cap) near = bt_realloc(near, cap = 2 * (m + add), sizeof *near);
-            for (size_t i = 0; i < add; i++) near[m++] = at[first[ends[e]] + (int64_t)i];
-        }
+        for (int e = 0; e < 2; e++)
+            for (int64_t i = first[ends[e]]; i < first[ends[e] + 1]; i++) near[m++] = at[i];
         if (m) qsort(near, m, sizeof *near, by_contact);
-        int64_t entries = ptr[2 * k];
-        int64_t blocks = 0;
-        for (size_t i = 0; i < m; i++) blocks += i == 0 || near[i].contact != near[i - 1].contact;
-        int64_t e0 = entries, e1 = entries + 2 * blocks;
-        ptr[2 * k + 1] = e1;
-        ptr[2 * k + 2] = e1 + 2 * blocks;
-        for (size_t i = 0; i < m;) {
-            const int o = near[i].contact;
-            double block[4] = {0};
-            for (; i < m && near[i].contact == o; i++) {
-                const bt_idx body = near[i].side > 0 ? rows[o].b : rows[o].a;
-                couple(p, body == p->b ? 1 : -1, &rows[o], near[i].side, b->inv[body], block);
-            }
-            for (int t = 0; t < 2; t++) {
-                col[e0] = col[e1] = 2 * o + t;
-                val[e0++] = block[t];
-                val[e1++] = block[2 + t];
-            }
-        }
+        couple_all(&x, b, rows, k, near, m);
     }
     for (int i = 0; i < 2 * n; i++) {
         double wr = 0;
-        for (int64_t e = ptr[i]; e < ptr[i + 1]; e++) wr += val[e] * r[col[e]];
-        q[i] = u[i] - wr;
+        for (int64_t e = x.ptr[i]; e < x.ptr[i + 1]; e++) wr += x.val[e] * x.r[x.col[e]];
+        x.q[i] = x.u[i] - wr;
     }
     const bt_fclib_places places = places_of(w, rows, n);
-    bt_status status =
-        bt_fclib_write_bounded(path, n, ptr, col, val, q, mu, NULL, u, r, bt_laws_on(&w->par) ? bound : NULL,
-                               bt_law_on(&w->par, BT_LAW_RAFTING) ? disc : NULL, &places, "bergtow",
-                               "contact problem of one time step of broken sea ice, 2-D, with its solution", err);
-    void *arrays[] = {rows,
-                      first,
-                      at,
-                      next,
-                      ptr,
-                      col,
-                      val,
-                      q,
-                      mu,
-                      u,
-                      r,
-                      near,
-                      bound,
-                      disc,
-                      (void *)places.body,
-                      (void *)places.normal,
-                      (void *)places.lever,
-                      (void *)places.pose};
+    const bt_fclib_problem out = {
+        .n = n, .w_ptr = x.ptr, .w_col = x.col, .w_val = x.val, .q = x.q, .mu = x.mu, .u = x.u, .r = x.r,
+        .bound = bt_laws_on(&w->par) ? x.bound : NULL, .disc = bt_law_on(&w->par, BT_LAW_RAFTING) ? x.disc : NULL,
+        .places = &places, .title = "bergtow",
+        .description = "contact problem of one time step of broken sea ice, 2-D, with its solution"};
+    const bt_status status = bt_fclib_write(path, &out, err);
+    void *const arrays[] = {rows, first, at, near, x.ptr, x.col, x.val, x.q, x.mu, x.u, x.r, x.bound, x.disc,
+                            (void *)places.body, (void *)places.normal, (void *)places.lever, (void *)places.pose};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) free(arrays[i]);
     return status;
 }

@@ -7,11 +7,10 @@
 //     /fclib_local/W/{nzmax, m, n, nz, p, i, x}    nz = −2: compressed rows (p [m+1], i columns, x values)
 //     /fclib_local/vectors/{q [m], mu [m/2]}
 //     /fclib_local/info/{title, description, math_info}   fixed-length strings
-//     /guesses/number_of_guesses, /guesses/1/{u, r};  /solution/{u, r}
+//     /solution/{u, r}
 //     /bound, /disc, /places                       of our own: bounds of the normal impulses; radius of the disc
 //                                                  about 0 that both components of a contact lie in (mu is 0),
 //                                                  NaN = another contact; where contacts and bodies are
-// A guess must have u as well as r, or the reader fails.
 #include "bergtow/fclib.h"
 
 #include <errno.h>
@@ -31,19 +30,18 @@ static bt_status refuse(const char *path, const char *reason, bt_errors *err)
     return BT_ERR_USAGE;
 }
 
-static bt_status check_problem(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                               const double *solution_u, const double *solution_r, bt_errors *err)
+static bt_status check_problem(const char *path, const bt_fclib_problem *p, bt_errors *err)
 {
-    if (n_contacts < 1) return refuse(path, "there are no contacts in this step; choose a step with contacts", err);
-    if (n_contacts > INT32_MAX / 2) return refuse(path, "the format has 32-bit sizes; choose a smaller case", err);
-    if (!solution_u != !solution_r) return refuse(path, "a solution needs both velocities and impulses", err);
-    const int m = 2 * n_contacts;
-    if (w_ptr[0] != 0 || w_ptr[m] > INT32_MAX)
+    if (p->n < 1) return refuse(path, "there are no contacts in this step; choose a step with contacts", err);
+    if (p->n > INT32_MAX / 2) return refuse(path, "the format has 32-bit sizes; choose a smaller case", err);
+    if (!p->u != !p->r) return refuse(path, "a solution needs both velocities and impulses", err);
+    const int m = 2 * p->n;
+    if (p->w_ptr[0] != 0 || p->w_ptr[m] > INT32_MAX)
         return refuse(path, "the format has 32-bit sizes; choose a smaller case", err);
     for (int i = 0; i < m; i++) {
-        if (w_ptr[i + 1] < w_ptr[i]) return refuse(path, "the rows of W are out of order", err);
-        for (int64_t k = w_ptr[i]; k < w_ptr[i + 1]; k++)
-            if (w_col[k] < 0 || w_col[k] >= m) return refuse(path, "W has a column outside the problem", err);
+        if (p->w_ptr[i + 1] < p->w_ptr[i]) return refuse(path, "the rows of W are out of order", err);
+        for (int64_t k = p->w_ptr[i]; k < p->w_ptr[i + 1]; k++)
+            if (p->w_col[k] < 0 || p->w_col[k] >= m) return refuse(path, "W has a column outside the problem", err);
     }
     return BT_OK;
 }
@@ -72,12 +70,11 @@ static void put_rows(bt_h5 *h, const char *name, int m, const double *data, cons
     put(h, name, H5T_NATIVE_DOUBLE, (hsize_t)m, 0, data, "row", units, meaning);
 }
 
-static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const int32_t *w_col, const double *w_val,
-                          const double *q, const double *mu)
+static void write_problem(bt_h5 *h, const bt_fclib_problem *x)
 {
-    const int m = 2 * n_contacts;
+    const int m = 2 * x->n;
     int32_t *rows = bt_alloc((size_t)m + 1, sizeof *rows);
-    for (int i = 0; i <= m; i++) rows[i] = (int32_t)w_ptr[i];
+    for (int i = 0; i <= m; i++) rows[i] = (int32_t)x->w_ptr[i];
     bt_h5_group(h, "/fclib_local");
     put_int(h, "/fclib_local/spacedim", 2, "dimensions of space");
     bt_h5_group(h, "/fclib_local/W");
@@ -87,28 +84,18 @@ static void write_problem(bt_h5 *h, int n_contacts, const int64_t *w_ptr, const 
     put_int(h, "/fclib_local/W/nz", COMPRESSED_ROWS, "kind of storage: -2, compressed rows");
     put(h, "/fclib_local/W/p", H5T_NATIVE_INT32, (hsize_t)m + 1, 0, rows, "row_end", "1",
         "row i has the entries p[i] up to p[i + 1]");
-    put(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, w_col, "entry", "1", "column of each entry");
-    put(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, w_val, "entry", "kg-1", "entries of W");
+    put(h, "/fclib_local/W/i", H5T_NATIVE_INT32, (hsize_t)rows[m], 0, x->w_col, "entry", "1", "column of each entry");
+    put(h, "/fclib_local/W/x", H5T_NATIVE_DOUBLE, (hsize_t)rows[m], 0, x->w_val, "entry", "kg-1", "entries of W");
     bt_h5_group(h, "/fclib_local/vectors");
-    put_rows(h, "/fclib_local/vectors/q", m, q, "m/s", "velocities without impulses: u = W r + q");
-    put(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)n_contacts, 0, mu, "contact", "1", "friction");
+    put_rows(h, "/fclib_local/vectors/q", m, x->q, "m/s", "velocities without impulses: u = W r + q");
+    put(h, "/fclib_local/vectors/mu", H5T_NATIVE_DOUBLE, (hsize_t)x->n, 0, x->mu, "contact", "1", "friction");
     free(rows);
-}
-
-static void write_guess(bt_h5 *h, int m, const int64_t *w_ptr, const int32_t *w_col, const double *w_val,
-                        const double *q, const double *r)
-{
-    double *u = bt_alloc((size_t)m, sizeof *u);
-    for (int i = 0; i < m; i++) {
-        u[i] = q[i];
-        for (int64_t k = w_ptr[i]; k < w_ptr[i + 1]; k++) u[i] += w_val[k] * r[w_col[k]];
-    }
-    bt_h5_group(h, "/guesses");
-    put_int(h, "/guesses/number_of_guesses", 1, "how many starts there are");
-    bt_h5_group(h, "/guesses/1");
-    put_rows(h, "/guesses/1/u", m, u, "m/s", "velocities at the start of the iteration");
-    put_rows(h, "/guesses/1/r", m, r, "N s", "impulses at the start of the iteration");
-    free(u);
+    bt_h5_group(h, "/fclib_local/info");
+    put_text(h, "/fclib_local/info/title", x->title ? x->title : "", "title");
+    put_text(h, "/fclib_local/info/description", x->description ? x->description : "", "description");
+    put_text(h, "/fclib_local/info/math_info",
+             "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent",
+             "what the problem is");
 }
 
 static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
@@ -127,42 +114,32 @@ static void write_places(bt_h5 *h, const bt_fclib_places *p, hsize_t n)
         "x, y, yaw of every body at the end of the step, by id");
 }
 
-bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                                 const double *w_val, const double *q, const double *mu, const double *guess_r,
-                                 const double *solution_u, const double *solution_r, const double *bound,
-                                 const double *disc, const bt_fclib_places *places, const char *title,
-                                 const char *description, bt_errors *err)
+/// What the format does not know, and the solution.
+static void write_more(bt_h5 *h, const bt_fclib_problem *p)
 {
-    bt_status status = check_problem(path, n_contacts, w_ptr, w_col, solution_u, solution_r, err);
-    if (status != BT_OK) return status;
-    const int m = 2 * n_contacts;
-    const size_t size = strlen(path) + sizeof ".tmp";
-    char *temporary = bt_alloc(size, 1);
-    snprintf(temporary, size, "%s.tmp", path);
+    const hsize_t n = (hsize_t)p->n;
+    if (p->bound)
+        put(h, "/bound", H5T_NATIVE_DOUBLE, n, 0, p->bound, "contact", "N s", "upper bound of the normal impulse");
+    if (p->disc)
+        put(h, "/disc", H5T_NATIVE_DOUBLE, n, 0, p->disc, "contact", "N s",
+            "radius of the disc about 0 that both impulses lie in; NaN: another contact");
+    if (p->places) write_places(h, p->places, n);
+    if (!p->r) return;
+    bt_h5_group(h, "/solution");
+    put_rows(h, "/solution/u", 2 * p->n, p->u, "m/s", "velocities of the solution");
+    put_rows(h, "/solution/r", 2 * p->n, p->r, "N s", "impulses of the solution");
+}
 
+bt_status bt_fclib_write(const char *path, const bt_fclib_problem *p, bt_errors *err)
+{
+    bt_status status = check_problem(path, p, err);
+    if (status != BT_OK) return status;
+    char *temporary = bt_text_of("%s.tmp", path);
     bt_h5 h;
     if (bt_h5_create(&h, temporary, err) == BT_OK) {
-        bt_h5_describe_file(&h, title ? title : "contact problem");
-        write_problem(&h, n_contacts, w_ptr, w_col, w_val, q, mu);
-        bt_h5_group(&h, "/fclib_local/info");
-        put_text(&h, "/fclib_local/info/title", title ? title : "", "title");
-        put_text(&h, "/fclib_local/info/description", description ? description : "", "description");
-        put_text(&h, "/fclib_local/info/math_info",
-                 "2-D Signorini-Coulomb: u = W r + q in m/s, r in N s; rows of a contact: normal, tangent",
-                 "what the problem is");
-        const hsize_t n = (hsize_t)n_contacts;
-        if (bound)
-            put(&h, "/bound", H5T_NATIVE_DOUBLE, n, 0, bound, "contact", "N s", "upper bound of the normal impulse");
-        if (disc)
-            put(&h, "/disc", H5T_NATIVE_DOUBLE, n, 0, disc, "contact", "N s",
-                "radius of the disc about 0 that both impulses lie in; NaN: another contact");
-        if (places) write_places(&h, places, (hsize_t)n_contacts);
-        if (guess_r) write_guess(&h, m, w_ptr, w_col, w_val, q, guess_r);
-        if (solution_r) {
-            bt_h5_group(&h, "/solution");
-            put_rows(&h, "/solution/u", m, solution_u, "m/s", "velocities of the solution");
-            put_rows(&h, "/solution/r", m, solution_r, "N s", "impulses of the solution");
-        }
+        bt_h5_describe_file(&h, p->title ? p->title : "contact problem");
+        write_problem(&h, p);
+        write_more(&h, p);
         bt_h5_close(&h);
     }
     status = h.status;
@@ -170,13 +147,4 @@ bt_status bt_fclib_write_bounded(const char *path, int n_contacts, const int64_t
     if (status != BT_OK) unlink(temporary);
     free(temporary);
     return status;
-}
-
-bt_status bt_fclib_write_local(const char *path, int n_contacts, const int64_t *w_ptr, const int32_t *w_col,
-                               const double *w_val, const double *q, const double *mu, const double *guess_r,
-                               const double *solution_u, const double *solution_r, const char *title,
-                               const char *description, bt_errors *err)
-{
-    return bt_fclib_write_bounded(path, n_contacts, w_ptr, w_col, w_val, q, mu, guess_r, solution_u, solution_r, NULL,
-                                  NULL, NULL, title, description, err);
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Collisions and pushes counted over the window of a run, which is known only when the run ends (private to the
-// recorder). On rank 0.
+// Collisions and quasi-static loads counted over the window of a run, which is known only when the run ends (private to
+// the recorder). On rank 0.
 //
 // A collision belongs to the window when the step in which it begins does: time >= start. Those before it are the
 // start's, counted apart. They are read back from the file they were written to, 104 B each, piece by piece: a million
 // of them is a file of 104 MB, and in memory no more than the largest peaks (80 kB) and a piece (0.9 MB). What is of
-// steps (resistance by collisions and by push, largest push) is a column of the history. Rejected: counters that begin
-// anew when the start that is found moves, which it also does backwards; all peaks in memory.
+// steps (resistance by collisions and quasi-static, largest quasi-static load) is a column of the history. Rejected:
+// counters that begin anew when the start that is found moves, which it also does backwards; all peaks in memory.
 #ifndef BT_IMPACT_COUNT_H
 #define BT_IMPACT_COUNT_H
 

@@ -49,7 +49,8 @@ void bt_impacts_print(const bt_impact_count *c)
     if (!c || !(c->hours > 0)) return;
     char a[32], b[32];
     printf(
-        "  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, pushes %s\n",
+        "  collisions          %lld in the window from %g s on, %.3g an hour; %s of the mean resistance, quasi-static "
+        "%s\n",
         (long long)c->n, c->start, (double)c->n / c->hours, bt_force_text(a, c->collision_resistance),
         bt_force_text(b, c->push_resistance));
     if (c->n > 0) {
@@ -59,10 +60,10 @@ void bt_impacts_print(const bt_impact_count *c)
         for (int k = 0; rank_of(k) <= c->n_peaks; k += 3)
             printf("%s %s at %.3g/h", k ? "," : ":", bt_force_text(a, peaks[rank_of(k) - 1]),
                    (double)rank_of(k) / c->hours);
-        printf("; largest push %s\n", bt_force_text(a, c->largest_push));
+        printf("; largest quasi-static load %s\n", bt_force_text(a, c->largest_push));
         free(peaks);
     }
     if (c->n_all > c->n)
-        printf("    start             %lld before the window, the largest peak %s, the largest push %s\n",
+        printf("    start             %lld before the window, the largest peak %s, the largest quasi-static load %s\n",
                (long long)(c->n_all - c->n), bt_force_text(a, c->start_peak), bt_force_text(b, c->start_push));
 }

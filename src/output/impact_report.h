@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Collisions and pushes in the summary (private to it).
+// Collisions and quasi-static loads in the summary (private to it).
 #ifndef BT_IMPACT_REPORT_H
 #define BT_IMPACT_REPORT_H
 

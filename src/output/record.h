@@ -55,7 +55,7 @@ typedef struct bt_sample {
     double repeats;         ///< times the step was solved again because floes outran the contact margin
     double outrun;          ///< 1 if they still did in the last solution
     double restitution_cut; ///< 1 if the restitution was lowered in this step, see solver.h
-    double collision_resistance; ///< N, the part of ice_resistance that collisions have (impact.h); the rest is push
+    double collision_resistance; ///< N, part of ice_resistance by collisions (impact.h); the rest is quasi-static
     double collisions;      ///< with the body that ended in the step; NaN where they are not told apart
     double impact_peak;     ///< largest peak force of these, N; 0 without
     /// largest force of a floe on the body that no collision explains, N; NaN as for the collisions

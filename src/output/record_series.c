@@ -78,7 +78,7 @@ const bt_quantity bt_own_series[] = {
         "natural-map residual of the contact problem at the end of the step, largest component",
         DIAGNOSTIC, "residual", "max_residual_m_s"),
     ROW(residual_rms, ALWAYS, MAX, "m/s", "the same residual, root mean square over the rows of all contacts"),
-    ROW(active, ALWAYS, LAST, "1", "floes in tiles whose contacts were looked at; all others are at rest"),
+    ROW(active, ALWAYS, LAST, "1", "floes in cells whose contacts were looked at; all others are at rest"),
     SHOWN(unconverged, ALWAYS, SUM, "1",
         "steps that met the sweep limit before the tolerance", NONE, NULL, "unconverged_steps"),
     SHOWN(overlap, ALWAYS, MAX, "m",
@@ -97,7 +97,7 @@ const bt_quantity bt_own_series[] = {
     SHOWN(restitution_cut, ALWAYS, SUM, "1",
         "steps whose restitution was lowered so that the contacts add no energy", NONE, NULL, "restitution_cut_steps"),
     SHOWN(collision_resistance, IMPACTS, MEAN, "N",
-        "part of ice_resistance that belongs to collisions, impulse / dt; the rest is push; NaN if not told "
+        "part of ice_resistance that belongs to collisions, impulse / dt; the rest is quasi-static; NaN if not told "
         "apart", NONE, NULL, "impacts.mean_collision_resistance_n"),
     SHOWN(collisions, IMPACTS, SUM, "1",
         "collisions with the towed body that ended in the step; NaN if not told apart",

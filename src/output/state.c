@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "bergtow/contact.h"
 #include "contact/law.h"
 #include "loads/impact.h"
 #include "space/cells.h"
@@ -18,6 +19,7 @@
 #include "output/state_check.h"
 
 #define MEMBER(struct_, label, type_, width_, member) {label, BT_ITEM_##type_, width_, offsetof(struct_, member)}
+#define ADDED_LAWS "contacts/added_laws"
 #define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
 
 // --- the tables ------------------------------------------------------------------------------------------------------
@@ -268,10 +270,10 @@ static void load_bodies(bt_world *w, bt_snapshot *s)
 
 // --- contacts --------------------------------------------------------------------------------------------------------
 
-enum { TRACE_WIDTH = sizeof(bt_memory) / sizeof(double) };
-_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a trace is a row of doubles");
+enum { MEMORY_WIDTH = sizeof(bt_memory) / sizeof(double) };
+_Static_assert(sizeof(bt_memory) % sizeof(double) == 0, "a record is a row of doubles");
 
-static const bt_state_row trace_columns[] = {
+static const bt_state_row memory_columns[] = {
     MEMBER(bt_memory, "a", I64, 1, a),
     MEMBER(bt_memory, "b", I64, 1, b),
     MEMBER(bt_memory, "part", U16, 2, part),
@@ -309,18 +311,46 @@ static void blank(bt_memory *t)
     if (t->n_points < 2) t->feature[1] = 0, t->value[1] = 0;
 }
 
+/// Names of the laws that a program has added, in the order of their numbers; "" without any. The caller frees it.
+static char *added_laws(void)
+{
+    bt_text t;
+    bt_text_begin(&t);
+    for (int k = 0; k < bt_n_contact_laws(); k++) fprintf(t.out, "%s%s", k ? ", " : "", bt_contact_law_of(k)->name);
+    return bt_text_end(&t);
+}
+
+/// Records name their law by its number, and the numbers of added laws follow from the order of their registration.
+static void check_added_laws(bt_snapshot *s)
+{
+    if (!bt_snapshot_find(s, ADDED_LAWS)) return; // none, or a checkpoint of before they were named
+    const char *then = bt_snapshot_text(s, ADDED_LAWS);
+    char *now = added_laws();
+    if (strcmp(now, then) && s->err)
+        bt_errors_add(s->err,
+                      "%s: the run had the added contact laws %s, in this order, and this program has %s; go on in one "
+                      "that registers the same laws in the same order",
+                      s->path, then, *now ? now : "none");
+    s->faulty |= strcmp(now, then) != 0;
+    free(now);
+}
+
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
     bt_memory *mine = bt_cells_take_memory(w, &n);
-    bt_memory *trace = (bt_memory *)(void *)bt_comm_gather(c, n, TRACE_WIDTH, (const double *)(const void *)mine, &all);
+    const double *rows = (const double *)(const void *)mine;
+    bt_memory *memory = (bt_memory *)(void *)bt_comm_gather(c, n, MEMORY_WIDTH, rows, &all);
     free(mine);
     if (c->rank == 0) {
-        if (all > 0) qsort(trace, (size_t)all, sizeof *trace, bt_memory_by_names);
-        for (int64_t k = 0; k < all; k++) blank(&trace[k]);
-        save_columns(s, "contacts", trace_columns, N_OF(trace_columns), trace, sizeof *trace, all);
+        if (all > 0) qsort(memory, (size_t)all, sizeof *memory, bt_memory_by_names);
+        for (int64_t k = 0; k < all; k++) blank(&memory[k]);
+        save_columns(s, "contacts", memory_columns, N_OF(memory_columns), memory, sizeof *memory, all);
+        char *laws = added_laws();
+        if (*laws) bt_snapshot_add_text(s, ADDED_LAWS, laws);
+        free(laws);
     }
-    free(trace);
+    free(memory);
 }
 
 // --- collisions, events ----------------------------------------------------------------------------------------------
@@ -428,8 +458,9 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     w->events.cap = w->events.n;
     int64_t n = -1;
     renew_contacts(s);
-    bt_memory *trace = load_columns(s, "contacts", trace_columns, N_OF(trace_columns), sizeof *trace, &n);
-    if (!s->faulty) bt_state_check(w, trace, n, w->impacts && c->rank == 0, s);
+    if (!s->faulty) check_added_laws(s);
+    bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
+    if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);
     if (status == BT_OK && !same_constants(&made, &w->par, !w->environment)) {
         bt_errors_add(err,
@@ -439,11 +470,11 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
         status = BT_ERR_CASE;
     }
     if (status != BT_OK) {
-        free(trace);
+        free(memory);
         return status;
     }
     bt_domain_create(w, c);
-    bt_cells_restore(w, trace, n);
+    bt_cells_restore(w, memory, n);
     if (bt_world_hash(w) == hash) return BT_OK;
     bt_errors_add(err,
                   "%s: the state that was read does not have the hash it was saved with, %016" PRIx64

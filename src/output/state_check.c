@@ -108,14 +108,14 @@ static void check_direction(bt_snapshot *s, const cell_names *name, bool in_cell
                             double side, int32_t wrap, int32_t low, int32_t n)
 {
     bt_snapshot_want(s, isfinite(corner), name->corner, -1, "is not finite");
-    bt_snapshot_want(s, side > 0 && isfinite(side), name->side, -1, "is no width of a tile");
+    bt_snapshot_want(s, side > 0 && isfinite(side), name->side, -1, "is no width of a cell");
     bt_snapshot_want(s, period > 0 ? wrap == 1 || (wrap >= 4 && wrap % 2 == 0) : wrap == 0, name->wrap, -1,
-                     "is no number of tiles around this domain");
+                     "is no number of cells around this domain");
     if (s->faulty) return;
     bt_snapshot_want(s, wrap == 0 || side == period / wrap, name->side, -1, "does not go round the domain");
-    bt_snapshot_want(s, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is no place of a tile");
+    bt_snapshot_want(s, wrap == 0 ? low >= -FAR && low <= FAR : low == 0, name->low, -1, "is no place of a cell");
     bt_snapshot_want(s, n >= 1 && (wrap == 0 || n == wrap || (n == 1 && !in_cells)), name->n, -1,
-                     "is no number of tiles");
+                     "is no number of cells");
 }
 
 static void check_cells(const bt_world *w, bt_snapshot *s)
@@ -134,7 +134,7 @@ static void check_cells(const bt_world *w, bt_snapshot *s)
     check_direction(s, &x, in_cells, w->par.period_x, t->x0, t->side_x, t->wrap_x, t->low_x, t->n_x);
     check_direction(s, &y, in_cells, w->par.period_y, t->y0, t->side_y, t->wrap_y, t->low_y, t->n_y);
     bt_snapshot_want(s, (double)t->n_x * t->n_y <= 4 * (double)b->n_global + 1024, "tiles/n_x", -1,
-                     "and n_y are more tiles than are made for so many floes");
+                     "and n_y are more cells than are made for so many floes");
     bt_snapshot_want(s, t->margin_max > 0 && isfinite(t->margin_max), "tiles/margin_max", -1, "is no margin");
     // Rounding: another build may have made the radii.
     bt_snapshot_want(s, isfinite(t->reach) && t->reach >= widest * (1 - 1e-9), "tiles/reach", -1,
@@ -168,7 +168,7 @@ static void check_bodies(const bt_world *w, bt_snapshot *s)
         bt_snapshot_want(s, b->home[i].copy >= -FAR && b->home[i].copy <= FAR, "bodies/copy", g, "is out of range");
         bt_snapshot_want(s, b->home[i].lap >= -FAR && b->home[i].lap <= FAR, "bodies/lap", g, "is out of range");
         if (b->large[i] || s->faulty) continue;
-        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the tiles");
+        bt_snapshot_want(s, in_box(w->cells, b->cell[i]), "bodies/tile", g, "is outside the box of the cells");
         bt_snapshot_want(s, w->cells->relabel || bt_cells_outside(w, i) <= w->cells->allowance, "bodies/tile", g,
                          "is too far from where the floe is");
     }
@@ -189,11 +189,11 @@ static bool can_meet(const bt_world *w, bt_idx i, bt_idx j)
     return b->large[i] || b->large[j] || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j]);
 }
 
-static void check_contacts(const bt_world *w, const bt_memory *trace, int64_t n, bt_snapshot *s)
+static void check_contacts(const bt_world *w, const bt_memory *memory, int64_t n, bt_snapshot *s)
 {
     const bt_bodies *b = &w->bodies;
     for (int64_t k = 0; k < n && !s->faulty; k++) {
-        const bt_memory *t = &trace[k];
+        const bt_memory *t = &memory[k];
         bt_snapshot_want(s, t->a >= 0 && t->a < t->b && t->b < b->n_global, "contacts/a", k,
                          "and b are no pair of bodies");
         if (s->faulty) return;
@@ -271,7 +271,7 @@ static void check_events(const bt_world *w, bt_snapshot *s)
 
 // --- the whole -------------------------------------------------------------------------------------------------------
 
-void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool impacts, bt_snapshot *s)
+void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s)
 {
     if (s->faulty) return; // then arrays are missing
     const bt_params *p = &w->par;
@@ -284,7 +284,7 @@ void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool i
                      "and what else is of water and air are not all finite");
     check_cells(w, s);
     if (!s->faulty) check_bodies(w, s);
-    if (!s->faulty) check_contacts(w, trace, n, s);
+    if (!s->faulty) check_contacts(w, memory, n, s);
     if (w->tow && !s->faulty) check_tow(w, s);
     if (w->window && !s->faulty) check_window(w, s);
     if (impacts && !s->faulty) check_impacts(w, s);

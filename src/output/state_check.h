@@ -11,7 +11,7 @@
 /// give.
 void bt_state_check_field(const bt_field *f, int64_t n_offsets, int64_t n_vertices, bt_snapshot *s);
 
-/// The same for a world before it is distributed, and for traces [n]; impacts: those were taken too.
-void bt_state_check(const bt_world *w, const bt_memory *trace, int64_t n, bool impacts, bt_snapshot *s);
+/// The same for a world before it is distributed, and for the memory of contacts [n]; impacts: those were taken too.
+void bt_state_check(const bt_world *w, const bt_memory *memory, int64_t n, bool impacts, bt_snapshot *s);
 
 #endif

@@ -131,38 +131,9 @@ static void warn_of_window(bt_summary *s, const bt_case *c, const bt_run_totals 
     bt_packing_warn(&packing, s->sim_time, &s->warnings); // where its window ends, too
 }
 
-void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
-                     bool body)
+/// How the steps were solved.
+static void warn_of_solver(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
 {
-    const double nan = NAN;
-    *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
-    if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
-
-    const bt_mean none = bt_stats_mean(NULL, 0);
-    s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
-    s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
-    bt_steady_none(&s->window);
-    if (body) {
-        bt_steady_find(&s->window, h, c, t);
-    }
-    reduce_added(s, h);
-    if (body) {
-        reduce_window(s, h);
-        warn_of_window(s, c, t);
-        s->reference_ratio = s->ice.mean / c->reference.mean_force;
-        bt_estimate_conditions(c, &s->estimate);
-        s->estimate.concentration = t->concentration;
-        if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
-        if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;
-    }
-
-    s->contacts = h->n ? h->sum_contacts / (double)h->n : nan;
-    s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
-    s->updates = h->n ? h->sum_updates / (double)h->n : nan;
-    s->moves = h->n ? h->sum_moves / (double)h->n : nan;
-    s->ns_per_floe_step =
-        n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
-
     if (c->solver.turn_rows != BT_TURN_ROWS)
         bt_errors_add(&s->warnings, "solver.turn_rows no longer has an effect; take it out of the case");
     if (h->unconverged)
@@ -185,6 +156,11 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
         bt_errors_add(&s->warnings,
                       "in %lld of %lld steps the contacts added energy; tighten solver.tolerance or lower run.dt",
                       (long long)h->positive_work, (long long)h->n);
+}
+
+/// What the bodies came to.
+static void warn_of_bodies(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t)
+{
     if (!(h->max_overlap <= OVERLAP_LIMIT * t->mean_size))
         bt_errors_add(&s->warnings,
                       "bodies overlap by up to %.2g m, %.1f %% of the mean floe size; lower run.dt or raise "
@@ -193,15 +169,13 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
     if (!(h->max_crushed_depth <= CRUSH_LIMIT * t->mean_size))
         bt_errors_add(&s->warnings,
                       "floes were crushed to a depth of %.2g m, %.0f %% of the mean floe size: outlines and masses "
-                      "stay as they were, "
-                      "which is no model of that",
+                      "stay as they were, which is no model of that",
                       h->max_crushed_depth, 100 * h->max_crushed_depth / t->mean_size);
     if (t->stall.windows)
         bt_errors_add(
             &s->warnings,
             "the towed body stood still for %.3g s of %.3g s, below %g %% of the speed that the tow asked for over a "
-            "path of a "
-            "mean floe size: a jam%s",
+            "path of a mean floe size: a jam%s",
             t->stall.time, s->sim_time, 100 * BT_STALL_SHARE,
             c->ice.crushing_pressure > 0 || c->ice.rafting_kappa > 0
                 ? ""
@@ -218,6 +192,40 @@ void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const
                       "%lld floes left the open domain and resist no more; use a larger domain or walls if that "
                       "matters",
                       (long long)t->floes_outside);
+}
+
+void bt_summary_make(bt_summary *s, const bt_history *h, const bt_case *c, const bt_run_totals *t, bt_idx n_floes,
+                     bool body)
+{
+    const double nan = NAN;
+    *s = (bt_summary){.body = body, .sim_time = h->n ? h->column[BT_COL_TIME][h->n - 1] : 0, .reference_ratio = nan};
+    if (t->stopped) bt_errors_add(&s->warnings, "the run stopped early: %s", t->stopped);
+
+    const bt_mean none = bt_stats_mean(NULL, 0);
+    s->ice = s->tow = s->drag = s->coriolis = s->tilt = s->inertia = s->budget = none;
+    s->p95 = s->p99 = s->peak = s->balance = s->closure = s->closure_relative = s->budget_closure_relative = nan;
+    bt_steady_none(&s->window);
+    if (body) bt_steady_find(&s->window, h, c, t);
+    reduce_added(s, h);
+    if (body) {
+        reduce_window(s, h);
+        warn_of_window(s, c, t);
+        s->reference_ratio = s->ice.mean / c->reference.mean_force;
+        bt_estimate_conditions(c, &s->estimate);
+        s->estimate.concentration = t->concentration;
+        if (t->mean_thickness > 0) s->estimate.thickness = t->mean_thickness;
+        if (t->mean_radius > 0) s->estimate.floe_radius = t->mean_radius;
+    }
+
+    s->contacts = h->n ? h->sum_contacts / (double)h->n : nan;
+    s->sweeps = h->n ? h->sum_sweeps / (double)h->n : nan;
+    s->updates = h->n ? h->sum_updates / (double)h->n : nan;
+    s->moves = h->n ? h->sum_moves / (double)h->n : nan;
+    s->ns_per_floe_step =
+        n_floes > 0 && t->n_steps > 0 ? 1e9 * t->wall_time / ((double)n_floes * (double)t->n_steps) : nan;
+
+    warn_of_solver(s, h, c, t);
+    warn_of_bodies(s, h, c, t);
 }
 
 void bt_summary_free(bt_summary *s)

@@ -147,7 +147,7 @@ static void line_of(const char *text, const char *key, char out[128])
 }
 
 /// Why a record is not the one that the files ask for, in words.
-static void tell(const char *folder, const char *kept, const char *wanted, bt_errors *err)
+static void report(const char *folder, const char *kept, const char *wanted, bt_errors *err)
 {
     static const char *const whose[] = {"name", "study"};
     char a[128], b[128];
@@ -185,7 +185,7 @@ bt_status bt_member_record_check(bt_member_records *r, int64_t m, const char *na
     if (status == BT_OK) status = bt_file_read_to(path, "a record", MOST_TEXT, &kept, &size, &why);
     if (status == BT_OK) status = make(r, name, folder, text, &why);
     if (status == BT_OK && (size != strlen(text) || memcmp(kept, text, size))) {
-        tell(folder, kept, text, &why);
+        report(folder, kept, text, &why);
         status = BT_ERR_CASE;
     }
     r->seen[m] = status == BT_OK ? now : 0;

@@ -13,7 +13,7 @@
 #include "run/run_parts.h"
 
 /// What the user should know of the checkpoint that is taken.
-static void tell(const bt_snapshot *s, const char *said)
+static void report(const bt_snapshot *s, const char *said)
 {
     bt_errors warnings = {0};
     if (said) bt_errors_add(&warnings, "warning: %s", said);
@@ -42,7 +42,7 @@ static bt_status open_folder(bt_resume *k, const bt_run_options *o, bt_errors *e
     char *said = NULL;
     const bt_status status =
         o->from ? bt_snapshot_read(&k->s, o->from, err) : bt_checkpoint_read(&k->s, o->dir, &k->path, &said, err);
-    if (status == BT_OK) tell(&k->s, said);
+    if (status == BT_OK) report(&k->s, said);
     free(said);
     return status;
 }

@@ -49,7 +49,7 @@ def test_the_nearest_file_holds(folder):
 
 
 def test_any_case_cut_into_a_chain_is_the_case(tmp_path):
-    """Cases drawn at random, their keys dealt to three files, some of them to two with another value in the farther."""
+    """Random cases, their keys spread over three files, some of them to two with another value in the farther."""
     table, tried = json.loads(call("--list-keys", "--json").stdout), 0
     for seed in range(12):
         case = random_cases.draw(seed, table)

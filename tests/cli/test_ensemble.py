@@ -161,7 +161,7 @@ def test_one_member_fails_and_the_rest_complete(tmp_path):
     result = ensemble(tmp_path)
     assert result.returncode == CASE
     assert "member c002-r001 failed (3)" in result.stderr and "output.window_start" in result.stderr
-    # told beforehand, too
+    # reported beforehand, too
     assert call("check", "study.yml",
                 cwd=tmp_path).stderr.replace(" (condition 2: run.duration 3)",
                                              "").strip().removeprefix("bergtow: ") in result.stderr

@@ -136,7 +136,7 @@ def test_a_full_disk_of_one_member(quiet, tmp_path, tmpfs, page, size):
 
 
 def test_a_full_disk_of_all_members(quiet, tmp_path, tmpfs):
-    """Not even the failure can be recorded: it is told, and the next call, with room, needs no word."""
+    """Not even the failure can be recorded: it is reported, and the next call, with room, needs no word."""
     prepare(tmp_path)
     tmpfs(tmp_path / "all/members", "16k")
     (tmp_path / "all/members/there").write_bytes(b"x" * 16384)

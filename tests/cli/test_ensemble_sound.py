@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Members whose files are not what they left are told, run again, and never in ensemble.h5; a call ends with 0 only
+"""Members whose files are not what they left are reported, run again, and never in ensemble.h5; a call ends with 0 only
 without a hole."""
 import json
 import os

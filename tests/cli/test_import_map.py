@@ -177,7 +177,7 @@ def test_heading(tmp_path, heading):
 
 
 def test_the_program_reads_it(tmp_path):
-    """Its own projection puts the degrees where PROJ had them, without a warning; and the numbers that were told are
+    """Its own projection puts the degrees where PROJ had them, without a warning; and the numbers reported are
     those of the case whose lines were printed."""
     write(tmp_path / "map.geojson", [places(r, -135.0, 74.0) for r in RINGS])
     r = call("outlines", "map.geojson", "-o", "floes.geojson", "--record", "floes.json", "--box", "1km,3.6km",

@@ -236,7 +236,7 @@ def test_degrees_by_crs(tmp_path, crs):
 
 @pytest.mark.parametrize("crs", METRES)
 def test_metres_by_crs(tmp_path, crs):
-    """Used as they are, about their middle, which is told; so is what is not corrected."""
+    """Used as they are, about their middle, which is reported; so is what is not corrected."""
     drawn = [shift(r, -1234567.5, 2345678.25) for r in (ARROW, BOX)]
     write(tmp_path, *drawn, **named(crs))
     rings, *_ = field(tmp_path, FRAMES["geographic"])

@@ -44,8 +44,9 @@ ice:
 tow:
   mode: {mode}
   hull_x: 2 m
-  speed: 1.8 km/h
-  direction: 90 deg
+  speed: 0.5 m/s
+  direction: 1.5707963267948966 rad
+  line_damping: 500 N s/m
 body:
   drag:
     water_form: 0.84999999999999998  # C_w
@@ -175,22 +176,13 @@ def test_case_values_are_in_si_units(tmp_path):
     with Run(make_run(tmp_path / "run")) as run:
         assert run.value("run.dt") == 0.1
         assert run.value("tow.speed") == 0.5
-        assert run.value("tow.direction") == np.pi / 2
+        assert run.value("tow.direction") == np.pi / 2 and run.value("tow.line_damping") == 500
         assert run.value("body.drag.water_form") == 0.85
         assert run.case["run.title"] == 'Square "A" °'
         assert np.isnan(run.value("ice.size")) and np.isnan(run.value("tow.mode"))
         assert not any(key.startswith("floes") for key in run.case)
         assert run.box == (-20.0, 20.0, -20.0, 20.0) and not run.geographic
         assert run.case_text.startswith("tow: {speed")
-
-
-def test_a_bare_angle_is_in_degrees(tmp_path):
-    make_run(tmp_path / "run")
-    with h5py.File(tmp_path / "run/result.h5", "a") as f:
-        del f["case"]
-        f["case"] = "tow:\n  direction: 180\n"
-    with Run(tmp_path / "run") as run:
-        assert run.value("tow.direction") == np.pi
 
 
 def test_periodic_floes_have_images_over_the_edge(tmp_path):
@@ -406,7 +398,7 @@ def test_a_moving_window_is_shown_about_the_body(tmp_path):
         f["frames/body_pose"][:, 0, 0] = (np.array(path)[:, 0] + 20) % 40 - 20
         del f["case"]
         f["case"] = CASE.format(frame="geographic", ends="moving\n  ahead: 25 m",
-                                mode="speed").replace("90 deg", "0 deg")
+                                mode="speed").replace("1.5707963267948966 rad", "0 rad")
     with Run(folder) as run:
         figure = plot_field.draw(run, window="body")
         axes = figure.axes[:3]
@@ -423,7 +415,8 @@ def test_titles_of_narrow_panels_stand_apart(tmp_path):
     with h5py.File(folder / "result.h5", "r+") as f:
         del f["case"]
         f["case"] = CASE.format(frame="geographic", ends="open",
-                                mode="speed").replace("length: 40 m", "length: 4 km").replace("90 deg", "0 deg")
+                                mode="speed").replace("length: 40 m", "length: 4000 m").replace(
+                                    "1.5707963267948966 rad", "0 rad")
     with Run(folder) as run:
         run.summary["title"] = "A tow with a title that is a good deal longer than the figure is wide at full size"
         figure = plot_field.draw(run, window="body")

@@ -195,7 +195,7 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):
-    """Conditions without a field, a member whose process died, one that has finished since the file was made: all told,
+    """Conditions without a field, a member whose process died, one finished since the file was made: all reported,
     none a fault of the page."""
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     rng = np.random.default_rng(6)

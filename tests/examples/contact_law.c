@@ -27,7 +27,7 @@ static bool fender_applies(const bt_world *w, bt_idx a, bt_idx b, const double *
     return w->bodies.gid[a] == w->towed || w->bodies.gid[b] == w->towed;
 }
 
-static void fender_bound(const bt_touch *t, double load[2], double given[2])
+static void fender_bound(const bt_law_contact *t, double load[2], double given[2])
 {
     for (int i = 0; i < t->n; i++) {
         given[i] = t->value[DEPTH];
@@ -35,7 +35,7 @@ static void fender_bound(const bt_touch *t, double load[2], double given[2])
     }
 }
 
-static bool fender_remember(bt_touch *t, double *number)
+static bool fender_remember(bt_law_contact *t, double *number)
 {
     double deeper = 0;
     for (int i = 0; i < t->n; i++) {

@@ -145,7 +145,7 @@ class Killed:
                 assert step >= self.stopped.get(member.name, 0)
                 if step < STEPS:
                     self.stopped[member.name] = step
-                    # else it was told by the launcher, whose other rank was killed, and had time for a checkpoint
+                    # else it was reported by the launcher, whose other rank was killed, and had time for a checkpoint
                     self.between |= {member.name} if step % EVERY == 0 else set()
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Guards among ranks: the same step, the same body and the same words as on one rank, told once; and the same largest
+"""Guards among ranks: the same step, body and words as on one rank, reported once; and the same largest
 overlap of the last state."""
 import json
 

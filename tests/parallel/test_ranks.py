@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The same bits on any number of ranks and threads: state hash, every series and every frame, over 500 steps and more
-in which tiles are dealt anew, floes go from rank to rank, and contacts act across ranks.
+in which cells are assigned anew, floes go from rank to rank, and contacts act across ranks.
 
 What turns these tests red: a sum over ranks in double precision, a shared floe that is not brought up to date after a
 phase, contacts in the order of a rank's memory instead of that of the ids, labels that depend on the division, what a
@@ -70,7 +70,7 @@ TIDE = changed(ROUND,
                water={"tide": {"major": 0.15, "minor": 0.1, "period": 20, "inclination": 60}},
                tow__mode="line",
                lead={"mode": "managed", "width": 2, "floe_size": 0.6, "length": 8})
-# Ice that crushes: what a pair has crushed stays with it when its tile is dealt to another rank, and when tiles are
+# Ice that crushes: what a pair has crushed stays with it when its cell is assigned to another rank, and when cells are
 # labelled anew.
 CRUSH = changed(LINE,
                 ice__crushing={"pressure": "2 kPa", "least_length": 0.5},
@@ -167,7 +167,7 @@ def test_the_same_bits(alone, name, ranks, threads):
     assert_same(one, r)
     if ranks == 1:
         return
-    # Otherwise nothing was dealt, or nothing went over.
+    # Otherwise nothing was assigned, or nothing went over.
     assert r.summary["divisions"] >= 2 and r.summary["moved_floes"] > 50, r.summary
     assert 0 < r.summary["edge_cut"] <= 1 and 0 < r.summary["halo_share"] < 3
     assert 0 <= r.summary["imbalance"] <= r.summary["worst_imbalance"]

@@ -199,7 +199,7 @@ def test_the_hash_sees_the_last_bit(tmp_path):
 
 
 def test_the_plain_schedule_is_the_reference(one_thread):
-    """Cells one after the other, without shares of threads: the same result as dealt to two threads."""
+    """Cells one after the other, without shares of threads: the same result as shared by two threads."""
     case, one, folder = one_thread
     plain = run(folder, changed(case, solver__plain_schedule=True), "--threads", 2, name="plain", env=environment())
     assert plain.hash == one.hash

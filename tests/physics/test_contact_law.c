@@ -4,11 +4,13 @@
 //
 // Red with (tried): the given depth left out of the gap; the bound without Δt; growth booked whichever law is at its
 // bound; the record not written; applies not asked; the work of the points not booked; the state counted from contacts
-// at work alone.
+// at work alone; the names of the laws in a checkpoint not compared.
 #include "scene.h"
 
 #include "bergtow/contact.h"
+#include "base/snapshot.h"
 #include "contact/law.h"
+#include "output/state.h"
 
 #include "examples/contact_law.c"
 
@@ -103,6 +105,35 @@ static void the_weaker_law_yields(void **state)
     }
 }
 
+/// Memory names its law by a number: a program with other laws before this one would take it for one of theirs.
+static void a_state_of_other_laws_is_refused(void **state)
+{
+    (void)state;
+    static const char *const had[] = {"fender", "fender, grip", "grip, fender"};
+    for (int k = 0; k < 3; k++) {
+        bt_world *w = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0), *other = hull_and_floe(5e-4, BT_PI / 4, 0.5, 0);
+        for (int s = 0; s < 900; s++) bt_world_step(w);
+        assert_true(pressed(w) > 0);
+        bt_errors err = {0};
+        bt_snapshot saved = {.path = "checkpoint", .err = &err}, s = saved;
+        assert_int_equal(bt_state_save(w, &bt_comm_alone, &saved, &err), BT_OK);
+        for (int i = 0; i < saved.n; i++) {
+            const bt_item *x = &saved.item[i];
+            if (!strcmp(x->name, "contacts/added_laws")) bt_snapshot_add_text(&s, x->name, had[k]);
+            else bt_snapshot_add(&s, x->name, x->type, x->n, x->width, x->data);
+        }
+        assert_string_equal(bt_snapshot_text(&saved, "contacts/added_laws"), had[0]);
+        const bt_status status = bt_state_load(other, &bt_comm_alone, &s, &err);
+        if (k == 0) assert_true(status == BT_OK && bt_world_hash(other) == bt_world_hash(w));
+        else assert_true(status == BT_ERR_CASE && err.n == 1 && strstr(err.text[0], had[k]));
+        bt_errors_free(&err);
+        bt_snapshot_free(&saved);
+        bt_snapshot_free(&s);
+        bt_world_free(w);
+        bt_world_free(other);
+    }
+}
+
 static void what_will_not_do_is_refused(void **state)
 {
     (void)state;
@@ -137,6 +168,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(it_takes_the_energy_of_a_floe), cmocka_unit_test(it_creeps_until_it_bears),
         cmocka_unit_test(it_is_the_hull_s_alone),        cmocka_unit_test(the_weaker_law_yields),
+        cmocka_unit_test(a_state_of_other_laws_is_refused),
         cmocka_unit_test(what_will_not_do_is_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

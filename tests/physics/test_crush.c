@@ -351,7 +351,7 @@ static void laws_of_a_jam(void **state)
             const bt_cell *t = &w->cells->cell[k];
             for (bt_idx j = 0; j < t->n_contacts; j++) {
                 const bt_limit *l = &t->laws.limits[j];
-                const bool rafts = l->trace[BT_LAW_RAFTING] >= 0;
+                const bool rafts = l->record[BT_LAW_RAFTING] >= 0;
                 for (int i = 0; i < t->contacts[j].n; i++) {
                     assert_true(l->grown[i] >= 0);
                     if (rafts) assert_true(l->depth[i] <= l->grown[i]);

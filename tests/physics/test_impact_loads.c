@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Collisions and pushes on the towed body against closed forms: impulse, effective mass, peak, duration, panels.
+// Collisions and quasi-static loads on the towed body against closed forms: impulse, effective mass, peak, duration,
+// panels.
 #include "scene.h"
 
 #include "loads/impact.h"
@@ -129,8 +130,8 @@ static void eccentric_impact(void **state)
 }
 
 /// A floe slides through water at rest onto the body: the drag of the step is in the solver's masses, (M + Δt K), and
-/// in λ, but the collision has the momentum of the mass alone, and the rest is push. From then on the contact carries k
-/// V².
+/// in λ, but the collision has the momentum of the mass alone, and the rest is quasi-static. From then on the contact
+/// carries k V².
 static void drag_is_push(void **state)
 {
     (void)state;
@@ -204,7 +205,7 @@ static void body_against_a_wall(void **state)
     }
 }
 
-/// A floe lies against a body at rest and the wind presses on it: a push of that force, never a collision.
+/// A floe lies against a body at rest and the wind presses on it: a quasi-static load of that force, never a collision.
 static void static_push(void **state)
 {
     (void)state;
@@ -308,7 +309,7 @@ static void corner_in_contact(void **state)
 }
 
 /// A heap of many floes before a turning, free body: at every sample the panels together carry the ice force, panels
-/// hold what touches there, and push and collision make up the resistance.
+/// hold what touches there, and quasi-static load and collision make up the resistance.
 static void panels_carry_the_ice_force(void **state)
 {
     (void)state;
@@ -339,7 +340,7 @@ static void panels_carry_the_ice_force(void **state)
         CHECK_CLOSE(sin(yaw) * fx + cos(yaw) * fy, o.ice_force_y, 1e-12 * (normal + 1));
         assert_true(normal >= force / hypot(1, 0.3) * (1 - 1e-9));
         assert_true(fabs(o.collision_resistance) <= fabs(o.ice_resistance) * (1 + 1e-9) + 0.4 * normal);
-        for (int64_t i = 0; i < w->impacts->n_touch; i++) in_steps += w->impacts->touch[i].collision;
+        for (int64_t i = 0; i < w->impacts->n_contacts; i++) in_steps += w->impacts->contact[i].collision;
         for (int64_t i = 0; i < w->impacts->n_closed; i++) in_events += w->impacts->closed[i].impulse;
         events += w->impacts->n_closed;
         turned = fmax(turned, fabs(yaw - 0.1));

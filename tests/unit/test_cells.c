@@ -329,7 +329,7 @@ static void a_blow_goes_through_a_row(void **state)
     for (bt_gid g = 0; g <= N; g++) CHECK_CLOSE(vel_of(w, g).x, 1.0 / (N + 1), 1e-6);
     bt_world_free(w);
 
-    // So long that the repeats of a step do not reach the end: told as outrun; nothing is lost, and no floe runs
+    // So long that the repeats of a step do not reach the end: reported as outrun; nothing is lost, and no floe runs
     // through another.
     enum { LONG = 160 };
     w = hit_row(LONG, 2.5, 1, &outrun, &repeats, &lost);
@@ -537,7 +537,7 @@ static void floes_find_a_body_at_rest(void **state)
     bt_world_free(w);
 }
 
-/// A floe that leaves all lists behind in a step, farther than the largest margin, is told; one just within is not.
+/// A floe that leaves all lists behind in a step, farther than the largest margin, is reported; one just within is not.
 static void what_outruns_all_margins_is_told(void **state)
 {
     (void)state;

@@ -88,7 +88,7 @@ static void agreement(const bt_comm *c)
     bt_errors_free(&err);
 }
 
-// Ids are dealt out by a hash; `change`: 0 = as it should be, 1 = nobody gives id 5, 2 = all ranks do, 3 = an id too
+// Ids are assigned by a hash; `change`: 0 = as it should be, 1 = nobody gives id 5, 2 = all ranks do, 3 = an id too
 // large, 4 = id 6 goes as another id 5, so that the number of rows is right.
 static bt_status exchange(const bt_comm *c, int64_t n, int change, bt_errors *err)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Reads, writes and closes that fail once, at every place of a small file in turn: each is told in the system's own
+// Reads, writes and closes that fail once, at every place of a small file in turn: each is reported in the system's own
 // words, none is taken for damage, and none passes because the next call succeeds. Files cut off early are known as
 // ours.
 #include <errno.h>

@@ -32,11 +32,10 @@ static void exponents_follow_from_the_dimensions(void **state)
             found = true;
             const double want = 3 * dimensions[i].kg + dimensions[i].m + 0.5 * dimensions[i].s;
             if (bt_units_froude((bt_unit)kind) != want)
-                fail_msg("%s: %g, by dimension %g", bt_units_noun((bt_unit)kind), bt_units_froude((bt_unit)kind), want);
+                fail_msg("%s: %g, by dimension %g", dimensions[i].symbol, bt_units_froude((bt_unit)kind), want);
         }
         if (!found)
-            fail_msg("%s: add the dimensions of %s to this test", bt_units_noun((bt_unit)kind),
-                     bt_units_symbol((bt_unit)kind));
+            fail_msg("add the dimensions of %s to this test", bt_units_symbol((bt_unit)kind));
     }
 }
 
