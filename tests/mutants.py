@@ -508,6 +508,7 @@ MUTANTS = {
          "not flushed"),
     ]),
     "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
+                                         "cli/test_resume.py::test_a_damaged_checkpoint_is_not_taken",
                                          "cli/test_resume.py"], [
         ("status = bt_file_rename(path, sound ? before : damaged, err);",
          "status = bt_file_rename(path, damaged, err);", "the checkpoint before is called damaged"),
@@ -545,7 +546,7 @@ MUTANTS = {
     "src/base/base.c": (["cli/test_faults.py::test_no_memory"], [
         ("    leave(BT_ERR_NUMERIC);\n", "    exit(BT_ERR_NUMERIC);\n", "HDF5 closes files from within itself"),
     ]),
-    "src/run/halt.c": (["cli/test_resume.py"], [
+    "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint", "cli/test_resume.py"], [
         ("if (h->wall > 0 && now - h->last >= h->wall) bits |= save;", "", "no checkpoint by the clock"),
         ("if (h->steps > 0 && step % h->steps == 0) bits |= save;", "", "no checkpoint by steps"),
         ("        save_signal = 0;\n        bits", "        bits", "a checkpoint at every step after a signal"),
