@@ -459,7 +459,7 @@ MUTANTS = {
         ("if (status != BT_OK && fd >= 0) unlink(temporary);", "", "a part stays under the temporary name"),
         ("const int broken = got < 0 ? errno : 0;", "const int broken = 0;", "half a text is taken for the whole"),
     ]),
-    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "cli/test_resume.py"], [
+    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "unit/test_checkpoint", "cli/test_resume.py"], [
         ("        if (!reason) reason = bt_file_sync(fd);\n", "", "the checksum is not synced"),
         ("!memcmp(behind, zeros, sizeof hdf5_magic));", "false);", "a file cut off early is a stranger's"),
         ("} else if (memcmp(block, wanted, sizeof block)) {", "} else if (0) {", "damage passes"),
@@ -499,7 +499,7 @@ MUTANTS = {
         ("status == BT_OK && last) status = bt_checkpoint_write",
          "status == BT_OK && last && 0) status = bt_checkpoint_write", "no last checkpoint"),
     ]),
-    "src/output/record_resume.c": (FILES + ["legs:line"], [
+    "src/output/record_resume.c": (FILES + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, r->h5.status);",
          "    bt_status status = bt_comm_agree(r->comm, r->h5.status);", "frames of other ranks at a checkpoint"),
         ("        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);\n", "",
