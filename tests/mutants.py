@@ -459,7 +459,7 @@ MUTANTS = {
         ("if (status != BT_OK && fd >= 0) unlink(temporary);", "", "a part stays under the temporary name"),
         ("const int broken = got < 0 ? errno : 0;", "const int broken = 0;", "half a text is taken for the whole"),
     ]),
-    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "cli/test_resume.py"], [
+    "src/base/checksum.c": (SYNC + ["unit/test_disk_faults", "unit/test_checkpoint", "cli/test_resume.py"], [
         ("        if (!reason) reason = bt_file_sync(fd);\n", "", "the checksum is not synced"),
         ("!memcmp(behind, zeros, sizeof hdf5_magic));", "false);", "a file cut off early is a stranger's"),
         ("} else if (memcmp(block, wanted, sizeof block)) {", "} else if (0) {", "damage passes"),
@@ -499,7 +499,7 @@ MUTANTS = {
         ("status == BT_OK && last) status = bt_checkpoint_write",
          "status == BT_OK && last && 0) status = bt_checkpoint_write", "no last checkpoint"),
     ]),
-    "src/output/record_resume.c": (FILES + ["legs:line"], [
+    "src/output/record_resume.c": (FILES + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, r->h5.status);",
          "    bt_status status = bt_comm_agree(r->comm, r->h5.status);", "frames of other ranks at a checkpoint"),
         ("        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);\n", "",
@@ -508,6 +508,7 @@ MUTANTS = {
          "not flushed"),
     ]),
     "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
+                                         "cli/test_resume.py::test_a_damaged_checkpoint_is_not_taken",
                                          "cli/test_resume.py"], [
         ("status = bt_file_rename(path, sound ? before : damaged, err);",
          "status = bt_file_rename(path, damaged, err);", "the checkpoint before is called damaged"),
@@ -545,7 +546,7 @@ MUTANTS = {
     "src/base/base.c": (["cli/test_faults.py::test_no_memory"], [
         ("    leave(BT_ERR_NUMERIC);\n", "    exit(BT_ERR_NUMERIC);\n", "HDF5 closes files from within itself"),
     ]),
-    "src/run/halt.c": (["cli/test_resume.py"], [
+    "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint", "cli/test_resume.py"], [
         ("if (h->wall > 0 && now - h->last >= h->wall) bits |= save;", "", "no checkpoint by the clock"),
         ("if (h->steps > 0 && step % h->steps == 0) bits |= save;", "", "no checkpoint by steps"),
         ("        save_signal = 0;\n        bits", "        bits", "a checkpoint at every step after a signal"),

@@ -248,7 +248,8 @@ def report(mutants, kept, table):
         with open(table, "w", newline="") as f:
             rows = csv.writer(f, lineterminator="\n")
             rows.writerow(["file", "mutant", "outcome", "by"])
-            rows.writerows([m[0], m[3], kind, words] for m, kind, words in sorted(found, key=lambda r: r[0][:3]))
+            rows.writerows([m[0], m[3], kind, words] for m, kind, words in sorted(found, key=lambda r: r[0][:3])
+                           if kind != "not run")
     run_, wrong = n.total() - n["not run"], n["killed"] + n["survives"]
     print(f"{n.total()} mutants, {run_} run, {n['killed']} killed, {n['survives']} survive, {n['equivalent']} "
           f"equivalent ({100 * n['killed'] / max(1, wrong):.1f} % of those that are wrong)")

@@ -68,6 +68,15 @@ def test_an_attempt_is_on_the_disk_before_it_begins(scenarios):
         assert after.name in faults.SYNCS and after.path == calls[k].path and after.result == 0
 
 
+def test_a_signal_brings_one_checkpoint(scenarios):
+    """SIGUSR1 while the first checkpoint is written: another after the next step, and none more."""
+    scenario, calls = scenarios("run")
+    def checkpoints(log):
+        return sum(c.name.startswith("rename") and c.path.endswith("/checkpoint.h5.tmp") for c in log)
+    assert scenario.strike("SIGUSR1", ("rename", "renameat"), 3) == "done"
+    assert checkpoints(faults.logged(scenario.base / "log")) == checkpoints(calls) + 1
+
+
 def test_the_old_result_goes_last(scenarios):
     """None of it is removed before the checkpoint of the new one has its name for good."""
     _, calls = scenarios("run --force")
