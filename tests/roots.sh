@@ -34,7 +34,7 @@ megabytes() { du -smx "$1" | cut -f 1; }
 # shellcheck disable=SC2016  # the variables are those of the shell in the root
 tests='cd /src && make -j2 all tests && failed=0
 for t in $(find build/release/tests/unit build/release/tests/physics -name "test_*" -executable) \
-    build/release/tests/fuzz/test_corpus; do timeout 300 $t || { echo "FAILED $t"; failed=1; }; done
+    build/release/tests/fuzz/test_corpus; do timeout 1200 $t || { echo "FAILED $t, code $?"; failed=1; }; done
 state() { sed -n "s/.*state_hash\": \"\(.*\)\".*/\1/p" /out/summary.json; }
 run="build/release/bergtow run cases/basin/basin-50.yml --steps 60 -o /out --force --quiet"
 $run && one=$(state) && mpirun --oversubscribe -n 2 $run && echo "states $one $(state)" && [ "$one" = "$(state)" ] &&
