@@ -192,14 +192,9 @@ def limits(points, log):
     return max(seen.min(), 0.05 * floor) / 2.5, 2.5 * seen.max()
 
 
-def draw(points, log=True):
-    """The figure of resistance against concentration."""
-    check_alike(points)
-    low, high = limits(points, log)
-    factor, unit = style.scale([high / 3 if log else high], "N")
-    figure = plt.figure(figsize=(11, 7))
-    axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
-    draw_estimates(axes, points, factor)
+def draw_runs(axes, points, factor, low, log):
+    """The runs with their intervals, means of several and what was measured; returns how many have no place in the
+    picture."""
     a = np.array([p.concentration for p in points])
     mean = np.array([p.mean for p in points])
     below, above = (np.nan_to_num(np.array(x))
@@ -240,21 +235,11 @@ def draw(points, log=True):
                   markersize=6,
                   zorder=6,
                   label="measured")
-    if log:
-        style.logarithmic(axes.yaxis)
-    axes.set_ylim(low / factor, high / factor)
-    axes.set_xlim(0, 1)
-    axes.set_xlabel("ice concentration")
-    axes.set_ylabel(f"mean ice resistance ({unit})")
-    axes.grid(which="major")
-    handles, labels, lost = style.legend_of(axes)
-    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("simulated"))
-    axes.legend([handles[i] for i in order], [labels[i] for i in order],
-                loc="upper left",
-                bbox_to_anchor=(1.02, 1.0),
-                borderaxespad=0,
-                handlelength=2.4,
-                labelspacing=0.8)
+    return np.count_nonzero(~shown)
+
+
+def write_around(figure, points, lost, hidden):
+    """Heading and notes. lost: legends of what is beyond the axes; hidden: runs that are."""
     e = points[0].conditions
     figure.text(
         0.02,
@@ -273,12 +258,39 @@ def draw(points, log=True):
     notes += ["out of the picture:", *lost] if lost else []
     if e["length_scale"] != 1:
         notes.append(f"P*, P_s by length scale {e['length_scale']:.3g}")
-    if not shown.all():
-        notes.append(f"{(~shown).sum()} run(s) without resistance not shown")
+    if hidden:
+        notes.append(f"{hidden} run(s) without resistance not shown")
     doubtful = sum(p.warnings > 0 for p in points)
     if doubtful:
         notes.append(f"{doubtful} of {len(points)} runs carry warnings")
     figure.text(0.735, 0.1, "\n".join(notes), va="bottom", fontsize=9, color=style.FAINT)
+
+
+def draw(points, log=True):
+    """The figure of resistance against concentration."""
+    check_alike(points)
+    low, high = limits(points, log)
+    factor, unit = style.scale([high / 3 if log else high], "N")
+    figure = plt.figure(figsize=(11, 7))
+    axes = figure.add_axes((0.085, 0.1, 0.63, 0.755))
+    draw_estimates(axes, points, factor)
+    hidden = draw_runs(axes, points, factor, low, log)
+    if log:
+        style.logarithmic(axes.yaxis)
+    axes.set_ylim(low / factor, high / factor)
+    axes.set_xlim(0, 1)
+    axes.set_xlabel("ice concentration")
+    axes.set_ylabel(f"mean ice resistance ({unit})")
+    axes.grid(which="major")
+    handles, labels, lost = style.legend_of(axes)
+    order = sorted(range(len(labels)), key=lambda i: not labels[i].startswith("simulated"))
+    axes.legend([handles[i] for i in order], [labels[i] for i in order],
+                loc="upper left",
+                bbox_to_anchor=(1.02, 1.0),
+                borderaxespad=0,
+                handlelength=2.4,
+                labelspacing=0.8)
+    write_around(figure, points, lost, hidden)
     return figure
 
 
