@@ -51,7 +51,8 @@ static bool holds(const bt_batch *o, bt_idx body)
     return false;
 }
 
-/// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there, have none.
+/// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
+/// have none.
 static void put_push(bt_batch *o, int l, const bt_contact *u, const bt_gaps *g, double slop)
 {
     o->mu[l] = slop;
@@ -316,8 +317,9 @@ BT_INLINE vec push(bt_batch *o, bt_vel *d)
     const vec zero = {0};
     vec most = zero;
     for (int i = 0; i < 2; i++) {
-        const vec open = o->nx * (b.x - a.x) + o->ny * (b.y - a.y) + o->rbn[i] * b.w - o->ran[i] * a.w + o->bias[i] + o->mu;
-        const vec p = bt_larger(zero, o->x[i] - open * o->mn[i]), step = p - o->x[i], x = step * o->nx, y = step * o->ny;
+        const vec un = o->nx * (b.x - a.x) + o->ny * (b.y - a.y) + o->rbn[i] * b.w - o->ran[i] * a.w;
+        const vec open = un + o->bias[i] + o->mu, p = bt_larger(zero, o->x[i] - open * o->mn[i]), step = p - o->x[i];
+        const vec x = step * o->nx, y = step * o->ny;
         a.x -= o->ma * x;
         a.y -= o->ma * y;
         a.w -= o->ia * (step * o->ran[i]);

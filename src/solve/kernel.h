@@ -131,8 +131,8 @@ static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double sl
     return bt_normal_velocity(u, i, da, db) + g->after[i] + slop;
 }
 
-/// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the largest
-/// correction, m.
+/// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the
+/// largest correction, m.
 static inline double bt_push_contact(const bt_contact *u, bt_gaps *g, double slop, bt_vel *d, const bt_inv *inv)
 {
     bt_vel da = d[u->a], db = d[u->b];

@@ -194,7 +194,7 @@ static void move_bodies(bt_world *w, bt_idx k, const void *context, bt_totals *t
     if (!cell->work.swept) return;
     const double beta = cell->work.still ? 0 : m->beta;
     cell->work.still = false;
-    if (cell->end > cell->first) move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
+    move_on_bodies(m->vel + cell->first, m->before + cell->first, cell->end - cell->first, beta);
 }
 
 /// Returns the largest update.

@@ -29,8 +29,8 @@
 // has not converged within the limit of work gets three tenths of it more without momentum, which circles far from the
 // solution where it does not converge.
 //
-// A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the unknowns
-// of the best residual pass are kept, from half of the work on, and are the result.
+// A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the
+// unknowns of the best residual pass are kept, from half of the work on, and are the result.
 //
 // When few contacts are left that are far from the tolerance, every second round is over the cells about them alone.
 //
@@ -48,9 +48,9 @@
 // of the velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which
 // a handful of contacts is left, but where a wedge drives its impulses up over thousands of sweeps a Newton step takes
 // as long as a hundred sweeps and the wedge needs as many steps as contacts change their state. At equal work more
-// steps missed the tolerance with them than without. Extrapolation of the last two rounds of plain sweeps along their
-// difference (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after it
-// are where they were before. Going back to the best unknowns whenever the residual has risen: more steps missed.
+// steps missed the tolerance with them than without. Extrapolation of two rounds of plain sweeps along their difference
+// (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after it are where
+// they were before. Going back to the best unknowns whenever the residual has risen: more steps missed.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 

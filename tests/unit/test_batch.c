@@ -95,7 +95,8 @@ static void fill(knot_of_floes *s, uint64_t *rng, double listed)
         s->v[i] = (bt_vel){any(rng), any(rng), any(rng), 0};
     }
     s->cell =
-        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .work.before = s->before, .work.list = s->list};
+        (bt_cell){.contacts = s->contacts, .gaps = s->gaps, .n_contacts = CONTACTS, .work.before = s->before,
+                  .work.list = s->list};
     for (bt_idx i = 0; i < CONTACTS; i++) {
         s->contacts[i] = random_contact(rng, s->inv);
         for (int c = 0; c < 3; c++) s->before[i][c] = any(rng);
