@@ -48,9 +48,9 @@
 // of the velocities, unsymmetric where contacts slide, factorised by nested dissection): two of them end a jam of which
 // a handful of contacts is left, but where a wedge drives its impulses up over thousands of sweeps a Newton step takes
 // as long as a hundred sweeps and the wedge needs as many steps as contacts change their state. At equal work more
-// steps missed the tolerance with them than without. Extrapolation of two rounds of plain sweeps along their difference
-// (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after it are where
-// they were before. Going back to the best unknowns whenever the residual has risen: more steps missed.
+// steps missed the tolerance with them than without. Extrapolation of two rounds of plain sweeps along their
+// difference (Aitken; it shrinks by 2 % a round): contacts change their state all along that way, and the rounds after
+// it are where they were before. Going back to the best unknowns whenever the residual has risen: more steps missed.
 #ifndef BERGTOW_ROUNDS_H
 #define BERGTOW_ROUNDS_H
 
