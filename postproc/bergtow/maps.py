@@ -42,7 +42,7 @@ def outlines(map: str | os.PathLike[str], file: str | os.PathLike[str], *, repla
     """Floe outlines for a case from a map: any vector format that GDAL knows (shapefile, GeoPackage, ...) or an image
     of labels, in any coordinate reference system, repaired with every change counted.
 
-        floes = bergtow.outlines("ice.gpkg", "floes.geojson", centre=(-12, 80), box=("1.1 km", "900 m"))
+        floes = bergtow.outlines("mosaic.gpkg", "floes.geojson", centre=(-12, 80), box=("1.1 km", "900 m"))
         case = bergtow.Case({"ice": {"outlines": "floes.geojson", ...}, ...})
 
     file: GeoJSON to write. options: those of `bergtow outlines`, where pairs may be tuples: centre, heading, crs,
