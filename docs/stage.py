@@ -81,6 +81,9 @@ The package `bergtow` of postproc/. How to install it, and examples: [the librar
    :members:
    :undoc-members:
    :imported-members:
+
+.. autodata:: bergtow.Force
+   :no-value:
 ```
 """)
     gallery(reference)

@@ -179,6 +179,34 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
     assert any(int(held) < int(n) for held, n, _ in said)
 
 
+def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
+    """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
+    theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")
+
+    def fails(name, between=lambda sim: None, **more):
+        with pytest.raises(bergtow.BergtowError) as raised:
+            with bergtow.Simulation(CLOSING, tmp_path / name, **more) as sim:
+                sim.step(9)
+                between(sim)
+                sim.step(sim.steps_left)
+        file = tmp_path / name / "failure.h5"
+        assert raised.value.status == NUMERIC and (str(file) in str(raised.value)) == file.exists()
+        return file, re.search(r"step \d+: floe", str(raised.value))[0]
+
+    def push(sim):
+        sim.set_velocity(0, 0.5, 0)
+
+    for name, between in {"begun": lambda sim: None, "kept": bergtow.Simulation.checkpoint,
+                          "pushed": lambda sim: (push(sim), sim.checkpoint())}.items():
+        file, step = fails(name, between)
+        assert step in call("resume", file, "--quiet").stderr
+        there = [n for n in differing(theirs.dir / "failure.h5", file)
+                 if not n.startswith(("/about", "/case", "/clock"))]
+        assert (there == []) == (name != "pushed")
+    assert not fails("changed", push)[0].exists()
+    assert not fails("forced", forces={"nothing": lambda bodies: None})[0].exists()
+
+
 # --- forces ----------------------------------------------------------------------------------------------------------
 
 @pytest.mark.parametrize("case", [SHORT, LINE, WINDOW], ids=["speed", "line", "window"])
@@ -299,34 +327,6 @@ def test_a_moment_may_be_returned():
             assert np.median(gained) == pytest.approx(0.5, rel=0.05)
             hashes.append(sim.state_hash)
     assert hashes[0] == hashes[1]
-
-
-def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
-    """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
-    theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")
-
-    def fails(name, between=lambda sim: None, **more):
-        with pytest.raises(bergtow.BergtowError) as raised:
-            with bergtow.Simulation(CLOSING, tmp_path / name, **more) as sim:
-                sim.step(9)
-                between(sim)
-                sim.step(sim.steps_left)
-        file = tmp_path / name / "failure.h5"
-        assert raised.value.status == NUMERIC and (str(file) in str(raised.value)) == file.exists()
-        return file, re.search(r"step \d+: floe", str(raised.value))[0]
-
-    def push(sim):
-        sim.set_velocity(0, 0.5, 0)
-
-    for name, between in {"begun": lambda sim: None, "kept": bergtow.Simulation.checkpoint,
-                          "pushed": lambda sim: (push(sim), sim.checkpoint())}.items():
-        file, step = fails(name, between)
-        assert step in call("resume", file, "--quiet").stderr
-        there = [n for n in differing(theirs.dir / "failure.h5", file)
-                 if not n.startswith(("/about", "/case", "/clock"))]
-        assert (there == []) == (name != "pushed")
-    assert not fails("changed", push)[0].exists()
-    assert not fails("forced", forces={"nothing": lambda bodies: None})[0].exists()
 
 
 def test_what_goes_wrong_in_a_force_is_told():
