@@ -195,6 +195,9 @@ typedef struct bt_forces {
     const bt_force_law *failed; ///< a law whose `begin` has failed, and why; NULL = none
     const char *why;
     double towed_at[2];        ///< where the towed body stands, not wrapped, m; NaN until the first step
+    /// in this step or before: a checkpoint names the added laws that have. Applied forces (bergtow/applied.h) act from
+    /// the first step with a row that is not 0, all other laws always.
+    bool acted[BT_MAX_FORCE_LAWS];
     double own[BT_MAX_FORCE_LAWS][BT_MAX_FORCE_OWN];
     /// as really used by the step: what is implicit with U2; their sum with those of contacts and line is M (U2 − U1),
     /// I (ω2 − ω1)

@@ -12,6 +12,7 @@
 
 #include "bergtow/forces.h"
 #include "base/name.h"
+#include "force/added.h"
 #include "force/load.h"
 #include "partition/domain.h"
 
@@ -128,6 +129,13 @@ static bool rests(const bt_params *p, const double *own)
 {
     (void)p;
     return own[ACTS] == 0;
+}
+
+bool bt_force_waits(const bt_force_law *law, const double *own) { return law->begin == begin && own[ACTS] == 0; }
+
+bool bt_force_is_released(const bt_force_law *law)
+{
+    return law->begin == begin && !((const slot *)law->context)->force;
 }
 
 static slot *find(const char *name)

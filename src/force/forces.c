@@ -4,6 +4,7 @@
 
 #include <math.h>
 
+#include "force/added.h"
 #include "force/laws.h"
 #include "force/load.h"
 #include "space/cells.h"
@@ -71,6 +72,7 @@ void bt_forces_begin(bt_world *w)
         const bt_force_law *law = bt_force_laws[k];
         const char *why = law->begin ? law->begin(w, f->own[k], law->context) : NULL;
         if (why) f->failed = law, f->why = why;
+        f->acted[k] |= !bt_force_waits(law, f->own[k]);
     }
     if (!rested || bt_forces_rest(w)) return;
     bt_cells_wake_all(w->cells);

@@ -88,6 +88,7 @@ bt_forces *bt_forces_create(void)
     f->n = bt_n_force_laws;
     f->n_series = bt_n_force_series;
     f->towed_at[0] = f->towed_at[1] = NAN;
+    for (int k = 0; k < f->n; k++) f->acted[k] = !bt_force_laws[k]->begin;
     return f;
 }
 

@@ -59,6 +59,7 @@ static const row rows[] = {
     {"contacts/part", "1", "convex part of each of the two bodies"},
     {"contacts/law", "1", "index of the contact law that has the memory"},
     {"contacts/added_laws", NULL, "contact laws that the program added, in the order of their indices"},
+    {"forces/added_laws", NULL, "force laws that the program added and that have acted, in order"},
     {"contacts/points", "1", "contact points, 1 or 2"},
     {"contacts/feature", "1", "edge or corner by which a point is known again"},
     {"contacts/value", "1", "numbers that the law keeps, in its own units (N s for impulses)"},

@@ -66,10 +66,12 @@ bt_status bt_record_publish(bt_record *r, bt_errors *err)
 /// A force that the run had not: it was 0.
 static bool was_zero(const bt_quantity *q) { return q->role == BT_ROLE_BALANCE; }
 
+/// NaN: a force on the towed body where there is none.
 static bool all_zero(const bt_item *i)
 {
     for (int64_t k = 0; k < i->n; k++)
-        if (i->type != BT_ITEM_F64 || ((const double *)i->data)[k] != 0) return false;
+        if (i->type != BT_ITEM_F64 || !(isnan(((const double *)i->data)[k]) || ((const double *)i->data)[k] == 0))
+            return false;
     return true;
 }
 

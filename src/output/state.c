@@ -11,6 +11,8 @@
 
 #include "bergtow/contact.h"
 #include "contact/law.h"
+#include "force/added.h"
+#include "force/laws.h"
 #include "loads/impact.h"
 #include "space/cells.h"
 #include "tow/tow.h"
@@ -20,6 +22,7 @@
 
 #define MEMBER(struct_, label, type_, width_, member) {label, BT_ITEM_##type_, width_, offsetof(struct_, member)}
 #define ADDED_LAWS "contacts/added_laws"
+#define ADDED_FORCES "forces/added_laws"
 #define N_OF(table) ((int)(sizeof(table) / sizeof *(table)))
 
 // --- the tables ------------------------------------------------------------------------------------------------------
@@ -335,6 +338,42 @@ static void check_added_laws(bt_snapshot *s)
     free(now);
 }
 
+/// Names of the force laws of a program that have acted, in the order in which they add.
+static char *added_forces(const bt_forces *f)
+{
+    bt_text t;
+    bt_text_begin(&t);
+    const char *comma = "";
+    for (int k = BT_LISTED_LAWS; k < f->n; k++) {
+        if (!f->acted[k]) continue;
+        fprintf(t.out, "%s%s", comma, bt_force_laws[k]->name);
+        comma = ", ";
+    }
+    return bt_text_end(&t);
+}
+
+/// Without a force the run would be another run, and with another order of sums it would have other bits. Forces that
+/// come later are welcome.
+static void load_added_forces(bt_forces *f, bt_snapshot *s)
+{
+    if (!bt_snapshot_find(s, ADDED_FORCES)) return; // none, or a checkpoint of before they were named
+    const char *then = bt_snapshot_text(s, ADDED_FORCES), *next = then;
+    for (int k = BT_LISTED_LAWS; k < f->n && *next; k++) {
+        const size_t n = strlen(bt_force_laws[k]->name);
+        if (bt_force_is_released(bt_force_laws[k]) || strncmp(next, bt_force_laws[k]->name, n)) continue;
+        if (next[n] && next[n] != ',') continue;
+        f->acted[k] = true;
+        next += next[n] ? n + 2 : n;
+    }
+    if (!*next) return;
+    if (s->err)
+        bt_errors_add(s->err,
+                      "%s: the run had %s, which a program had added (force laws, in this order); go on in one that "
+                      "adds the same in the same order",
+                      s->path, then);
+    s->faulty = true;
+}
+
 static void save_contacts(const bt_world *w, const bt_comm *c, bt_snapshot *s)
 {
     int64_t n, all;
@@ -367,6 +406,9 @@ bt_status bt_state_save(const bt_world *w, const bt_comm *c, bt_snapshot *s, bt_
     const bt_status status = save_bodies(w, c, s, err);
     save_contacts(w, c, s);
     if (c->rank != 0) return status;
+    char *forces = added_forces(w->forces);
+    if (*forces) bt_snapshot_add_text(s, ADDED_FORCES, forces);
+    free(forces);
     bt_snapshot_add_rows(s, "world", world_rows, N_OF(world_rows), w);
     bt_snapshot_add_int(s, "world/hash", (int64_t)hash);
     bt_snapshot_add_rows(s, "step", par_rows, N_OF(par_rows), &w->par);
@@ -459,6 +501,7 @@ bt_status bt_state_load(bt_world *w, const bt_comm *c, bt_snapshot *s, bt_errors
     int64_t n = -1;
     renew_contacts(s);
     if (!s->faulty) check_added_laws(s);
+    if (!s->faulty) load_added_forces(w->forces, s);
     bt_memory *memory = load_columns(s, "contacts", memory_columns, N_OF(memory_columns), sizeof *memory, &n);
     if (!s->faulty) bt_state_check(w, memory, n, w->impacts && c->rank == 0, s);
     bt_status status = bt_comm_agree(c, s->faulty ? BT_ERR_CASE : BT_OK);

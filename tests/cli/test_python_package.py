@@ -154,7 +154,36 @@ with bergtow.Simulation.resume("later", forces=dict(push=push), threads=1) as si
     shutil.copytree(tmp_path / "part", tmp_path / "copy")
     shutil.copy(tmp_path / "early.h5", tmp_path / "copy")
     result = call("resume", tmp_path / "copy/early.h5")
-    assert result.returncode == CASE and "the run had push_force, which a program had added" in result.stderr
+    assert result.returncode == CASE and "the run had push, which a program had added" in result.stderr
+
+
+def test_a_force_that_has_acted_is_named_and_wanted(tmp_path):
+    """One on a floe alone, where every series of forces is 0 or NaN; none where a force of the process was silent."""
+    script = tmp_path / "save.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow
+def nudge(bodies): bodies.force[bodies.id == 3, 1] += 1e-3
+def still(bodies): pass
+for name, forces in dict(nudged=dict(still=still, nudge=nudge), silent=dict(still=still)).items():
+    with bergtow.Simulation({SHORT!r}, name, forces=forces, threads=1) as sim:
+        sim.step(10)
+        sim.checkpoint()
+        sim.drop()
+with bergtow.Simulation.resume("nudged", forces=dict(still=still, nudge=nudge), threads=1) as sim:
+    sim.step(1)
+    sim.drop()
+try:
+    bergtow.Simulation.resume("nudged", threads=1)
+except bergtow.BergtowError as error:
+    print(error)
+""")
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "the run had nudge, which a program had added" in result.stdout
+    refused = call("resume", tmp_path / "nudged", "--quiet")
+    assert refused.returncode == CASE and "the run had nudge, which a program had added" in refused.stderr
+    assert call("resume", tmp_path / "silent", "--quiet").returncode == 0
 
 
 def test_two_ranks_have_the_state_of_one(tmp_path):
@@ -182,6 +211,8 @@ with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1)
 def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
     """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
     theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")
+    with bergtow.Simulation(SHORT, threads=1, forces={"over": lambda bodies: bodies.force.__iadd__(1)}) as sim:
+        sim.step(1)  # what has acted elsewhere in this process, and is over, does not make a state one of its own
 
     def fails(name, between=lambda sim: None, **more):
         with pytest.raises(bergtow.BergtowError) as raised:
