@@ -38,11 +38,26 @@ extern "C" {
 enum {
     BT_MAX_ATTEMPTS = 20,     ///< of a member whose process dies each time
     BT_SUSPECT_ATTEMPTS = 10, ///< from here on it is run while no other of its kind is
+    BT_MAX_JOBS = 1024,       ///< processes of one call
 };
+
+/// How a call without a launcher gets further processes on this machine to share its members, each a call of its own
+/// on the same folder with `job`.
+typedef struct bt_ensemble_helpers {
+    void (*start)(void *of, int n, int threads); ///< n processes of so many threads
+    void (*end)(void *of, bool stop);            ///< wait until they have ended; stop: and ask them to
+    void *of;
+} bt_ensemble_helpers;
 
 typedef struct bt_ensemble_options {
     const char *dir;
-    int threads;              ///< of each rank, 0 = the cores of the node shared by its ranks
+    /// of each rank, 0 = run.threads of the base case, or OMP_NUM_THREADS, or the cores of the node shared by its ranks
+    int threads;
+    /// processes on this machine, 0 = without threads that somebody has asked for, as many as the cores are enough for
+    /// with the threads that the floes of a member keep busy; otherwise 1
+    int jobs;
+    const bt_ensemble_helpers *helpers; ///< NULL = 1 job
+    bool job;                           ///< this call is one of a helper: it reports members alone
     bool quiet;
     bool retry;               ///< failed members are tried again
     /// end when nothing is left to begin, even if other processes are still at work on members

@@ -15,16 +15,20 @@
 
 #include "bergtow/checkpoint.h"
 #include "bergtow/run.h"
+#include "case/case_derived.h"
 #include "case/cost.h"
 #include "run/ensemble_member.h"
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
 #include "base/json.h"
+#include "base/launcher.h"
 
 // Wall time between two looks at ensemble.h5: 1 s or more, and so much that they take a twentieth of it.
 #define GATHER_SECONDS 1.0
 #define GATHER_SHARE 0.05
 enum { MOST_REPORTED = 10 }; // failed members that are reported one by one
+// Two threads do 1.85 times the work of one from some 30,000 floes on, two processes twice at any size.
+#define FLOES_OF_A_THREAD 15000.0
 
 typedef struct {
     bt_member m;
@@ -43,7 +47,8 @@ typedef struct {
     entry *list;        ///< [n] in the order in which they are taken
     int64_t n, before;  ///< members; settled when this call began
     double cost_before; ///< of those
-    int n_groups, of_group, threads, lock; ///< lock: descriptor held for the member at hand
+    double most_floes;  ///< of the member with the most
+    int n_groups, of_group, threads, jobs, lock; ///< lock: descriptor held for the member at hand
     /// descriptor held by the one group that may work on members that look hopeless, −1 = not this one
     int alone;
     int64_t lost;       ///< members whose failure could not be recorded
@@ -187,7 +192,9 @@ static void make_list(ensemble *e)
             bt_case c;
             bt_errors unheard = {0};
             priced = x->m.condition;
-            cost = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK ? bt_cost_seconds(&c) : 0;
+            const bool read = bt_member_case(e->s, &x->m, &c, &unheard) == BT_OK;
+            cost = read ? bt_cost_seconds(&c) : 0;
+            if (read) e->most_floes = bt_max(e->most_floes, bt_case_expected_floes(&c) + (double)c.n_floes);
             bt_case_free(&c);
             bt_errors_free(&unheard);
         }
@@ -540,7 +547,7 @@ static bool wait_for_others(ensemble *e, bool told_of)
     }
     bt_comm_bcast(e->world, &n, sizeof n);
     if (n == 0) return false;
-    if (!told_of && !e->o->quiet && e->world->rank == 0) {
+    if (!told_of && !e->o->quiet && e->jobs == 1 && e->world->rank == 0) {
         printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
         fflush(stdout);
     }
@@ -548,15 +555,32 @@ static bool wait_for_others(ensemble *e, bool told_of)
     return true;
 }
 
-/// As for a run of the base case.
+/// As for a run of the base case. *open: nobody has asked for a number.
 static bt_status choose_threads(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, int *threads,
-                                bt_errors *err)
+                                bool *open, bt_errors *err)
 {
     bt_case c;
     const bt_status status = bt_study_base_case(s, &c, err);
-    if (status == BT_OK) *threads = bt_run_threads(comm, &c, o->threads);
+    if (status == BT_OK) {
+        *threads = bt_run_threads(comm, &c, o->threads);
+        *open = o->threads == 0 && c.run.threads == 0 && !getenv("OMP_NUM_THREADS");
+    }
     bt_case_free(&c);
     return status;
+}
+
+/// Members have as many threads as their floes keep busy, and the other cores go to other members. open: the number of
+/// threads is.
+static void share_cores(ensemble *e, bool open)
+{
+    const bt_ensemble_options *o = e->o;
+    e->jobs = 1;
+    if (!o->helpers || o->job || o->max_steps > 0 || bt_launcher_find().found) return;
+    const double busy = bt_max(1, ceil(e->most_floes / FLOES_OF_A_THREAD));
+    const double left = bt_max(1, (double)(e->n - e->before)),
+                 most = o->jobs ? o->jobs : open ? floor(e->threads / busy) : 1;
+    e->jobs = (int)bt_max(1, bt_min(most, left));
+    if (open) e->threads = bt_max(1, e->threads / e->jobs);
 }
 
 bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensemble_options *o, bt_errors *err)
@@ -564,7 +588,8 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     bt_status status = bt_study_fits(s, comm->size, err);
     bt_member_records records = {0};
     int threads = 1;
-    if (status == BT_OK) status = choose_threads(comm, s, o, &threads, err);
+    bool open = false;
+    if (status == BT_OK) status = choose_threads(comm, s, o, &threads, &open, err);
     if (status == BT_OK && comm->rank == 0) status = prepare_folder(s, o, err);
     if (status == BT_OK) status = bt_member_records_begin(&records, s, err);
     status = bt_comm_agree(comm, status);
@@ -594,10 +619,11 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     if (o->retry)
         for (int64_t i = 0; i < e.n; i++)
             e.list[i].settled = bt_ensemble_state(e.list[i].folder, NULL, NULL) != BT_MEMBER_WAITING;
-    if (comm->rank == 0 && !o->quiet) {
+    share_cores(&e, open);
+    if (comm->rank == 0 && !o->quiet && !o->job) {
         printf("%" PRId64 " members: %" PRId64 " conditions x %" PRId64 " fields, %" PRId64
                " settled before; %d at a time, %" PRId64 " ranks x %d threads each\n",
-               e.n, s->n_conditions, s->repeats, e.before, e.n_groups, s->ranks, e.threads);
+               e.n, s->n_conditions, s->repeats, e.before, e.n_groups * e.jobs, s->ranks, e.threads);
         fflush(stdout);
     }
     if (comm->rank == 0) gather(&e, false); // after a kill the file may be behind
@@ -605,6 +631,8 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
     sigemptyset(&act.sa_mask);
     stop_signal = 0;
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &act, &before[k]);
+    const bool helped = e.jobs > 1;
+    if (helped) o->helpers->start(o->helpers->of, e.jobs - 1, e.threads);
     bool others = false;
     do {
         if (!idle) status = work(&e);
@@ -612,12 +640,13 @@ bt_status bt_ensemble_run(const bt_comm *comm, const bt_study *s, const bt_ensem
         status = bt_comm_agree(comm, status);
         others = status == BT_OK && !o->leave && o->max_steps == 0 && wait_for_others(&e, others);
     } while (others);
+    if (helped) o->helpers->end(o->helpers->of, status != BT_OK);
     for (int k = 0; k < N_CAUGHT; k++) sigaction(caught[k], &before[k], NULL);
     if (e.alone >= 0) close(e.alone);
     share_records(&e);
     if (comm->rank == 0) {
         const bt_status gathered = gather(&e, true);
-        status = tell_end(&e, status, err);
+        if (!o->job) status = tell_end(&e, status, err);
         if (status == BT_OK) status = gathered;
     }
     bt_comm_split_end(&group);
