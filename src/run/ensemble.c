@@ -34,6 +34,7 @@ typedef struct {
     bt_member m;
     int64_t index; ///< among the members of the study
     char *folder;
+    int64_t turn;  ///< repeat where wall time is limited: a call that is stopped leaves whole fields; otherwise 0
     double cost;   ///< estimated, s of one core
     bool settled;  ///< finished or failed, as far as this process knows
     bool paused;   ///< has done the steps that this call was to do
@@ -94,6 +95,7 @@ static int by_cost(const void *a, const void *b)
     const entry *p = a, *q = b;
     const int doubt[2] = {(p->attempts > 0) + suspect(p), (q->attempts > 0) + suspect(q)};
     if (doubt[0] != doubt[1]) return doubt[0] - doubt[1]; // those whose process died come last
+    if (p->turn != q->turn) return p->turn < q->turn ? -1 : 1;
     if (p->cost != q->cost) return p->cost > q->cost ? -1 : 1;
     return strcmp(p->m.name, q->m.name);
 }
@@ -199,6 +201,7 @@ static void make_list(ensemble *e)
             bt_errors_free(&unheard);
         }
         x->cost = cost;
+        x->turn = e->o->max_wall > 0 ? x->m.repeat : 0;
         x->attempts = bt_member_attempts(x->folder);
         look(x);
     }

@@ -19,8 +19,9 @@
 #define LEAST_CAP 0.3   // less is none
 #define CALM 0.3         // of the limit of work, beyond it
 #define HARD 0.5         // of the limit of work: from here on the best unknowns are kept
+#define FAR 4            // tolerances: a residual that is not left at the limit of work
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
-enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100 };
+enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
 
 // Squares in units in which that of the tolerance is 2²⁰: kept to twelve digits from 10⁻⁷ times the tolerance on. What
 // a cell adds ends at 2⁴⁵, some 6,000 times the tolerance: beyond, the root mean square is a lower bound. Energies: the
@@ -309,7 +310,8 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     double best = INFINITY;
     const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
     // between them no momentum
-    const double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
+    double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
+    int more = 0; // further attempts
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
@@ -325,9 +327,15 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         all = !part;
         bt_rounds_residual(w, p, settled, work);
         if (p->keep && !p->plain && spent(p, work) > calm - HARD * all_work) keep_better(w, p, work, &best);
-        if (settled || work->residual > p->tolerance) continue;
-        bt_rounds_residual(w, p, true, work);
-        settled = true;
+        if (!settled && work->residual <= p->tolerance) {
+            bt_rounds_residual(w, p, true, work);
+            settled = true;
+        }
+        if (spent(p, work) < limit || bt_min(best, work->residual) <= FAR * p->tolerance) continue;
+        if (p->plain || !p->keep || more++ == MOST_MORE) continue;
+        a = (pace){.cap = p->cap, .mark = INFINITY, .length = p->length};
+        all = false;
+        calm = spent(p, work) + HARD * all_work, limit = calm + CALM * all_work;
     }
     if (!settled) bt_rounds_residual(w, p, true, work);
     back_to_best(w, p, work, best);

@@ -27,7 +27,8 @@
 // chains of many floes, and heavy bodies that press on light ones, are not circling but slow, and converge with β near
 // 1 alone (a row of 5 floes under 10⁴ times their mass: 13,000 sweeps, where plain ones need more than 500,000). What
 // has not converged within the limit of work gets three tenths of it more without momentum, which circles far from the
-// solution where it does not converge.
+// solution where it does not converge. Where the result is still more than four tolerances off, the whole starts anew
+// with half of the work, at most twice.
 //
 // A jam that does not converge within its work wanders: its residual rises and falls by a factor of ten. So the
 // unknowns of the best residual pass are kept, from half of the work on, and are the result.

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // What rounds do when the work is spent: on made-up problems whose residual after each sweep is given. Tried: unknowns
-// never kept, kept from the first sweep on, not put back, and put back although the problem is solved: each red.
+// never kept, kept from the first sweep on, not put back, and put back although the problem is solved; no further
+// attempts, one for ever, and further ones although the result is near: each red.
 #include "scene.h"
 
 #include "solve/rounds.h"
 
-enum { SWEEPS = 40 };
+enum { SWEEPS = 160 };
 
 /// A problem with one unknown, the number of the sweep that it comes from.
 static struct {
@@ -100,6 +101,21 @@ static void a_better_end_stays(void **state)
     assert_int_equal(made_up.puts, 1);
 }
 
+static void a_result_far_off_has_further_attempts(void **state)
+{
+    (void)state;
+    double r[SWEEPS];
+    script(r, (double[]){31, 3.5, -1}); // in the first of them: ten sweeps with momentum, six without
+    CHECK_CLOSE(run(r), 3.5, 0);
+    assert_int_equal(made_up.sweeps, 26 + 16);
+    script(r, (double[]){-1}); // in none of two
+    CHECK_CLOSE(run(r), 9, 0);
+    assert_int_equal(made_up.sweeps, 26 + 2 * 16);
+    script(r, (double[]){50, 0.5, -1});
+    CHECK_CLOSE(run(r), 0.5, 0);
+    assert_int_equal(made_up.sweeps, 51);
+}
+
 static void a_solution_is_kept_whatever_came_before(void **state)
 {
     (void)state;
@@ -115,6 +131,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_best_of_the_second_half_is_the_result),
         cmocka_unit_test(a_better_end_stays),
+        cmocka_unit_test(a_result_far_off_has_further_attempts),
         cmocka_unit_test(a_solution_is_kept_whatever_came_before),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
