@@ -14,7 +14,8 @@ PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
 FILES = ["cli/test_faults.py", "cli/test_replace.py"]
-ENDS = ["cli/test_faults.py::test_what_is_made_stands_in_this_order", "cli/test_faults.py::test_the_old_result_goes_last",
+ENDS = ["cli/test_faults.py::test_what_is_made_stands_in_this_order",
+        "cli/test_faults.py::test_the_old_result_goes_last",
         "cli/test_faults.py::test_the_other_rank_syncs_its_frames_at_each_checkpoint"]
 OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
            "scenes:line_bridle_breaks,thrust,impacts_sine"]

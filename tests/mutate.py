@@ -37,7 +37,7 @@ PAST = HERE / "past.json"
 SEED = 20
 # Seconds of a clock, generous since a busy machine must not kill a mutant; what computes without an end is stopped by
 # its processor time: scenes take half a second of it, the slowest test of a part twenty.
-PATIENCE = {"build": 900, "program": 900, "pytest": 3600, "scene": 180}
+PATIENCE = {"build": 900, "program": 900, "pytest": 3600, "scene": 600}
 PROCESSOR = {"program": 60, "scene": 15}
 # (ranks, threads) of the legs of a run; what ranks break shows on three of them, threads alone hardly tell anything
 LAYOUTS = {"scenes": [((1, 1),)], "legs": [((1, 1), (1, 1))], "ranks": [((3, 2), (2, 1)), ((1, 2),)]}
