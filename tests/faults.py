@@ -407,7 +407,13 @@ class OtherRank(Ranks):
     name, struck = "2 ranks, the second", 1
 
 
-SCENARIOS = {s.name: s for s in (FreshRun, Resume, Force, Field, FieldText, Contacts, Ensemble, Ranks, OtherRank)}
+class ForceOnRanks(Ranks, Force):
+    """The other rank holds no name of the old result, so that the first alone is struck."""
+    name = "run --force, 2 ranks"
+
+
+SCENARIOS = {s.name: s for s in (FreshRun, Resume, Force, Field, FieldText, Contacts, Ensemble, Ranks, OtherRank,
+                                 ForceOnRanks)}
 
 
 def numbers(n, most):

@@ -14,6 +14,9 @@ PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
 FILES = ["cli/test_faults.py", "cli/test_replace.py"]
+ENDS = ["cli/test_faults.py::test_what_is_made_stands_in_this_order",
+        "cli/test_faults.py::test_the_old_result_goes_last",
+        "cli/test_faults.py::test_the_other_rank_syncs_its_frames_at_each_checkpoint"]
 OBSERVE = ["unit/test_observe", "cli/test_balance.py", "cli/test_tow.py",
            "scenes:line_bridle_breaks,thrust,impacts_sine"]
 
@@ -222,7 +225,8 @@ MUTANTS = {
         ("if (movable) t->bound[n] = bt_max(t->bound[n], fastest);", "", "the body does not see fast floes"),
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
     ]),
-    "src/contact/law.c": (["physics/test_crush", "physics/test_rafting", "scenes:crushing,rafting_press"], [
+    "src/contact/law.c": (["physics/test_crush", "physics/test_rafting", "scenes:crushing,rafting_press",
+                           "ranks:crushing_press,rafting_press"], [
         ("if (!(approach > 0)) continue;", "", "what opens gives way"),
         ("l->grown[i] = w->par.dt * approach;", "l->grown[i] = approach;", "depth without the step"),
         ("bt_max(t->gaps[j].gap[i], 0) / w->par.dt;", "t->gaps[j].gap[i] / w->par.dt;", "place of an overlap"),
@@ -326,6 +330,7 @@ MUTANTS = {
          "    advance(w);\n    bt_impacts_take(w);\n    ", "collisions at X2"),
     ]),
     "src/step/window.c": (["unit/test_window", "physics/test_window", "parallel/test_window.py",
+                           "parallel/test_window.py::test_the_same_bits[speed-1]",
                            "scenes:window,window_backwards", "ranks:window,window_backwards"], [
         ("v->share /= v->mass;", "v->share /= n;", "share of the added mass"),
         ("v->inertia /= n, v->radius /= n,", "v->radius /= n,", "inertia of all floes in one"),
@@ -397,7 +402,7 @@ MUTANTS = {
         ("solver = is_under(d, cell) ? d->large_owner : -1;", "solver = -1;",
          "floes beside the body keep old velocities"),
         ("for (int32_t dy = -2; dy <= 2; dy++)", "for (int32_t dy = -1; dy <= 1; dy++)", "speeds of cells at two"),
-        ("cell->border = true;", "", "border cells come late"),
+        ("sharer) > 1) cell->border = true;", "sharer) > 100) cell->border = true;", "border cells come late"),
         ("cell->border = k == t->n - 1;", "cell->border = false;", "the last cell's floes are not sent"),
         ("d->touched[cell->contacts[j].b] |= (uint8_t)(1 << cell->phase);", "", "second bodies are not sent"),
         ("if (now) l->send_now[p][l->n_send_now[p]++] = l->send[p][i];",
@@ -408,8 +413,9 @@ MUTANTS = {
         ("const bool own = k < t->n - 1 ? cell->own : d->comm->rank == 0;", "const bool own = cell->own;",
          "large bodies"),
     ]),
-    "partition/migrate.c": (RANKS + ["parallel/test_window.py"], [
-        ("if (rank[k] == me) keep[i] = 1;", "keep[i] = 1;", "floes stay where they were, too"),
+    "partition/migrate.c": (RANKS + ["parallel/test_ranks.py::test_the_same_bits[crush-3-1]",
+                                       "parallel/test_window.py"], [
+        ("if (rank[k] == me) keep[i] = 1;", "if (keep[i] = 1, rank[k] == me) {}", "floes stay where they were, too"),
         ("if (d->distributed && !d->owned[i]) continue;", "if (!d->owned) continue;", "ghosts are sent, too"),
         ("b->offset[n + 1] = to + m;", "", "outlines are mixed up"),
         ("if (to == d->comm->rank) memory[kept++] = memory[k];", "memory[kept++] = memory[k];", "records on two ranks"),
@@ -490,7 +496,7 @@ MUTANTS = {
         ("    if (*r->errnum) {\n        r->status = bt_file_fail", "    if (0) {\n        r->status = bt_file_fail",
          "a read error is called damage"),
     ]),
-    "src/output/record.c": (FILES, [
+    "src/output/record.c": (FILES + ENDS, [
         ("if (status == BT_OK) status = bt_file_rename(part, path, err);\n    free(part);", "free(part);", "no result"),
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, close_file(r));",
          "    bt_status status = bt_comm_agree(r->comm, close_file(r));", "frames of other ranks are not synced"),
@@ -498,7 +504,7 @@ MUTANTS = {
         ("status == BT_OK && last) status = bt_checkpoint_write",
          "status == BT_OK && last && 0) status = bt_checkpoint_write", "no last checkpoint"),
     ]),
-    "src/output/record_resume.c": (FILES + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
+    "src/output/record_resume.c": (FILES + ENDS + ["cli/test_faults.py::test_nothing_is_lost[run]"], [
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, r->h5.status);",
          "    bt_status status = bt_comm_agree(r->comm, r->h5.status);", "frames of other ranks at a checkpoint"),
         ("        if (status == BT_OK) status = bt_checksum_write(copy, BT_CHECKSUM_RESULT, err);\n", "",
@@ -507,7 +513,7 @@ MUTANTS = {
          "not flushed"),
     ]),
     "src/output/checkpoint.c": (FILES + ["cli/test_replace.py::test_an_end_that_fails_is_made_again",
-                                         "cli/test_resume.py::test_a_damaged_checkpoint_is_not_taken",
+                                         "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint",
                                          "cli/test_resume.py"], [
         ("status = bt_file_rename(path, sound ? before : damaged, err);",
          "status = bt_file_rename(path, damaged, err);", "the checkpoint before is called damaged"),
@@ -545,7 +551,9 @@ MUTANTS = {
     "src/base/base.c": (["cli/test_faults.py::test_no_memory"], [
         ("    leave(BT_ERR_NUMERIC);\n", "    exit(BT_ERR_NUMERIC);\n", "HDF5 closes files from within itself"),
     ]),
-    "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint", "cli/test_resume.py"], [
+    "src/run/halt.c": (["cli/test_faults.py::test_a_signal_brings_one_checkpoint",
+                        "cli/test_resume.py::test_by_wall_time",
+                        "cli/test_resume.py::test_a_missing_and_a_cut_checkpoint", "cli/test_resume.py"], [
         ("if (h->wall > 0 && now - h->last >= h->wall) bits |= save;", "", "no checkpoint by the clock"),
         ("if (h->steps > 0 && step % h->steps == 0) bits |= save;", "", "no checkpoint by steps"),
         ("        save_signal = 0;\n        bits", "        bits", "a checkpoint at every step after a signal"),

@@ -4,7 +4,7 @@
 and tests run until one fails: the quick ones of those named with it, then two dozen scenes on one rank, which take some
 seconds; with --wide, for survivors, the slow ones named with it, all scenes and the wider suite.
 
-    tests/mutate.py [-j N] [--only TEXT] [--first N] [--again] [--wide] [--seconds S] [--report [FILE.csv]]
+    tests/mutate.py [-j N] [--only TEXT] [--first N] [--alone] [--again] [--wide] [--seconds S] [--report [FILE.csv]]
 
 They are taken in an order drawn with a fixed seed, so that a part of the list is a fair sample of it. A test counts
 only where it passes without a mutant, which is looked at as well. Results are kept in build/mutate/results.json, by
@@ -33,13 +33,14 @@ from mutants import EQUIVALENT, MUTANTS
 HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
 SOUND = HERE / "sound.json"
+PAST = HERE / "past.json"
 SEED = 20
 # Seconds of a clock, generous since a busy machine must not kill a mutant; what computes without an end is stopped by
 # its processor time: scenes take half a second of it, the slowest test of a part twenty.
 PATIENCE = {"build": 900, "program": 900, "pytest": 3600, "scene": 600}
-PROCESSOR = {"program": 120, "scene": 30}
-# (ranks, threads) of the legs of a run
-LAYOUTS = {"scenes": [((1, 1),)], "legs": [((1, 1), (1, 1))], "ranks": [((1, 2),), ((3, 2), (2, 1))]}
+PROCESSOR = {"program": 60, "scene": 15}
+# (ranks, threads) of the legs of a run; what ranks break shows on three of them, threads alone hardly tell anything
+LAYOUTS = {"scenes": [((1, 1),)], "legs": [((1, 1), (1, 1))], "ranks": [((3, 2), (2, 1)), ((1, 2),)]}
 # Half the time of -O3 to compile, and the same bits.
 MAKE = ["make", "-s", "--no-print-directory", "CONFIG=release", "OPT_release=-O1 -DNDEBUG",
         "REVISION=mutant"]
@@ -63,18 +64,32 @@ def name_of(mutant):
     return f"{mutant[0]}: {mutant[1]} -> {mutant[2]}"
 
 
-def order_of(mutant, wide):
-    """What to run, the cheapest first: scenes need no other program, so they come before what is compiled. What only
-    ranks can show is looked for on ranks first."""
+def of_ranks(mutant):
+    """Can only ranks tell it?"""
+    return "domain" in mutant[1] or mutant[0].startswith("partition/")
+
+
+def price(test, past):
+    """Seconds that a kill by this test costs, by what it has told so far. A test that has not run is taken for one
+    that takes 5 s, 30 on ranks, and kills every second mutant."""
+    kills, seconds = past.get(test, (0, 0))
+    return (seconds + (30 if test.startswith(("ranks:", "parallel/")) else 5)) / (kills + 0.5)
+
+
+def order_of(mutant, wide, past=None):
+    """What to run, the cheapest kill first. What only ranks can show is looked for on ranks first, and what one rank
+    never calls on ranks alone."""
     tests = mutant[4]
-    if "domain" in mutant[1] and not any(t.startswith("ranks:") for t in tests):
+    if of_ranks(mutant) and not any(t.startswith("ranks:") for t in tests):
         tests = [*tests, AMONG]
-    kinds = [[t for t in tests if t.startswith(("scenes:", "legs:"))], [t for t in tests if "::" in t],
-             [t for t in tests if t.startswith(("unit/", "physics/"))], [t for t in tests if t.startswith("ranks:")]]
-    if "domain" in mutant[1]:
-        kinds.reverse()
-    quick = sum(kinds, []) + ([] if kinds[1] else [SOME])
-    return [t for t in [*tests, *WIDE] if t not in quick] if wide else quick
+    quick = [t for t in tests if "::" in t or t.startswith((*LAYOUTS, "unit/", "physics/"))]
+    if mutant[0].startswith("partition/"):
+        quick = [t for t in quick if not t.startswith(("scenes:", "legs:"))]
+    elif not any("::" in t for t in quick):
+        quick.append(SOME)
+    if wide:
+        return [t for t in [*tests, *WIDE] if t not in quick]
+    return sorted(quick, key=lambda t: (of_ranks(mutant) and not t.startswith("ranks:"), price(t, past or {})))
 
 
 def limited(seconds):
@@ -193,7 +208,8 @@ def restore(tree, since):
                     file.unlink()
 
 
-def killed_by(tree, mutant, wide):
+def killed_by(tree, mutant, wide, told):
+    """told: (test, did it tell?, seconds) of each that ran."""
     path, text, instead = mutant[:3]
     target = tree / path
     source = target.read_text()
@@ -204,8 +220,11 @@ def killed_by(tree, mutant, wide):
         code, out = make(tree, "all")
         if code != 0:
             return "does not build: " + out.strip().splitlines()[-1][:200]
-        for test in order_of(mutant, wide):
+        past = json.loads(PAST.read_text()) if PAST.exists() else {}
+        for test in order_of(mutant, wide, past):
+            began = time.monotonic()
             found = fails(tree, test)
+            told.append((test, bool(found), time.monotonic() - began))
             if found and sound(found, test):
                 return found
         return None
@@ -216,12 +235,12 @@ def killed_by(tree, mutant, wide):
 def worker(k, jobs, done, wide):
     tree = HERE / f"tree{k}"
     for mutant in iter(jobs.get, None):
-        began = time.monotonic()
+        began, told = time.monotonic(), []
         try:
-            by = killed_by(tree, mutant, wide)
+            by = killed_by(tree, mutant, wide, told)
         except Exception as e:  # reported with the mutant; the others go on
             by = f"does not build: {e}"
-        done.put((mutant, by, time.monotonic() - began))
+        done.put((mutant, by, told, time.monotonic() - began))
 
 
 def verdict(mutant, kept):
@@ -261,6 +280,7 @@ def main():
     p.add_argument("-j", type=int, default=1, help="trees at work at a time")
     p.add_argument("--only", default="", help="mutants whose file, text or reason holds this")
     p.add_argument("--first", type=int, default=0, help="so many of those that are left")
+    p.add_argument("--alone", action="store_true", help="without those that only ranks can tell: each may take minutes")
     p.add_argument("--wide", action="store_true", help="survivors alone, against the wider suite")
     p.add_argument("--again", action="store_true", help="survivors alone, after new tests")
     p.add_argument("--seconds", type=float, default=1e9, help="begin none after this time")
@@ -272,6 +292,7 @@ def main():
     random.Random(SEED).shuffle(mutants)
     alive = a.wide or a.again
     todo = [m for m in mutants if (kept.get(name_of(m), {}).get("by", 0) is None if alive else name_of(m) not in kept)]
+    todo = [m for m in todo if not (a.alone and of_ranks(m))]
     if a.first:
         todo = todo[:a.first]
     if a.report is not None:
@@ -288,8 +309,13 @@ def main():
             at_work += 1
         if not at_work:
             break
-        mutant, by, seconds = done.get()
+        mutant, by, told, seconds = done.get()
         at_work -= 1
+        past = json.loads(PAST.read_text()) if PAST.exists() else {}
+        for test, killed, took in told:
+            before = past.get(test, (0, 0))
+            past[test] = before[0] + killed, round(before[1] + took, 1)
+        PAST.write_text(json.dumps(past, indent=1))
         kept[name_of(mutant)] = {"by": by, "seconds": round(seconds, 1)}
         RESULTS.write_text(json.dumps(kept, indent=1))
         print(f"{seconds:5.0f} s  {by or 'SURVIVES':40.40}  {mutant[0]}: {mutant[3]}", flush=True)

@@ -9,7 +9,7 @@ import pytest
 from faults import FAULTS, SCENARIOS, campaign, numbers, printed
 
 EVERY = 10**6
-MOST = {"ensemble": 40, "2 ranks": 12, "2 ranks, the second": 12}
+MOST = {"ensemble": 40, "2 ranks": 12, "2 ranks, the second": 12, "run --force, 2 ranks": 12}
 
 
 @pytest.mark.parametrize("fault", FAULTS)

@@ -279,6 +279,28 @@ static void edge_contact_keeps_its_features(void **state)
     bt_world_free(w);
 }
 
+/// Two squares whose edges face each other along a millionth of their length: two points, and no telling how they share
+/// the load. Solved together they would take the difference of two impulses of any size.
+static void points_that_all_but_coincide_are_not_solved_together(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 1);
+    bt_world *w = bt_world_create(&p);
+    double v[8];
+    scene_square(1, v);
+    bt_body_def d = scene_prism(4, v, 900);
+    bt_world_add(w, &d);
+    d.x = 1.01, d.y = 1 - 1e-6;
+    bt_world_add(w, &d);
+    bt_contacts_detect_all(w, 0.05);
+    assert_int_equal(w->cells->n_contacts, 1);
+    const bt_contact *u = &w->cells->cell[bt_cells_of_pair(w, 0, 1)].contacts[0];
+    assert_int_equal(u->n, 2);
+    CHECK_CLOSE(u->ran[0] - u->ran[1], 0, 1.01e-6);
+    assert_true(u->per_det == 0);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -286,6 +308,7 @@ int main(void)
         cmocka_unit_test(gaps_are_distances),
         cmocka_unit_test(arms_meet),
         cmocka_unit_test(edge_contact_keeps_its_features),
+        cmocka_unit_test(points_that_all_but_coincide_are_not_solved_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
