@@ -6,7 +6,7 @@
 //
 // What the result depends on is only this: a contact exists for every pair of an active cell whose gap along the best
 // separating axis is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
-// pairs are conservative shortcuts that cannot change it (tests/contact/test_contacts.c holds them against all pairs by
+// pairs are conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by
 // brute force).
 //
 // Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame.
