@@ -131,7 +131,7 @@ MUTANTS = {
     "src/solve/project.c": (PROJECT, [
         ("t->most = bt_max(t->most, -g->after[i]);", "t->most = bt_max(t->most, -g->gap[i]);", "overlap of the start"),
         ("g->after[i] += cell->laws.limits[j].grown[i];", ";", "crushed ice is pushed apart"),
-        ("on = on || g->push[i] > 0 ||", "on = on ||", "contacts that push are not listed"),
+        ("on = on || g->multiplier[i] > 0 ||", "on = on ||", "contacts that push are not listed"),
         ("s->shifted = t.most > w->par.slop;", "s->shifted = t.most > 2 * w->par.slop;", "overlap is left"),
         (".tolerance = 0.1 * w->par.slop", ".tolerance = w->par.slop", "overlap is left"),
         (".length = 25", ".length = 5", "rounds of another length"),

@@ -78,7 +78,7 @@ _Static_assert(sizeof(bt_contact) == 192, "three cache lines");
 typedef struct bt_gaps {
     double gap[2];         ///< m
     double after[2];       ///< gaps that U2 leaves at the end of the step, m
-    double push[2];        ///< multipliers of the position projection, kg m
+    double multiplier[2];  ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the cell
 } bt_gaps;
 
