@@ -312,7 +312,7 @@ MUTANTS = {
         ("w->tow->travel_y += dy;", "", "way of the body across"),
         ("b->radius[i] * fabs(turn)", "0 * fabs(turn)", "turning adds no path"),
         ("|| b->vel[i].w != 0)", ")", "a turning floe sleeps"),
-        ("if (!calm || !at_rest(w, t))", "if (!at_rest(w, t))", "floes sleep in the wind"),
+        ("if (!can_sleep || !at_rest(w, t))", "if (!at_rest(w, t))", "floes sleep in the wind"),
         ("ts->relabel = out > ts->allowance;", "ts->relabel = out > 3 * ts->allowance;", "labels too late"),
         ("bt_domain_maxima(w, &out, 1);", "", "ranks disagree on labels"),
         ("ts->moved_any += farthest;", "", "lists of the body grow old"),
