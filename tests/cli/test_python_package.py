@@ -360,7 +360,7 @@ def test_a_moment_may_be_returned():
     assert hashes[0] == hashes[1]
 
 
-def test_what_goes_wrong_in_a_force_is_told():
+def test_what_goes_wrong_in_a_force_is_reported():
     class Own(Exception):
         pass
 
@@ -607,7 +607,7 @@ def test_an_ensemble_is_a_dataset_and_a_table(tmp_path, capfd):
 
 
 def test_an_ensemble_with_a_hole(tmp_path, monkeypatch, capfd):
-    """A member that fails is told, its numbers are NaN, and the others are there."""
+    """A member that fails is reported, its numbers are NaN, and the others are there."""
     path = study(tmp_path, parameters={"output.window_start": [0.5, 9]})
     with pytest.raises(bergtow.BergtowError, match="c002-r001.*output.window_start"):
         bergtow.Ensemble.run(path, tmp_path / "out", progress=False)
@@ -674,12 +674,12 @@ def test_a_program_is_told_that_memory_has_run_out():
     said = python("""
 import bergtow, ctypes, os
 lib = bergtow._library.library()
-told = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)(lambda text, user: os.write(1, b"told: " + text))
-lib.bt_on_out_of_memory(told, None)
+report = ctypes.CFUNCTYPE(None, ctypes.c_char_p, ctypes.c_void_p)(lambda text, user: os.write(1, b"reported: " + text))
+lib.bt_on_out_of_memory(report, None)
 lib.bt_alloc.argtypes = [ctypes.c_size_t, ctypes.c_size_t]
 lib.bt_alloc(2**60, 8)
 """)
-    assert said.stdout.startswith("told: out of memory") and not said.stderr and said.returncode == 5
+    assert said.stdout.startswith("reported: out of memory") and not said.stderr and said.returncode == 5
 
 
 # --- installation ----------------------------------------------------------------------------------------------------

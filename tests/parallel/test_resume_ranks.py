@@ -110,11 +110,11 @@ def test_killed_again_and_again(whole):
 def test_a_signal_to_all_ranks(whole):
     """mpirun hands on SIGUSR2: all stop after the same step, with a checkpoint."""
     folder, path, _ = whole
-    p = started(2, "run", "case.yml", "-o", "told", "--quiet", "--threads", 1, cwd=folder)
-    while not (folder / "told/checkpoint.h5").exists() and p.poll() is None:
+    p = started(2, "run", "case.yml", "-o", "signalled", "--quiet", "--threads", 1, cwd=folder)
+    while not (folder / "signalled/checkpoint.h5").exists() and p.poll() is None:
         time.sleep(0.01)
     p.send_signal(signal.SIGUSR2)
     _, err = p.communicate(timeout=60)
-    assert p.returncode == SIGNAL and "bergtow resume told" in err, err
-    done(1, "resume", "told", "--quiet", "--threads", 1, cwd=folder)
-    assert_same_result(path, folder / "told")
+    assert p.returncode == SIGNAL and "bergtow resume signalled" in err, err
+    done(1, "resume", "signalled", "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / "signalled")

@@ -538,7 +538,7 @@ static void floes_find_a_body_at_rest(void **state)
 }
 
 /// A floe that leaves all lists behind in a step, farther than the largest margin, is reported; one just within is not.
-static void what_outruns_all_margins_is_told(void **state)
+static void what_outruns_all_margins_is_reported(void **state)
 {
     (void)state;
     const double dt = 0.1, sizes[] = {11, 13};
@@ -570,7 +570,7 @@ int main(void)
         cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
         cmocka_unit_test(floes_find_a_body_at_rest),
-        cmocka_unit_test(what_outruns_all_margins_is_told),
+        cmocka_unit_test(what_outruns_all_margins_is_reported),
         cmocka_unit_test(a_body_far_away_covers_no_cell),
         cmocka_unit_test(no_floes_need_no_rows),
     };
