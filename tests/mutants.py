@@ -218,7 +218,7 @@ MUTANTS = {
         ("bt_domain_maxima(w, &any, 1);\n    return any > 0;", "return any > 0;", "ranks disagree on a repeat"),
         ("if (b->disturbed[i]) s = bt_max(s, stir);", "", "a shifted floe outruns its margin"),
         ("2 * w->par.dt * t->bound[k] > 1.5 * bt_margin_most(w)", "false", "a fast floe outruns all margins"),
-        ("bt_domain_tell_cells(w, t->speed, bt_contacts_spread);", "", "speeds of other ranks"),
+        ("bt_domain_tell_cells(w, t->speed, spread);", "", "speeds of other ranks"),
         ("if (movable) t->bound[n] = bt_max(t->bound[n], fastest);", "", "the body does not see fast floes"),
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
     ]),

@@ -407,7 +407,8 @@ bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
     return bt_cells_at(t, at[0], at[1]);
 }
 
-void bt_cells_put_memory(bt_world *w, bt_memory *memory, int64_t n)
+/// Put memory, in any order, into the pair lists of empty cells.
+static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
 {
     bt_cells *t = w->cells;
     if (n > 0) qsort(memory, (size_t)n, sizeof *memory, bt_memory_by_names);
@@ -470,7 +471,7 @@ static void place(bt_world *w, bt_memory *memory, int64_t n)
     if (w->exchange) memory = w->exchange->migrate(w, memory, &n);
     sort_bodies(w);
     make_cells(w);
-    bt_cells_put_memory(w, memory, n);
+    put_memory(w, memory, n);
     if (w->exchange) w->exchange->connect(w);
     free(memory);
     t->labelled = true;

@@ -250,8 +250,6 @@ bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
 /// have been set, and the memory [n], which is released, is that of all ranks. A domain has been created, but
 /// nothing is distributed yet.
 void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n);
-/// Put memory, in any order, into the pair lists of empty cells.
-void bt_cells_put_memory(bt_world *w, bt_memory *memory, int64_t n);
 
 /// Cell that owns the contacts of bodies a and b, −1 = not here.
 bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b);

@@ -4,7 +4,7 @@
 #include <sys/resource.h>
 
 #include "space/pairs.h"
-#include "scene.h"
+#include "all_pairs.h"
 
 enum { SIDE = 20 }; // floes along one side of the square fields
 
@@ -376,8 +376,8 @@ static void check_contacts(bt_world *w, double margin)
 {
     bt_manifold *want;
     bt_idx n_want;
-    bt_contacts_detect_all(w, margin);
-    bt_contacts_brute_force(w, margin, &want, &n_want);
+    detect_all(w, margin);
+    brute_force(w, margin, &want, &n_want);
     assert_int_equal(w->cells->n_contacts, n_want);
     const bt_gid *gid = w->bodies.gid;
     uint64_t sum = 0, sum_want = 0;
