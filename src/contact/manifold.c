@@ -235,7 +235,7 @@ typedef struct { double sa, sb; int ia, ib; } best_axes;
 
 /// Is the edge of b the reference? Two edges that face each other squarely have nearly the same separation: keep the
 /// reference of the step before, so that features, and with them impulses, persist.
-static bool reference_is_b(const polygon *a, const polygon *b, const best_axes *s, double tie, int before)
+static inline bool reference_is_b(const polygon *a, const polygon *b, const best_axes *s, double tie, int before)
 {
     bool ref_b = s->sb > s->sa;
     if (!isfinite(s->sa) || !isfinite(s->sb)) return ref_b;
