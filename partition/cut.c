@@ -394,20 +394,3 @@ bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part)
     free(label);
     return good && (n < n_parts || bt_cut_measure(g, n_parts, part, NULL).n_empty == 0);
 }
-
-bool bt_graph_is_valid(const bt_graph *g)
-{
-    if (g->n < 0 || g->start[0] != 0) return false;
-    for (int v = 0; v < g->n; v++)
-        if (g->start[v + 1] < g->start[v] || g->weight[v] < 0) return false;
-    for (int v = 0; v < g->n; v++)
-        for (int e = g->start[v]; e < g->start[v + 1]; e++) {
-            int u = g->to[e];
-            if (u < 0 || u >= g->n || g->edge[e] < 0) return false;
-            bool back = u == v;
-            for (int f = g->start[u]; !back && f < g->start[u + 1]; f++)
-                back = g->to[f] == v && g->edge[f] == g->edge[e];
-            if (!back) return false;
-        }
-    return true;
-}

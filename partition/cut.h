@@ -52,7 +52,5 @@ bt_cut_quality bt_cut_measure(const bt_graph *g, int n_parts, const int *part, c
 /// Every label in 0 ... n_parts − 1, groups together, and no part empty unless there are fewer vertices than parts.
 bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part);
 
-/// Rows in order, neighbours in range, nothing negative, every edge in both rows with one weight.
-bool bt_graph_is_valid(const bt_graph *g);
 
 #endif

@@ -74,8 +74,6 @@ int bt_division_sharers(const bt_world *w, int32_t x, int32_t y, int rank[BT_MAX
 /// Cell of the phase that touches the bodies of cell (x, y); false when there is none.
 bool bt_division_toucher(const bt_world *w, int phase, int32_t x, int32_t y, int32_t out[2]);
 
-/// Collective. The links for the cells as they are now.
-void bt_halo_connect(bt_world *w);
 void bt_halo_free(bt_domain *d);
 
 /// Collective. Ends the run when bodies are lost or doubled.

@@ -19,11 +19,20 @@ enum { CHECK_STEPS = 10 };
 #define PAIR 60e-9
 #define BODY 120e-9
 
+static bool owns_cell(const bt_world *w, int32_t x, int32_t y)
+{
+    return !w->domain || bt_division_owner(w, x, y) == w->domain->comm->rank;
+}
+
+static bool owns_large(const bt_world *w) { return !w->domain || w->domain->large_owner == w->domain->comm->rank; }
+
+static bool is_due(const bt_world *w) { return w->domain && w->domain->due; }
+
 static const bt_exchange exchange = {
     .maxima = bt_domain_maxima,
-    .owns_cell = bt_domain_owns_cell,
-    .owns_large = bt_domain_owns_large,
-    .due = bt_domain_due,
+    .owns_cell = owns_cell,
+    .owns_large = owns_large,
+    .due = is_due,
     .migrate = bt_domain_migrate,
     .connect = bt_domain_connect,
     .send = bt_domain_send,
@@ -63,19 +72,10 @@ double bt_domain_exchange_time(const bt_world *w)
     return t;
 }
 
-bool bt_domain_owns_cell(const bt_world *w, int32_t x, int32_t y)
-{
-    return !w->domain || bt_division_owner(w, x, y) == w->domain->comm->rank;
-}
-
-bool bt_domain_owns_large(const bt_world *w) { return !w->domain || w->domain->large_owner == w->domain->comm->rank; }
-
 bool bt_domain_owns(const bt_world *w, bt_idx i)
 {
     return !w->domain || !w->domain->distributed || w->domain->owned[i];
 }
-
-bool bt_domain_due(const bt_world *w) { return w->domain && w->domain->due; }
 
 // --- sums ------------------------------------------------------------------------------------------------------------
 

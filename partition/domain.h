@@ -44,9 +44,7 @@ double bt_domain_exchange_time(const bt_world *w);
 void bt_domain_validate(bt_world *w);
 enum { BT_VALIDATE_STEPS = 20 };
 
-/// Does this rank answer for the contacts of cell (x, y); for the large movable bodies; for body i?
-bool bt_domain_owns_cell(const bt_world *w, int32_t x, int32_t y);
-bool bt_domain_owns_large(const bt_world *w);
+/// Does this rank answer for body i?
 bool bt_domain_owns(const bt_world *w, bt_idx i);
 
 /// Maxima over the ranks. Collective.
@@ -59,8 +57,6 @@ uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x);
 /// Rows of doubles [n][width] of all ranks to rank 0, see bt_comm_gather; only with a division. Collective.
 double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total);
 
-/// Is a new division due?
-bool bt_domain_due(const bt_world *w);
 /// After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong now. Takes
 /// and returns the memory. Collective.
 bt_memory *bt_domain_migrate(bt_world *w, bt_memory *memory, int64_t *n);

@@ -163,7 +163,8 @@ static void mark_owned(bt_world *w)
     d->stats.halo = bt_sum_value(&sums[1]) > 0 ? bt_sum_value(&sums[0]) / bt_sum_value(&sums[1]) : 0;
 }
 
-void bt_halo_connect(bt_world *w)
+/// The links for the cells as they are now.
+static void make_links(bt_world *w)
 {
     bt_domain *d = w->domain;
     bt_halo_free(d);
@@ -194,7 +195,7 @@ void bt_domain_connect(bt_world *w)
 {
     if (!w->domain) return;
     mark_owned(w);
-    bt_halo_connect(w);
+    make_links(w);
     bt_domain_check(w);
 }
 

@@ -66,12 +66,12 @@ def estimates_of(summary):
         if not (isinstance(numbers, dict) and "force_n" in numbers):
             continue  # a condition, or the curves
         # An earlier version gives no labels; what comes on top has no ratio there, though it has a force.
-        told = labels.get(name) or {
+        about = labels.get(name) or {
             "kind": "on top" if numbers["force_n"] and numbers.get("simulated_over_estimate") is None else ""
         }
         out[name] = Estimate(name,
-                             told.get("label") or name.replace("_", " "),
-                             told.get("kind") == "on top", bool(told.get("uses_floe_size")), numbers)
+                             about.get("label") or name.replace("_", " "),
+                             about.get("kind") == "on top", bool(about.get("uses_floe_size")), numbers)
     return out
 
 
@@ -242,26 +242,26 @@ class Run:
 
     def description(self, name):
         """One sentence on a series."""
-        return self.told(name, "description")
+        return self.attribute(name, "description")
 
-    def told(self, name, what):
-        """What the file tells of a series: role, label, summary, merge, ...; "" where it does not."""
+    def attribute(self, name, what):
+        """An attribute of a series: role, label, summary, merge, ...; "" where the file has none."""
         return str(_plain(self._dataset(f"series/{name}").attrs.get(what, "")))
 
     def label(self, name):
         """What pictures and tables call a series."""
-        return self.told(name, "label") or name.replace("_", " ")
+        return self.attribute(name, "label") or name.replace("_", " ")
 
     def by_role(self, *roles):
         """Names of the series with one of these roles ("balance", "force", "load", "diagnostic"), in the order of the
         program's registry."""
-        told = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
+        attributes = {name: self._dataset(f"series/{name}").attrs for name in self.series_names}
         # of an earlier version: the forces go by their names
-        if not any("role" in attributes for attributes in told.values()):
-            return sorted((n for n in told if n.endswith("_force") or n == "ice_resistance"),
+        if not any("role" in a for a in attributes.values()):
+            return sorted((n for n in attributes if n.endswith("_force") or n == "ice_resistance"),
                           key=lambda n: (n != "tow_force", n != "ice_resistance", n)) if "balance" in roles else []
-        return sorted((n for n in told if _plain(told[n].get("role", "")) in roles),
-                      key=lambda n: int(told[n]["order"]))
+        return sorted((n for n in attributes if _plain(attributes[n].get("role", "")) in roles),
+                      key=lambda n: int(attributes[n]["order"]))
 
     @property
     def balance(self):

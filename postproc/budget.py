@@ -52,8 +52,8 @@ def assumed(e):
     with h5py.File(e.file, "r") as f:
         for key in e.parameters:
             attributes = f[f"parameters/{key}"].attrs
-            told = {w: attributes.get(w, b"") for w in ("distribution", "source")}
-            out[key] = {w: v.decode() if isinstance(v, bytes) else str(v) for w, v in told.items()}
+            words = {w: attributes.get(w, b"") for w in ("distribution", "source")}
+            out[key] = {w: v.decode() if isinstance(v, bytes) else str(v) for w, v in words.items()}
             if e.units[key] not in ("", "1") and out[key]["distribution"]:
                 out[key]["distribution"] += f" {e.units[key]}"
             if not out[key]["distribution"]:
@@ -70,13 +70,14 @@ def of_ensemble(e, key=OF, converge=None):
     if key not in e.summary:
         raise RunError(e.file, f"has no number {key}", "see bergtow --list-quantities")
     rows = e.used[np.isfinite(e.summary[key][e.used])]
-    told = e.meaning.get(key, {})
+    meaning = e.meaning.get(key, {})
     found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], e.summary[key][rows],
                                (converge or {}).get("rows", ()))
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
-    return found | {"title": e.title, "of": key, "units": str(told.get("units") or ("N" if key.endswith("_n") else "")),
-                    "meaning": str(told.get("description") or key), "assumed": assumed(e), "wanted": e.n}
+    units = meaning.get("units") or ("N" if key.endswith("_n") else "")
+    return found | {"title": e.title, "of": key, "units": str(units),
+                    "meaning": str(meaning.get("description") or key), "assumed": assumed(e), "wanted": e.n}
 
 
 def read_converge(path, folder):

@@ -37,10 +37,10 @@ def rows(found):
                     _percent(p["share"]), "", "", ""])
     indices = b["shares"].get("indices", {})
     for name in sorted(found["assumed"], key=lambda k: -(indices.get(k, {}).get("total") or 0.0)):
-        i, told = indices.get(name), found["assumed"][name]
-        source = told["source"] or "assumed"
+        i, given = indices.get(name), found["assumed"][name]
+        source = given["source"] or "assumed"
         out.append([f"- {name}", "", "", "", *((_index(i, "first"), _index(i, "total")) if i else ("–", "–")),
-                    "; ".join(t for t in (told["distribution"], source) if t)])
+                    "; ".join(t for t in (given["distribution"], source) if t)])
     n = b["numerics"]
     out.append(["numerics", "at most " + _force(found, n["sd"]) if n else "not studied",
                 _percent(n["sd"] / abs(mean)) if n else "", _percent(n["share"]) if n else "", "", "", ""])
@@ -52,18 +52,18 @@ def rows(found):
 def notes(found):
     s = found["shares"]
     if "refused" in s:
-        told = f"The parameters' part is not shared out: {s['refused']}."
+        shares = f"The parameters' part is not shared out: {s['refused']}."
     else:
         trust = "" if s["q2"] >= TRUSTED_Q2 else (
             " That is little: take the shares as a rough guide, and more conditions for better ones.")
-        told = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
+        shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
                 f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
     n = found["numerics"]
     rest = "" if n else " Numerics: run `bergtow converge` on the base case and name its file with --converge."
     left = found["wanted"] - found["members"]
     missing = f" {left} of {found['wanted']} members are missing." if left else ""
     return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "
-            f"{found['members']} tows.{missing} {told}{rest}")
+            f"{found['members']} tows.{missing} {shares}{rest}")
 
 
 def text(found, markdown=False):

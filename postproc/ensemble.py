@@ -59,7 +59,7 @@ def estimates(e, rows, mean):
     """Force of each estimate, mean of the condition's fields, and simulated / estimate where all of them are held
     against it (bergtow/estimate.h)."""
     out = {}
-    for name, told in e.estimates.items():
+    for name, estimate in e.estimates.items():
         def column(what, default=None):
             values = e.summary.get(f"estimates_{name}_{what}")
             return np.full(
@@ -67,9 +67,9 @@ def estimates(e, rows, mean):
                 np.nan) if values is None and default is None else default if values is None else values[rows]
         valid = column("valid")
         force, compares = float(np.mean(column("force_n"))) if len(rows) else np.nan, column("compares", valid)
-        held = len(rows) and not told["on_top"] and np.all(compares == 1) and force > 0
+        held = len(rows) and not estimate["on_top"] and np.all(compares == 1) and force > 0
         out[name] = {
-            "label": told["label"], "on_top": told["on_top"], "force": force,
+            "label": estimate["label"], "on_top": estimate["on_top"], "force": force,
             "valid": bool(len(rows)
                           and np.all(valid == 1)), "compares": bool(held), "ratio": mean / force if held else np.nan
         }
@@ -178,14 +178,14 @@ def nothing_to_count(e, dropped):
                         "run `bergtow ensemble` again: it takes them in")
     failed = e.reasons(FAILED)
     name, why = next(iter(failed.items()), (None, None))
-    told = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
+    failures = f"; {len(failed)} failed, the first: {name}: {why}" if failed else ""
     if e.unsound:
-        return RunError(e.file, f"has no sound member{told}; {e.holes()}",
+        return RunError(e.file, f"has no sound member{failures}; {e.holes()}",
                         "run `bergtow ensemble` again: it runs them anew")
     if np.any(e.status == FINISHED):
-        return RunError(e.file, f"has no member with a mean ice resistance{told}",
+        return RunError(e.file, f"has no member with a mean ice resistance{failures}",
                         "tow a body, for longer than output.window_start")
-    return RunError(e.file, f"has no member that has finished{told}",
+    return RunError(e.file, f"has no member that has finished{failures}",
                     "run the ensemble further" if not e.complete else "mend the study, and give it another folder")
 
 

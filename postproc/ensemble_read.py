@@ -116,7 +116,7 @@ class Ensemble:
                 for key, data in f["summary"].items()
             }
             self._series = {key: data[()] for key, data in f["series"].items()}
-            self._told = {
+            self._described = {
                 key: [_text(data.attrs.get(what, "")) for what in ("label", "units", "description")]
                 for key, data in f["series"].items()
             }
@@ -155,10 +155,11 @@ class Ensemble:
         forces = [key for key in self.summary if key.startswith("estimates_") and key.endswith("_force_n")]
         out = {}
         for key in sorted(forces, key=lambda key: int(self.meaning[key].get("order", 0))):
-            told, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
+            meaning, name = self.meaning[key], key[len("estimates_"):-len("_force_n")]
             without_ratio = f"estimates_{name}_simulated_over_estimate" not in self.summary
-            on_top = told["kind"] == "on top" if "kind" in told else without_ratio
-            out[told.get("estimate", name)] = {"label": told.get("label", name.replace("_", " ")), "on_top": on_top}
+            on_top = meaning["kind"] == "on top" if "kind" in meaning else without_ratio
+            label = meaning.get("label", name.replace("_", " "))
+            out[meaning.get("estimate", name)] = {"label": label, "on_top": on_top}
         return out
 
     @property
@@ -179,9 +180,9 @@ class Ensemble:
         """Does ensemble.h5 hold this series of the members?"""
         return name in self._series
 
-    def told(self, name):
+    def described(self, name):
         """(label, units, description) of a series."""
-        label, *rest = self._told[name]
+        label, *rest = self._described[name]
         return (label or name.replace("_", " "), *rest)
 
     def series(self, m, name="ice_resistance"):
@@ -225,8 +226,8 @@ class Ensemble:
                 "unsteady": verdict == "not steady", "short": short, "stopped": bool(texts.get("stopped"))
             }
             found |= {kind for kind, there in checks.items() if there}
-            told = len(texts.get("warnings") or [])
-            if told > sum(checks.values()):
+            warnings = len(texts.get("warnings") or [])
+            if warnings > sum(checks.values()):
                 found.add("other")
             out[int(m)] = found
         return out

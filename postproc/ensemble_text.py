@@ -243,11 +243,11 @@ def report(s, markdown=False):
             f"{counted(len(s['behind']))} of these finished after ensemble.h5 was made: run `bergtow ensemble` again, "
             f"which takes them in."
         )
-    for kind, told in (("failed", "failed, and in no number"), ("died", "whose process died")):
+    for kind, words in (("failed", "failed, and in no number"), ("died", "whose process died")):
         if s[kind]:
             name, why = next(iter(s[kind].items()))
             lines.append(
-                f"{counted(len(s[kind]))} {told}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the "
+                f"{counted(len(s[kind]))} {words}{f' ({listed(list(s[kind]))})' if len(s[kind]) > 1 else ''}; the "
                 f"first: {name}: {why}"
             )
     if s["excluded"]:

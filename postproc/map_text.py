@@ -25,18 +25,19 @@ def map_lines(found, crs):
     return lines
 
 
-def plane_lines(plane, told, bend):
-    """told: Plane.distortion; bend: how far edges that are straight on the map are not so in the plane, m."""
-    if "length_error" not in told:
+def plane_lines(plane, distortion, bend):
+    """distortion: Plane.distortion; bend: how far edges that are straight on the map are not so in the plane, m."""
+    if "length_error" not in distortion:
         x, y = plane.centre
-        return [f"plane: metres as they are, about {x:.10g}, {y:.10g}; farthest vertex {length(told['farthest_m'])}"]
+        return [f"plane: metres as they are, about {x:.10g}, {y:.10g}; farthest vertex "
+                f"{length(distortion['farthest_m'])}"]
     lon, lat = plane.centre
     lines = [f"plane: azimuthal equidistant about longitude {lon:.7g}, latitude {lat:.7g}; farthest vertex "
-             f"{length(told['farthest_m'])}",
-             f"distortion at most: lengths {told['length_error']:.1e}, areas {told['area_error']:.1e}, north turns by "
-             f"{told['north_turns_deg']:.2g}°, edges straight on the map bend by {length(bend)}"]
-    if told["map_scale"]:
-        least, most = told["map_scale"]
+             f"{length(distortion['farthest_m'])}",
+             f"distortion at most: lengths {distortion['length_error']:.1e}, areas {distortion['area_error']:.1e}, "
+             f"north turns by {distortion['north_turns_deg']:.2g}°, edges straight on the map bend by {length(bend)}"]
+    if distortion["map_scale"]:
+        least, most = distortion["map_scale"]
         lines.append(f"a metre of the map is {1 / most:.6f} to {1 / least:.6f} m on the ground; the outlines are "
                      "corrected for it")
     if plane.accuracy:
@@ -91,32 +92,33 @@ def distribution(size, areas):
              "share_of_area": areas[place == k].sum() / areas.sum()} for k in range(n)]
 
 
-def floe_lines(told):
-    q, (x0, x1, y0, y1) = told["sizes_m"], told["rectangle_m"]
-    lines = [f"floes: {told['floes']}, {told['convex']} of them convex, {area(told['area_m2'])}; mean size "
-             f"{length(told['mean_size_m'])}, spread {told['size_spread']:.2f}, median {length(q['median'])}, "
+def floe_lines(numbers):
+    q, (x0, x1, y0, y1) = numbers["sizes_m"], numbers["rectangle_m"]
+    lines = [f"floes: {numbers['floes']}, {numbers['convex']} of them convex, {area(numbers['area_m2'])}; mean size "
+             f"{length(numbers['mean_size_m'])}, spread {numbers['size_spread']:.2f}, median {length(q['median'])}, "
              f"{length(q['least'])} to {length(q['largest'])}",
-             f"concentration: {told['concentration']:.3f} of what was imaged of {length(x1 - x0)} by {length(y1 - y0)}"]
-    if told["imaged_share"] < 0.97:
-        lines.append(f"only {100 * told['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the "
+             f"concentration: {numbers['concentration']:.3f} of what was imaged of {length(x1 - x0)} by "
+             f"{length(y1 - y0)}"]
+    if numbers["imaged_share"] < 0.97:
+        lines.append(f"only {100 * numbers['imaged_share']:.0f} % of this rectangle was imaged, and bergtow takes the "
                      "rest for water: choose a smaller one with --box")
-    if told["with_thickness"]:
-        lines.append(f"thickness: {told['with_thickness']} floes have one, {told['mean_thickness_m']:.3g} m in the "
-                     "mean")
+    if numbers["with_thickness"]:
+        lines.append(f"thickness: {numbers['with_thickness']} floes have one, {numbers['mean_thickness_m']:.3g} m in "
+                     "the mean")
     lines.append("       size, m          floes   share of the ice")
     return lines + [f"{row['from_m']:9.4g} to {row['to_m']:<9.4g} {row['floes']:6d} {100 * row['share_of_area']:8.1f} %"
-                    for row in told["distribution"]]
+                    for row in numbers["distribution"]]
 
 
-def case_lines(path, told, heading, margin):
+def case_lines(path, numbers, heading, margin):
     """Lines for a case that reads the file: in the geographic frame x is north."""
-    x0, x1, y0, y1 = told["rectangle_m"]
-    low = np.minimum(told["reach_m"][:2], (x0, y0)) - margin
-    high = np.maximum(told["reach_m"][2:], (x1, y1)) + margin
+    x0, x1, y0, y1 = numbers["rectangle_m"]
+    low = np.minimum(numbers["reach_m"][:2], (x0, y0)) - margin
+    high = np.maximum(numbers["reach_m"][2:], (x1, y1)) + margin
     if heading is None:
         low, high, x0, x1, y0, y1 = low[::-1], high[::-1], y0, y1, x0, x1
     low, size = np.floor(low), np.ceil(high) - np.floor(low)
-    frame, bays = "geographic" if heading is None else "basin", told["convex"] < told["floes"]
+    frame, bays = "geographic" if heading is None else "basin", numbers["convex"] < numbers["floes"]
     return ["in a case beside it:",
             f"  domain: {{frame: {frame}, x0: {low[0]:.0f} m, y0: {low[1]:.0f} m, length: {size[0]:.0f} m, "
             f"width: {size[1]:.0f} m}}",
@@ -124,13 +126,13 @@ def case_lines(path, told, heading, margin):
             f"y_max: {y1:.1f} m" + (", nonconvex: split}" if bays else "}")]
 
 
-def record(found, plane, crs, told, bend, book, rules, floes):
+def record(found, plane, crs, distortion, bend, book, rules, floes):
     """Everything as one dict for JSON."""
     return {
         "map": {"file": str(found.path), "crs": name_of(crs), "says_of_itself": found.about or None,
                 "shapes": len(found.shapes)},
         "plane": {"centre": list(plane.centre), "heading_deg": plane.heading, "edges_bend_m": bend,
-                  "accuracy_m": plane.accuracy if math.isfinite(plane.accuracy) else None, **told},
+                  "accuracy_m": plane.accuracy if math.isfinite(plane.accuracy) else None, **distortion},
         "rules": {"tolerance_m": rules.tolerance, "least_m2": rules.least, "box_m": rules.box,
                   "clear_m": rules.clear, "keep_cut": rules.keep_cut},
         "changes": {kind: {"what": KINDS[kind], "count": c.count, "area_before_m2": c.before,

@@ -249,22 +249,23 @@ def main(argv=None):
     if not floes:
         print("\n".join(map_text.change_lines(book)))
         raise RunError(found.path, "leaves no floe", "see the changes: --box, --clear, --least, --tolerance, --cut")
-    told, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
-    if told["farthest_m"] > map_plane.FARTHEST:
-        raise RunError(found.path, f"has floes {told['farthest_m'] / 1e3:.4g} km from the centre; bergtow takes 100 km",
+    distortion, numbers = plane.distortion(map_repair.hull_of(floes)), summed_up(floes, found, rules)
+    if distortion["farthest_m"] > map_plane.FARTHEST:
+        far = distortion["farthest_m"] / 1e3
+        raise RunError(found.path, f"has floes {far:.4g} km from the centre; bergtow takes 100 km",
                        "choose a part with --box or --where, or set --centre")
     if numbers["mean_size_m"] < LEAST_SIZE:
         raise RunError(found.path, f"has floes of {numbers['mean_size_m']:.2g} m in the mean, as degrees look in "
                        "metres",
                        "say its crs: --crs EPSG:4326")
-    print("\n".join(map_text.plane_lines(plane, told, bend)))
+    print("\n".join(map_text.plane_lines(plane, distortion, bend)))
     print(f"tolerance: {map_text.length(rules.tolerance)}")
     print("\n".join(map_text.change_lines(book) + map_text.floe_lines(numbers)))
     command.write_text(geojson(floes, found, plane), a.output, a.force)
     print("\n".join(map_text.case_lines(a.output, numbers, a.heading, MARGIN)))
     print(a.output)
     if a.record:
-        record = map_text.record(found, plane, crs, told, bend, book, rules, numbers)
+        record = map_text.record(found, plane, crs, distortion, bend, book, rules, numbers)
         command.write_json(record, a.record, a.force)
         print(a.record)
     if a.picture:

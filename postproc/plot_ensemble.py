@@ -158,7 +158,7 @@ def force_limits(e, some_groups, log):
     seen += [v for v in tops if np.isfinite(v)]
     low = min((v for v in seen if v > 0), default=1.0)
     high = max(seen, default=1.0)
-    for name in (name for name, told in e.estimates.items() if not told["on_top"]):
+    for name in (name for name, estimate in e.estimates.items() if not estimate["on_top"]):
         force, valid = (e.summary.get(f"estimates_{name}_{what}", np.zeros(e.n))[e.used]
                         for what in ("force_n", "valid"))
         seen += [v for v in force[(valid == 1) & (force > low / 30) & (force < 30 * high)]]

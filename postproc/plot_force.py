@@ -227,7 +227,7 @@ def draw_diagnostics(run):
         axes.yaxis.set_major_locator(MaxNLocator(4))
         positive = values[values > 0]
         # of residual and overlap decades are of interest
-        if run.told(name, "merge") == "largest of the steps" and len(positive):
+        if run.attribute(name, "merge") == "largest of the steps" and len(positive):
             style.logarithmic(axes.yaxis)
             axes.set_ylim(bottom=max(positive.min(), 1e-6 * positive.max()) / 1.5)
         elif not np.any(values < 0):

@@ -130,7 +130,7 @@ def table(head, rows):
     return {"kind": "table", "head": head, "rows": rows}
 
 
-def told(e, m):
+def reported(e, m):
     """Warnings of a member in its own words, or why they are not known."""
     try:
         with Run(e.folder(m)) as run:
@@ -150,7 +150,7 @@ def members(e, s):
             "name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "doubts": ", ".join(sorted(e.doubts(m))),
-            "told": [scrubbed(w) for w in (told(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
+            "reported": [scrubbed(w) for w in (reported(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
         })
     return out
 

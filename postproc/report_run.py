@@ -143,7 +143,7 @@ def forces(run):
         return []
     n, rows = run.number, []
     for name in run.by_role("balance", "force", "load"):
-        key = run.told(name, "summary") or f"mean_{name}_n"
+        key = run.attribute(name, "summary") or f"mean_{name}_n"
         mean = n(key)
         if not np.isfinite(mean) and name not in ("ice_resistance", "tow_force"):
             continue

@@ -19,7 +19,7 @@ Intervals: by profile likelihood, widened for dependence within a field and scat
 With fewer fields than that needs, the likelihood alone. Either is a lower bound of what is not known: the model of the
 tail itself, and the threshold, are assumed. Below a shape of -1/2 maximum likelihood is irregular
 [Smith 1985, Biometrika 72]: the fitted end of the tail is little more than the largest peak, and so are the levels;
-this is told.
+this is reported.
 """
 import numpy as np
 from scipy import optimize, stats

@@ -130,7 +130,7 @@ def not_durable(log):
     return faults
 
 
-def told(result, folder):
+def says_what_to_do(result, folder):
     """A message names a file of the folder, the reason, and what to do about it."""
     assert re.search(rf"bergtow: [^\n]*{re.escape(str(folder))}[^\n]*: [^\n]*; [^\n]+", result.stderr), result.stderr
 
@@ -179,7 +179,7 @@ class Scenario:
             assert result.returncode in (-number, 128 + number), (result.returncode, result.stderr)
         else:
             assert result.returncode in self.codes, (result.returncode, result.stderr)
-            told(result, self.folder)
+            says_what_to_do(result, self.folder)
         self.check_kept(logged(self.base / "log"))
         return self.recover()
 

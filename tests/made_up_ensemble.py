@@ -21,7 +21,7 @@ LABELS = {"lichey_hellmer": "Lichey-Hellmer", "marchenko_compaction": "compactio
 TEXT = h5py.string_dtype()
 
 
-def told(name):
+def described(name):
     """What the program says of an estimate beside its numbers."""
     return {
         "label": LABELS.get(name, name.replace("_", " ")),
@@ -31,12 +31,12 @@ def told(name):
 
 def member(series, parameters, condition, **changes):
     """One member: series [n] N at 1 s from 1 s on, steady from `start` s; peaks: (times s, forces N); more: further
-    series of result.h5, told: {name: attributes} of them; case: its text."""
+    series of result.h5, attributes: {name: attributes} of them; case: its text."""
     return {
         "series": np.asarray(series, dtype=float), "parameters": parameters, "condition": condition, "start": 0.5,
         "status": FINISHED, "reason": "", "warnings": [], "peaks": None, "hours": len(series) / 3600,
-        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {}, "told": {},
-        "case": None
+        "conversion": "half-sine of 0.1 s", "estimates": ESTIMATES, "window_warning": None, "more": {},
+        "attributes": {}, "case": None
     } | changes
 
 
@@ -83,7 +83,7 @@ def write_member(folder, m):
     (folder / "summary.json").write_text(
         json.dumps(
             nested | {
-                "estimate_labels": {n: told(n)
+                "estimate_labels": {n: described(n)
                                     for n in m["estimates"]}, "title": "made up", "warnings": m["warnings"],
                 "stopped": None
             }))
@@ -91,7 +91,7 @@ def write_member(folder, m):
         f["case"] = m["case"] or f"ice:\n  concentration: {m['parameters'].get('ice.concentration', 0.5)}\n"
         for name, x in ({"time": np.arange(1.0, len(m["series"]) + 1)} | m["more"] if m["more"] else {}).items():
             f[f"series/{name}"] = x
-            f[f"series/{name}"].attrs.update(m["told"].get(name, {"units": "s"}))
+            f[f"series/{name}"].attrs.update(m["attributes"].get(name, {"units": "s"}))
         times, peaks = m["peaks"] if m["peaks"] is not None else ([], [])
         f["impacts/time"], f["impacts/peak"] = np.asarray(times, dtype=float), np.asarray(peaks, dtype=float)
         f["impacts"].attrs["conversion"] = m["conversion"]
@@ -139,7 +139,8 @@ def write(folder, members, title="made up", sampling="grid"):
         for key in dict.fromkeys(k for s in summaries for k in s):
             f[f"summary/{key}"] = np.array([s.get(key, np.nan) for s in summaries])
             for name in (n for n in members[0]["estimates"] if key.startswith(f"estimates_{n}_")):
-                f[f"summary/{key}"].attrs.update({"estimate": name, "order": list(ESTIMATES).index(name), **told(name)})
+                order = list(ESTIMATES).index(name)
+                f[f"summary/{key}"].attrs.update({"estimate": name, "order": order, **described(name)})
         time, ice, tow = (np.full((n, longest), np.nan) for _ in range(3))
         for i, (m, ok) in enumerate(zip(members, done)):
             if ok:

@@ -144,7 +144,7 @@ def prepare(n):
 
 
 def sound(by, test):
-    """Does the test that told pass where nothing is wrong? One that does not tells nothing. Looked at once each."""
+    """Does the test that failed pass where nothing is wrong? One that does not shows nothing. Looked at once each."""
     known = json.loads(SOUND.read_text()) if SOUND.exists() else {}
     if by not in known:
         scene = by.removeprefix("scene ").split(" ")[0]

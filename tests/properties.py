@@ -44,7 +44,7 @@ numbers = st.one_of(st.integers(1, 30), st.just(10**6))
 
 
 class Refused(Exception):
-    """A case that the program does not run: no finding here (random_cases.judge has them)."""
+    """A case that the program does not run: no finding here (judge.judge has them)."""
 
 
 def called(folder, *words, ranks=1, env=None):

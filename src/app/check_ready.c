@@ -37,7 +37,8 @@ static bt_check_ice ice_of_field(const bt_case *c, const bt_field *f)
     return n;
 }
 
-bt_check_ice bt_check_ice_of(const bt_case *c, const bt_field *f)
+/// Of the field that was read, or expected of the one that will be made.
+static bt_check_ice ice_of(const bt_case *c, const bt_field *f)
 {
     bt_check_ice n = c->ice.field || c->ice.outlines ? ice_of_field(c, f) : ice_of_case(c);
     n.corners = bt_cost_corners(c, f, n.count);
@@ -83,10 +84,10 @@ bt_status bt_check_ready(const bt_case *c, const bt_comm *comm, bt_field *f, bt_
     if (status == BT_OK && reads_field(c)) status = bt_field_load(c, f, err);
     if (status == BT_OK && reads_field(c)) status = bt_cost_fits(c, f->n, comm, machine, err);
     if (status != BT_OK) return status;
-    *n = *run = bt_check_ice_of(c, f);
+    *n = *run = ice_of(c, f);
     if (reads_field(c) && c->lead.mode != BT_LEAD_NONE) {
         status = bt_lead_open(c, f, lead, err);
-        if (status == BT_OK) *run = bt_check_ice_of(c, f);
+        if (status == BT_OK) *run = ice_of(c, f);
     }
     return status == BT_OK ? try_setup(c, f, err) : status;
 }

@@ -54,7 +54,8 @@ static bool in_range(const bt_key *k, double value, const char *text, char *why)
     return false;
 }
 
-bool bt_value_is_utf8(const char *text, size_t n)
+/// True when the text is valid UTF-8 without NUL.
+static bool is_utf8(const char *text, size_t n)
 {
     const unsigned char *s = (const unsigned char *)text;
     for (size_t i = 0; i < n;) {
@@ -138,7 +139,7 @@ static bool read_choice(const bt_key *k, void *base, const char *text, char *why
 static bool read_text(const bt_key *k, void *base, const char *text, char *why)
 {
     size_t n = strlen(text);
-    if (n > BT_MAX_TEXT || !bt_value_is_utf8(text, n)) {
+    if (n > BT_MAX_TEXT || !is_utf8(text, n)) {
         snprintf(why, BT_WHY,
                  n > BT_MAX_TEXT ? "the text has %zu bytes; give at most %d"
                                  : "the text is not UTF-8; save it as UTF-8",

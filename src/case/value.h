@@ -26,7 +26,5 @@ bool bt_value_read_coordinate(const bt_key *k, const char *text, double *value, 
 /// Write the member as a YAML scalar (or flow list of points) that reads back to the same bits.
 void bt_value_write(const bt_key *k, const void *base, FILE *out);
 
-/// True when the text is valid UTF-8 without NUL.
-bool bt_value_is_utf8(const char *text, size_t n);
 
 #endif

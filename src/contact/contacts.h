@@ -6,7 +6,7 @@
 //
 // What the result depends on is only this: a contact exists for every pair of an active cell whose gap along the best
 // separating axis is at most the cell's margin. The pair list with its skin, the cached axis and the skipping of far
-// pairs are conservative shortcuts that cannot change it (tests/contact/test_contacts.c holds them against all pairs by
+// pairs are conservative shortcuts that cannot change it (tests/unit/test_contacts.c holds them against all pairs by
 // brute force).
 //
 // Margin. Twice the way that the fastest floe of the cell's neighbourhood makes in the step, through the water's frame.
@@ -35,9 +35,6 @@ typedef struct bt_manifold {
 /// `keep`; returns the largest of all, m/s. Collective.
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
 
-/// Speed s of cell (x, y) into the bounds of the cells it matters to.
-void bt_contacts_spread(struct bt_cells *t, int32_t x, int32_t y, double s);
-
 /// Has the bound grown beyond what the last detection was made for? Collective.
 bool bt_contacts_outrun(const bt_world *w);
 
@@ -50,9 +47,6 @@ void bt_contacts_detect(bt_world *w, bool again);
 /// that have come apart do not, so the state must have been saved. Collective.
 double bt_contacts_overlap(bt_world *w);
 
-/// Everything within margin, whether at rest or not (tests, deepest overlap).
-void bt_contacts_detect_all(bt_world *w, double margin);
-
 /// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of
 /// b, −1: none) settles ties between nearly equal reference edges. gap_out: the largest separation over the edge
 /// normals of both (a lower bound of the distance), axis_out its edge (numbered as in bt_pair).
@@ -63,8 +57,5 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
 /// otherwise see src/contact/manifold.c.
 bool bt_contacts_parts(const bt_world *w, bt_idx a, bt_idx b, const uint16_t part[2], double margin,
                        int reference_before, bt_manifold *m, double *gap_out, int32_t *axis_out);
-
-/// All manifolds by testing all pairs, for tests; in the order of gids.
-void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man);
 
 #endif

@@ -28,7 +28,8 @@ static void raise(bt_cells *t, int32_t x0, int32_t x1, int32_t y0, int32_t y1, d
         }
 }
 
-void bt_contacts_spread(bt_cells *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
+/// Speed s of cell (x, y) into the bounds of the cells it matters to.
+static void spread(bt_cells *t, int32_t x, int32_t y, double s) { raise(t, x, x, y, y, s); }
 
 /// What a large body that moves, or can be moved, asks of the cells under it and beside it.
 static double spread_large(bt_world *w, const bt_vel *v, const bt_vel *v2)
@@ -78,9 +79,9 @@ double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool ke
         const bt_idx k = t->busy[j];
         if (!(t->speed[k] > 0) || !t->cell[k].own) continue;
         fastest = bt_max(fastest, t->speed[k]);
-        bt_contacts_spread(t, t->cell[k].x, t->cell[k].y, t->speed[k]);
+        spread(t, t->cell[k].x, t->cell[k].y, t->speed[k]);
     }
-    bt_domain_tell_cells(w, t->speed, bt_contacts_spread);
+    bt_domain_tell_cells(w, t->speed, spread);
     const double large = spread_large(w, v, v2);
     bt_cells_sort_busy(t);
     // The last cell meets floes anywhere: it is made for the fastest of them all.
@@ -238,7 +239,7 @@ static void find_awake(bt_world *w)
     bt_cells_sort_busy(t);
 }
 
-static void detect(bt_world *w, bool again)
+void bt_contacts_detect(bt_world *w, bool again)
 {
     bt_cells *t = w->cells;
     bt_idx *due = bt_alloc((size_t)t->n_busy, sizeof *due), n_due = 0;
@@ -273,55 +274,12 @@ static void detect(bt_world *w, bool again)
     bt_cells_leave(t);
 }
 
-void bt_contacts_detect(bt_world *w, bool again) { detect(w, again); }
-
-void bt_contacts_detect_all(bt_world *w, double margin)
-{
-    bt_cells_begin(w);
-    bt_cells_update(w, margin);
-    bt_cells_wake_all(w->cells);
-    // A speed whose margin is the one asked for; a margin that is rounded already must not go up another step.
-    for (bt_idx k = 0; k < w->cells->n; k++)
-        w->cells->bound[k] = bt_max(0.5 * margin / w->par.dt * (1 - 1e-12), 1e-300);
-    bool movable = false;
-    for (bt_idx l = w->cells->n_in_cells; l < w->bodies.n; l++) movable = movable || w->bodies.motion[l] == BT_DYNAMIC;
-    if (!movable) w->cells->bound[w->cells->n - 1] = 0;
-    detect(w, false);
-}
-
-void bt_contacts_brute_force(const bt_world *w, double margin, bt_manifold **man, bt_idx *n_man)
-{
-    const bt_bodies *b = &w->bodies;
-    bt_idx cap = 64;
-    *man = bt_alloc((size_t)cap, sizeof **man);
-    *n_man = 0;
-    for (bt_gid g = 0; g < b->n_global; g++)
-        for (bt_gid h = g + 1; h < b->n_global; h++) {
-            const bt_idx i = bt_world_index(w, g), j = bt_world_index(w, h);
-            if (b->motion[i] != BT_DYNAMIC && b->motion[j] != BT_DYNAMIC) continue;
-            for (int p = bt_part_first(b, i); p >= 0; p = bt_part_next(b, i, p))
-                for (int q = bt_part_first(b, j); q >= 0; q = bt_part_next(b, j, q)) {
-                    if (*n_man == cap) *man = bt_realloc(*man, (size_t)(cap *= 2), sizeof **man);
-                    double gap;
-                    int32_t axis = -1;
-                    if (bt_contacts_parts(w, i, j, (uint16_t[]){(uint16_t)p, (uint16_t)q}, margin, -1, &(*man)[*n_man],
-                                          &gap, &axis))
-                        ++*n_man;
-                }
-        }
-    bt_merge_parts(w, *man, (size_t)*n_man);
-    bt_idx kept = 0;
-    for (bt_idx k = 0; k < *n_man; k++)
-        if ((*man)[k].n_points > 0) (*man)[kept++] = (*man)[k];
-    *n_man = kept;
-}
-
 double bt_contacts_overlap(bt_world *w)
 {
     bt_cells_begin(w); // from here on and again below, bodies may lie elsewhere
     if (bt_cells_update(w, bt_margin_for(w, bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false))))
         bt_contacts_bound(w, w->bodies.vel, w->bodies.vel, false);
-    detect(w, false);
+    bt_contacts_detect(w, false);
     const bt_cells *t = w->cells;
     double deepest = 0;
     for (bt_idx k = 0; k < t->n; k++)

@@ -213,89 +213,100 @@ static void deepest_point(const polygon *ref, int i, const polygon *inc, bool fl
               ((uint32_t)flip << 31) | ((uint32_t)i << 20) | (uint32_t)deepest << 1);
 }
 
+/// Two corners, ca of a and cb of b, as the only point: the normal is along the line that joins them. False beyond the
+/// margin.
+static bool join_corners(const polygon *a, int ca, const polygon *b, int cb, const double d[2], double margin,
+                         bt_manifold *m)
+{
+    double x[2], y[2];
+    world_vertex(a, ca, x);
+    world_vertex(b, cb, y);
+    const double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
+    if (gap > margin || gap == 0) return false;
+    m->nx = (y[0] - x[0]) / gap;
+    m->ny = (y[1] - x[1]) / gap;
+    set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
+              0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
+    return true;
+}
+
+/// An edge of each polygon, and how far it separates the two; −∞ where none counts.
+typedef struct { double sa, sb; int ia, ib; } best_axes;
+
+/// Is the edge of b the reference? Two edges that face each other squarely have nearly the same separation: keep the
+/// reference of the step before, so that features, and with them impulses, persist.
+static inline bool reference_is_b(const polygon *a, const polygon *b, const best_axes *s, double tie, int before)
+{
+    bool ref_b = s->sb > s->sa;
+    if (!isfinite(s->sa) || !isfinite(s->sb)) return ref_b;
+    double ax, ay, bx, by;
+    edge_normal(a, s->ia, &ax, &ay);
+    edge_normal(b, s->ib, &bx, &by);
+    const bool square = ax * bx + ay * by < -0.98;
+    if (square && before >= 0 && fabs(s->sa - s->sb) < tie) ref_b = before;
+    else if (square && before < 0 && s->sb < s->sa + tie) ref_b = false;
+    // apart by one of them: the tie must not feign overlap
+    if (bt_max(s->sa, s->sb) > 0 && (ref_b ? s->sb : s->sa) <= 0) ref_b = !ref_b;
+    return ref_b;
+}
+
+/// 1 % of the smaller floe's radius.
+static double tie_of(const bt_bodies *b, bt_idx i, bt_idx j) { return 0.01 * bt_min(b->radius[i], b->radius[j]); }
+
+/// The edges that separate a and b most. False, with a separating axis and its gap, as soon as one separates by more
+/// than the margin. *axis on entry: the one of the last step. It usually separates again. Where not, an edge that
+/// separates by less than that one, and by more than the tie, is neither the best nor in question; so only the others
+/// are looked at in full, and the result is the same with any hint.
+static bool find_axes(const polygon *a, const polygon *b, double margin, double tie, best_axes *s, double *gap,
+                      int32_t *axis)
+{
+    const int32_t hint = *axis;
+    double known = -INFINITY;
+    if (hint >= 0 && hint < a->count + b->count) {
+        known = hint < a->count ? edge_separation(a, hint, b, -INFINITY)
+                                : edge_separation(b, hint - a->count, a, -INFINITY);
+        *gap = known;
+        if (known > margin) return false;
+    }
+    s->sa = *gap = max_separation(a, b, margin, known - 2 * tie, &s->ia);
+    *axis = s->ia;
+    if (s->sa > margin) return false;
+    s->sb = *gap = max_separation(b, a, margin, bt_max(known, s->sa) - 2 * tie, &s->ib);
+    *axis = a->count + s->ib;
+    return !(s->sb > margin);
+}
+
 bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int reference_before, bt_manifold *m,
                       double *gap_out, int32_t *axis_out)
 {
     double d[2];
     bt_bodies_offset(w, a, b, d);
     const polygon pa = polygon_of(&w->bodies, a, 0, 0, 0), pb = polygon_of(&w->bodies, b, 0, d[0], d[1]);
-
-    // Two edges that face each other squarely have nearly the same separation: keep the reference of the step
-    // before, so that features, and with them impulses, persist. The tie is 1 % of the smaller floe's radius.
-    const double tie = 0.01 * bt_min(w->bodies.radius[a], w->bodies.radius[b]);
-    // The axis that separated them last time usually does so again. Where not, an edge that separates by less than that
-    // one, and by more than the tie, is neither the best nor in question; so only the others are looked at in full, and
-    // the result is the same with any hint.
-    const int32_t hint = *axis_out;
-    double known = -INFINITY;
-    if (hint >= 0 && hint < pa.count + pb.count) {
-        known = hint < pa.count ? edge_separation(&pa, hint, &pb, -INFINITY)
-                                : edge_separation(&pb, hint - pa.count, &pa, -INFINITY);
-        if (known > margin) {
-            *gap_out = known;
-            return false;
-        }
-    }
-    int ia = 0, ib = 0;
-    const double sa = max_separation(&pa, &pb, margin, known - 2 * tie, &ia);
-    if (sa > margin) {
-        *gap_out = sa;
-        *axis_out = ia;
-        return false;
-    }
-    const double sb = max_separation(&pb, &pa, margin, bt_max(known, sa) - 2 * tie, &ib);
-    if (sb > margin) {
-        *gap_out = sb;
-        *axis_out = pa.count + ib;
-        return false;
-    }
-
-    bool ref_b = sb > sa;
-    double ax, ay, bx, by;
-    edge_normal(&pa, ia, &ax, &ay);
-    edge_normal(&pb, ib, &bx, &by);
-    const bool square = ax * bx + ay * by < -0.98;
-    if (square && reference_before >= 0 && fabs(sa - sb) < tie) ref_b = reference_before;
-    else if (square && reference_before < 0 && sb < sa + tie) ref_b = false;
-    // apart by one of them: the tie must not feign overlap
-    if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b;
-    *gap_out = bt_max(sa, sb);
-    *axis_out = ref_b ? pa.count + ib : ia;
+    const double tie = tie_of(&w->bodies, a, b);
+    best_axes s = {0};
+    if (!find_axes(&pa, &pb, margin, tie, &s, gap_out, axis_out)) return false;
+    const bool ref_b = reference_is_b(&pa, &pb, &s, tie, reference_before);
+    const double sep = ref_b ? s.sb : s.sa;
+    const int edge = ref_b ? s.ib : s.ia;
+    *gap_out = bt_max(s.sa, s.sb);
+    *axis_out = ref_b ? pa.count + s.ib : s.ia;
 
     *m = (bt_manifold){.a = a, .b = b};
-    double sep = ref_b ? sb : sa;
-    int edge = ref_b ? ib : ia;
-    if (sep > 0) {
-        int ca = 0, cb = 0, e = 0;
-        bool of_b = false;
-        const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
-        clip_points(ref, edge, inc, ref_b, d[0], d[1], margin, m);
-        if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie)
-            return true;
-        // The nearest vertex lies beside the reference edge, and not by the tilt of two nearly parallel edges: a
-        // corner is near.
-        m->n_points = 0;
-        if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) {
-            double x[2], y[2];
-            world_vertex(&pa, ca, x);
-            world_vertex(&pb, cb, y);
-            double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
-            if (gap > margin || gap == 0) return false;
-            m->nx = (y[0] - x[0]) / gap;
-            m->ny = (y[1] - x[1]) / gap;
-            set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
-                      0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
-            return true;
-        }
-        ref = of_b ? &pb : &pa;
-        inc = of_b ? &pa : &pb;
-        clip_points(ref, e, inc, of_b, d[0], d[1], margin, m);
-        return m->n_points > 0;
-    }
     const polygon *ref = ref_b ? &pb : &pa, *inc = ref_b ? &pa : &pb;
     clip_points(ref, edge, inc, ref_b, d[0], d[1], margin, m);
-    if (m->n_points == 0) deepest_point(ref, edge, inc, ref_b, d[0], d[1], m);
-    return true;
+    if (!(sep > 0)) {
+        if (m->n_points == 0) deepest_point(ref, edge, inc, ref_b, d[0], d[1], m);
+        return true;
+    }
+    if (m->n_points > 0 && bt_min(m->p[0].gap, m->p[m->n_points - 1].gap) <= sep + tie) return true;
+    // The nearest vertex lies beside the reference edge, and not by the tilt of two nearly parallel edges: a corner is
+    // near.
+    m->n_points = 0;
+    int ca = 0, cb = 0, e = 0;
+    bool of_b = false;
+    if (nearest_features(&pa, &pb, &ca, &cb, &e, &of_b)) return join_corners(&pa, ca, &pb, cb, d, margin, m);
+    clip_points(of_b ? &pb : &pa, e, of_b ? &pa : &pb, of_b, d[0], d[1], margin, m);
+    return m->n_points > 0;
 }
 
 // --- bodies that are not convex --------------------------------------------------------------------------------------
@@ -309,11 +320,11 @@ bool bt_contacts_pair(const bt_world *w, bt_idx a, bt_idx b, double margin, int 
 //                 lies in its normal cone: n·e1 >= 0 and n·e2 <= 0.
 // What is left out here is found with the part that has the edge, or with the one on the other side of the cut. Parts
 // that are apart touch at their nearest features or not at all. Parts that overlap part along the best axis that
-// counts, if that is not much farther than along the best of
-// all: the middle one of three parts that share a corner has edges of the outline only on its far side.
+// counts, if that is not much farther than along the best of all: the middle one of three parts that share a corner
+// has edges of the outline only on its far side.
 
-#define CONE                                                                                                           \
-    1e-6 // rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
+// rad by which a direction may stand outside a cone: two parts of a straight shore may both answer, never none
+#define CONE 1e-6
 #define DETOUR 4  // depth along an axis that counts / depth along the best of all; more only within the tie
 
 typedef struct {
@@ -402,17 +413,8 @@ static bool nearest_contact(const part_of_body *a, const part_of_body *b, const 
     bool of_b = false;
     m->n_points = 0;
     if (nearest_features(&a->p, &b->p, &ca, &cb, &e, &of_b)) {
-        double x[2], y[2];
-        world_vertex(&a->p, ca, x);
-        world_vertex(&b->p, cb, y);
-        const double gap = bt_hypot(y[0] - x[0], y[1] - x[1]);
-        if (gap > margin || gap == 0) return false;
-        m->nx = (y[0] - x[0]) / gap;
-        m->ny = (y[1] - x[1]) / gap;
-        if (!corner_counts(a, ca, m->nx, m->ny) || !corner_counts(b, cb, -m->nx, -m->ny)) return false;
-        set_point(m, 0.5 * (x[0] + y[0]), 0.5 * (x[1] + y[1]), gap, d[0], d[1],
-                  0x7ff00000u | (uint32_t)ca << 10 | (uint32_t)cb);
-        return true;
+        return join_corners(&a->p, ca, &b->p, cb, d, margin, m) && corner_counts(a, ca, m->nx, m->ny) &&
+               corner_counts(b, cb, -m->nx, -m->ny);
     }
     const part_of_body *ref = of_b ? b : a, *inc = of_b ? a : b;
     double nx, ny;
@@ -431,7 +433,7 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
     double d[2];
     bt_bodies_offset(w, ia, ib, d);
     const part_of_body a = part_of(&w->bodies, ia, part[0], 0, 0), b = part_of(&w->bodies, ib, part[1], d[0], d[1]);
-    const double tie = 0.01 * bt_min(w->bodies.radius[ia], w->bodies.radius[ib]);
+    const double tie = tie_of(&w->bodies, ia, ib);
     // Parts do not hold the centroid of their body, which rules out edges in max_separation: all edges in full, the
     // last axis first.
     const int32_t n = a.p.count + b.p.count, hint = *axis_out >= 0 && *axis_out < n ? *axis_out : 0;
@@ -447,21 +449,13 @@ bool bt_contacts_parts(const bt_world *w, bt_idx ia, bt_idx ib, const uint16_t p
     if (best > margin) return false;
 
     *m = (bt_manifold){.a = ia, .b = ib};
-    int ea = 0, eb = 0;
-    const double sa = separation_that_counts(&a, &b, &ea), sb = separation_that_counts(&b, &a, &eb);
-    bool ref_b = sb > sa;
-    if (isfinite(sa) && isfinite(sb)) {
-        double ax, ay, bx, by;
-        edge_normal(&a.p, ea, &ax, &ay);
-        edge_normal(&b.p, eb, &bx, &by);
-        const bool square = ax * bx + ay * by < -0.98;
-        if (square && reference_before >= 0 && fabs(sa - sb) < tie) ref_b = reference_before;
-        else if (square && reference_before < 0 && sb < sa + tie) ref_b = false;
-        if (bt_max(sa, sb) > 0 && (ref_b ? sb : sa) <= 0) ref_b = !ref_b;
-    }
-    const double sep = ref_b ? sb : sa;
+    best_axes s = {0};
+    s.sa = separation_that_counts(&a, &b, &s.ia);
+    s.sb = separation_that_counts(&b, &a, &s.ib);
+    const bool ref_b = reference_is_b(&a.p, &b.p, &s, tie, reference_before);
+    const double sep = ref_b ? s.sb : s.sa;
     const part_of_body *ref = ref_b ? &b : &a, *inc = ref_b ? &a : &b;
-    const int edge = ref_b ? eb : ea;
+    const int edge = ref_b ? s.ib : s.ia;
     if (best > 0) {
         if (sep > 0 && sep >= best - tie) {
             clip_what_counts(ref, edge, inc, ref_b, d, margin, m);

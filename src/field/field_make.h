@@ -53,7 +53,6 @@ typedef struct bt_tessellation {
     double *target;  ///< [n] area asked for, m²
 } bt_tessellation;
 
-bt_tessellation bt_tessellation_create(bt_idx n);
 void bt_tessellation_free(bt_tessellation *c);
 /// Cells of a power diagram whose areas approach target[n] × a common factor. The cells own a copy of target.
 bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed);

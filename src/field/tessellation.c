@@ -46,7 +46,7 @@ typedef struct diagram {
     bt_idx *member;   // [n]
 } diagram;
 
-bt_tessellation bt_tessellation_create(bt_idx n)
+static bt_tessellation create(bt_idx n)
 {
     bt_tessellation c = {.n = n};
     c.nv = bt_alloc((size_t)n, sizeof *c.nv);
@@ -298,7 +298,7 @@ static void place_seeds(const bt_region *y, bt_idx n, const double *radius, int6
 
 bt_tessellation bt_tessellation_tessellate(const bt_region *y, bt_idx n, const double *target, int64_t seed)
 {
-    bt_tessellation cells = bt_tessellation_create(n);
+    bt_tessellation cells = create(n);
     double lx = y->x1 - y->x0, ly = y->y1 - y->y0, wanted = 0;
     for (bt_idx i = 0; i < n; i++) wanted += target[i];
     double share = y->ice_area / wanted; // cells fill the region

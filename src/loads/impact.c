@@ -46,7 +46,8 @@ void bt_impacts_free(bt_impacts *m)
 
 // --- force of a collision --------------------------------------------------------------------------------------------
 
-void bt_impact_convert(const bt_impact_rule *r, bt_impact *e)
+/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
+static void convert(const bt_impact_rule *r, bt_impact *e)
 {
     if (!r->real_corner || !(e->corner > 0 && e->corner < BT_PI)) e->corner = r->corner_angle;
     if (r->conversion == BT_IMPACT_CRUSHING) {
@@ -80,7 +81,7 @@ static void close_event(bt_impacts *m, const bt_impact_open *o)
     bt_impact *e = &m->closed[m->n_closed++];
     *e = o->so_far;
     e->panel = bt_panels_at(&m->panels, e->x, e->y);
-    bt_impact_convert(&m->rule, e);
+    convert(&m->rule, e);
 }
 
 /// Contacts t[n] of one floe in this step into its event; o is its open one, or empty. True when an event is there that

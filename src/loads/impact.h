@@ -116,8 +116,6 @@ void bt_impacts_take(bt_world *w);
 /// The run is over: what is still open is closed as it is, into `closed`.
 void bt_impacts_end(bt_impacts *m);
 
-/// Mean, peak and duration of a collision from its impulse, approach, mass, thickness and corner.
-void bt_impact_convert(const bt_impact_rule *r, bt_impact *e);
 
 /// What the conversion is, in words: "half-sine of 0.1 s".
 void bt_impact_describe(const bt_impact_rule *r, char out[160]);

@@ -93,7 +93,8 @@ bt_status bt_folder_check(const char *dir, bt_errors *err)
     return status;
 }
 
-bool bt_folder_begun(const char *dir)
+/// Does the folder hold a run that has begun and not come to its end?
+static bool has_begun(const char *dir)
 {
     return bt_file_there(dir, BT_RESULT_PART) || bt_checkpoint_there(dir) || bt_folder_keeps(dir);
 }
@@ -212,7 +213,7 @@ void bt_folder_settle(const char *dir)
 
 bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err)
 {
-    const bool finished = bt_file_there(dir, "summary.json"), begun = bt_folder_begun(dir);
+    const bool finished = bt_file_there(dir, "summary.json"), begun = has_begun(dir);
     const bt_status foreign = bt_folder_check(dir, err);
     if (foreign != BT_OK || force || (!finished && !begun && !bt_file_there(dir, "result.h5"))) return foreign;
     if (finished || !begun)

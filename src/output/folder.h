@@ -27,9 +27,6 @@ bt_status bt_folder_check(const char *dir, bt_errors *err);
 /// force. Errors: BT_ERR_IO.
 bt_status bt_folder_may_take(const char *dir, bool force, bt_errors *err);
 
-/// Does the folder hold a run that has begun and not come to its end?
-bool bt_folder_begun(const char *dir);
-
 /// Move what is there aside and give the resolved case its name. After an error the folder is as it was.
 bt_status bt_folder_replace(const char *dir, const char *resolved, bt_errors *err);
 

@@ -13,7 +13,12 @@
 #define COLUMN(column, name, member) [column] = {"history/" name, offsetof(bt_sample, member)}
 _Static_assert((int)BT_N_COLUMNS == (int)BT_COST_COLUMNS, "what check says of memory and disk counts them");
 
-const bt_column_def bt_history_columns[BT_N_COLUMNS] = {
+typedef struct {
+    const char *name;   ///< in the checkpoint, under history/
+    size_t offset;      ///< of the number in bt_sample
+} column_def;
+
+static const column_def columns[BT_N_COLUMNS] = {
     COLUMN(BT_COL_TIME, "time", time),
     COLUMN(BT_COL_ICE, "ice", ice_resistance),
     COLUMN(BT_COL_TOW, "tow", tow_force),
@@ -102,7 +107,7 @@ static void add_total(bt_history *h, const bt_total *t, const bt_sample *s)
 
 const char *bt_history_name(int k, char name[BT_HISTORY_NAME])
 {
-    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", bt_history_columns[k].name);
+    if (k < BT_N_COLUMNS) snprintf(name, BT_HISTORY_NAME, "%s", columns[k].name);
     else snprintf(name, BT_HISTORY_NAME, BT_HISTORY_ADDED "%s", bt_added(k - BT_N_COLUMNS)->name);
     return name;
 }
@@ -123,7 +128,7 @@ void bt_history_add(bt_history *h, const bt_sample *s)
             h->column[k] = bt_realloc(h->column[k], (size_t)h->cap, sizeof(double));
     }
     for (int k = 0; k < BT_N_COLUMNS; k++)
-        h->column[k][h->n] = *(const double *)(const void *)((const char *)s + bt_history_columns[k].offset);
+        h->column[k][h->n] = *(const double *)(const void *)((const char *)s + columns[k].offset);
     for (int k = BT_N_COLUMNS; k < h->n_columns; k++)
         h->column[k][h->n] = bt_sample_value(s, bt_added(k - BT_N_COLUMNS));
     h->n++;

@@ -6,7 +6,7 @@
 #include "base/snapshot.h"
 #include "output/record.h"
 
-/// Columns of what the summary keeps of every step; names and members of the sample: bt_history_columns.
+/// Columns of what the summary keeps of every step; names and members of the sample: history.c.
 typedef enum bt_column {
     BT_COL_TIME,
     BT_COL_ICE,
@@ -25,13 +25,6 @@ typedef enum bt_column {
     BT_COL_QUASI_STATIC,
     BT_N_COLUMNS
 } bt_column;
-
-typedef struct bt_column_def {
-    const char *name;   ///< in the checkpoint, under history/
-    size_t offset;      ///< of the number in bt_sample
-} bt_column_def;
-
-extern const bt_column_def bt_history_columns[BT_N_COLUMNS];
 
 /// What the summary keeps of every step, whatever output.sample_every says: 120 bytes a step.
 typedef struct bt_history {

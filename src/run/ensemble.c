@@ -110,7 +110,7 @@ static void look(entry *x)
 enum { SOUND, DAMAGED, UNREADABLE };
 
 /// Check a member that says it has finished. What is damaged is taken away, unless somebody is at it already.
-static int check_member(ensemble *e, entry *x, bt_errors *told_of)
+static int check_member(ensemble *e, entry *x, bt_errors *warnings)
 {
     bt_errors why = {0};
     bt_status status = bt_member_record_check(&e->records, x->index, x->m.name, x->folder, &why);
@@ -131,7 +131,7 @@ static int check_member(ensemble *e, entry *x, bt_errors *told_of)
         if (fd >= 0) close(fd);
     }
     for (size_t k = 0; k < why.n && k < 1; k++)
-        bt_errors_add(told_of, "warning: member %s is not sound%s: %s%s", x->m.name,
+        bt_errors_add(warnings, "warning: member %s is not sound%s: %s%s", x->m.name,
                       status == BT_ERR_CASE ? " and is run again" : ", and stays so", why.text[k],
                       why.n > 1 ? ", ..." : "");
     bt_errors_free(&why);
@@ -158,11 +158,11 @@ static void check_members(ensemble *e)
     const int n = (int)(e->n / PER_WORD + 1);
     uint64_t *found = bt_alloc((size_t)n, sizeof *found);
     memset(found, 0, (size_t)n * sizeof *found);
-    bt_errors told_of = {0};
+    bt_errors warnings = {0};
     for (int64_t i = e->world->rank; i < e->n; i += e->world->size) {
         entry *x = &e->list[i];
         if (bt_ensemble_state(x->folder, NULL, NULL) != BT_MEMBER_FINISHED) continue;
-        found[i / PER_WORD] |= (uint64_t)check_member(e, x, &told_of) << 2 * (i % PER_WORD);
+        found[i / PER_WORD] |= (uint64_t)check_member(e, x, &warnings) << 2 * (i % PER_WORD);
     }
     bt_comm_reduce(e->world, NULL, 0, NULL, 0, found, n);
     share_records(e);
@@ -171,9 +171,9 @@ static void check_members(ensemble *e)
         if (how == DAMAGED) e->list[i].settled = false;
         if (how == UNREADABLE) e->list[i].settled = true; // nothing can be done about it here
     }
-    bt_comm_errors(e->world, &told_of);
-    if (e->world->rank == 0) print_warnings(&told_of);
-    bt_errors_free(&told_of);
+    bt_comm_errors(e->world, &warnings);
+    if (e->world->rank == 0) print_warnings(&warnings);
+    bt_errors_free(&warnings);
     free(found);
 }
 
@@ -540,8 +540,8 @@ static void forget_failures(const ensemble *e)
 }
 
 /// Collective. Nothing is left to begin: wait a moment if other processes are at work on members, which may finish or
-/// die. told_of: that has been said.
-static bool wait_for_others(ensemble *e, bool told_of)
+/// die. reported: that has been said.
+static bool wait_for_others(ensemble *e, bool reported)
 {
     int64_t n = 0;
     for (int64_t i = 0; e->world->rank == 0 && i < e->n; i++) {
@@ -550,7 +550,7 @@ static bool wait_for_others(ensemble *e, bool told_of)
     }
     bt_comm_bcast(e->world, &n, sizeof n);
     if (n == 0) return false;
-    if (!told_of && !e->o->quiet && e->jobs == 1 && e->world->rank == 0) {
+    if (!reported && !e->o->quiet && e->jobs == 1 && e->world->rank == 0) {
         printf("waiting for %" PRId64 " members that other processes are at work on (--no-wait does not)\n", n);
         fflush(stdout);
     }

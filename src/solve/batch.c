@@ -15,19 +15,19 @@ enum { LANES = BT_LANES, OPEN = 8 }; // OPEN: batches that wait for more contact
 typedef bt_vec vec;
 typedef bt_mask mask;
 
-typedef enum { RIGID, BOUNDED, SHEETS, PUSHES } kind_of_units; // of a batch
+typedef enum { RIGID, BOUNDED, SHEETS, PROJECTION } kind_of_batch;
 
 /// Names as in bt_contact; lanes without a contact are zero.
 typedef struct bt_batch {
     vec nx, ny, ran[2], rbn[2], rat, rbt, w[2], w12, mn[2], per_det, wt, mt, bias[2];
-    vec mu;                    // friction; of pushes: the overlap that is left alone, m
+    vec mu;                    // friction; of the projection: the overlap that is left alone, m
     vec ma, ia, mb, ib;        // inverse masses and moments of inertia of a and b
     vec x[3], before[3], y[3]; // impulses, or multipliers: now, before the last sweep, after the move
     vec bound[2];              // of the normals; bound[0] of sheets: the radius of their disc
     bt_idx a[LANES], b[LANES], contact[LANES];
     bool moves_a[LANES], moves_b[LANES];
     int n;
-    kind_of_units kind;
+    kind_of_batch kind;
 } bt_batch;
 
 bool bt_batch_is_for(const bt_cell *cell)
@@ -35,13 +35,13 @@ bool bt_batch_is_for(const bt_cell *cell)
     return !(cell->laws.limits && cell->laws.rising) && cell->phase != BT_COLOURS;
 }
 
-bool bt_batch_pushes(const bt_cell *cell) { return cell->phase != BT_COLOURS; }
+bool bt_batch_projects(const bt_cell *cell) { return cell->phase != BT_COLOURS; }
 
 // --- packing ---------------------------------------------------------------------------------------------------------
 
-static kind_of_units kind_of(const bt_cell *cell, const bt_contact *u, bool pushes)
+static kind_of_batch kind_of(const bt_cell *cell, const bt_contact *u, bool projection)
 {
-    return pushes ? PUSHES : !cell->laws.limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
+    return projection ? PROJECTION : !cell->laws.limits ? RIGID : u->n > 0 ? BOUNDED : SHEETS;
 }
 
 static bool holds(const bt_batch *o, bt_idx body)
@@ -53,14 +53,14 @@ static bool holds(const bt_batch *o, bt_idx body)
 
 /// What the position projection has in place of impulses, biases and friction. Sheets, and a point that is not there,
 /// have none.
-static void put_push(bt_batch *o, int l, const bt_contact *u, const bt_gaps *g, double slop)
+static void put_projection(bt_batch *o, int l, const bt_contact *u, const bt_gaps *g, double slop)
 {
     o->mu[l] = slop;
     for (int c = 0; c < 2; c++) {
         const bool there = c < u->n;
         o->mn[c][l] = there ? u->mn[c] : 0;
         o->bias[c][l] = there ? g->after[c] : 0;
-        o->x[c][l] = there ? g->push[c] : 0;
+        o->x[c][l] = there ? g->multiplier[c] : 0;
     }
     o->x[2][l] = o->before[2][l] = 0;
 }
@@ -86,7 +86,7 @@ static void put(bt_batch *o, const bt_cell *cell, bt_idx i, const bt_inv *inv)
     o->moves_a[l] = inv[u->a].m > 0, o->moves_b[l] = inv[u->b].m > 0;
 }
 
-static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_units kind)
+static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_batch kind)
 {
     if (cell->work.n_batches == cell->work.cap_batches) {
         const bt_idx cap = bt_max(LANES, 2 * cell->work.cap_batches);
@@ -104,7 +104,7 @@ static bt_batch *begin_batch(bt_cell *cell, const bt_contact *u, kind_of_units k
 }
 
 /// May a contact stand in a batch?
-static bool fits(const bt_batch *o, const bt_contact *u, kind_of_units kind, const bt_inv *inv)
+static bool fits(const bt_batch *o, const bt_contact *u, kind_of_batch kind, const bt_inv *inv)
 {
     return o->kind == kind && !(inv[u->a].m > 0 && holds(o, u->a)) && !(inv[u->b].m > 0 && holds(o, u->b));
 }
@@ -120,7 +120,7 @@ static void pack(bt_cell *cell, const bt_inv *inv, const double *slop)
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_contact *u = &cell->contacts[cell->work.list[j]];
         int k = 0;
-        const kind_of_units kind = kind_of(cell, u, slop != NULL);
+        const kind_of_batch kind = kind_of(cell, u, slop != NULL);
         while (k < n_open && !fits(&cell->work.batch[open[k]], u, kind, inv)) k++;
         if (k == n_open) {
             if (n_open == OPEN) memmove(open, open + 1, (OPEN - 1) * sizeof *open), k = --n_open;
@@ -129,7 +129,7 @@ static void pack(bt_cell *cell, const bt_inv *inv, const double *slop)
         }
         bt_batch *o = &cell->work.batch[open[k]];
         put(o, cell, cell->work.list[j], inv);
-        if (slop) put_push(o, o->n - 1, u, &cell->gaps[cell->work.list[j]], *slop);
+        if (slop) put_projection(o, o->n - 1, u, &cell->gaps[cell->work.list[j]], *slop);
         if (o->n < LANES) continue;
         n_open--;
         memmove(open + k, open + k + 1, (size_t)(n_open - k) * sizeof *open);
@@ -150,9 +150,9 @@ void bt_batch_unpack(bt_cell *cell)
         const bt_batch *o = &cell->work.batch[k];
         for (int l = 0; l < o->n; l++) {
             bt_contact *u = &cell->contacts[o->contact[l]];
-            if (o->kind == PUSHES) {
+            if (o->kind == PROJECTION) {
                 bt_gaps *g = &cell->gaps[o->contact[l]];
-                g->push[0] = o->x[0][l], g->push[1] = o->x[1][l];
+                g->multiplier[0] = o->x[0][l], g->multiplier[1] = o->x[1][l];
             } else {
                 u->ln[0] = o->x[0][l], u->ln[1] = o->x[1][l], u->lt = o->x[2][l];
             }
@@ -311,7 +311,7 @@ BT_INLINE vec update(bt_batch *o, bt_vel *v, bool bounded)
 }
 
 /// As the update of one contact in project.c: its points one after the other.
-BT_INLINE vec push(bt_batch *o, bt_vel *d)
+BT_INLINE vec project(bt_batch *o, bt_vel *d)
 {
     motion a = load(d, o->a), b = load(d, o->b);
     const vec zero = {0};
@@ -345,10 +345,10 @@ static double pass(bt_batch *batch, bt_idx n, bt_vel *v)
 }
 
 BT_FOR_EACH_CPU
-static double pass_pushes(bt_batch *batch, bt_idx n, bt_vel *d)
+static double pass_projection(bt_batch *batch, bt_idx n, bt_vel *d)
 {
     vec most = {0};
-    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, push(&batch[k], d));
+    for (bt_idx k = 0; k < n; k++) most = bt_larger(most, project(&batch[k], d));
     return largest_lane(most);
 }
 
@@ -411,9 +411,9 @@ double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_swee
     return visit(cell, v, cell->laws.limits ? pass_bounded : pass, s, times, enough, done, most);
 }
 
-double bt_batch_push(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
-                     double *most)
+double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+                        double *most)
 {
     if (!cell->work.packed) pack(cell, inv, &slop);
-    return visit(cell, d, pass_pushes, s, 1, 0, done, most);
+    return visit(cell, d, pass_projection, s, 1, 0, done, most);
 }

@@ -28,7 +28,7 @@
 /// Are the contacts of this cell swept in batches?
 bool bt_batch_is_for(const bt_cell *cell);
 /// And in the position projection?
-bool bt_batch_pushes(const bt_cell *cell);
+bool bt_batch_projects(const bt_cell *cell);
 
 /// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the
@@ -37,8 +37,8 @@ double bt_batch_sweep(bt_cell *cell, bt_vel *v, const bt_inv *inv, const bt_swee
                       int64_t *done, double *most);
 
 /// The same for the position projection, in one pass; d: displacements, slop: overlap that is left alone, m.
-double bt_batch_push(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
-                     double *most);
+double bt_batch_project(bt_cell *cell, double slop, bt_vel *d, const bt_inv *inv, const bt_sweep *s, int64_t *done,
+                        double *most);
 
 /// The contacts of the list in the order in which they are swept, [n_list]; of a cell that has been swept.
 void bt_batch_order(const bt_cell *cell, bt_idx *contact);

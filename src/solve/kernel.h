@@ -133,14 +133,14 @@ static inline double bt_opening(const bt_contact *u, const bt_gaps *g, double sl
 
 /// Gauss–Seidel update of the multipliers of a contact in the position projection, d: displacements. Returns the
 /// largest correction, m.
-static inline double bt_push_contact(const bt_contact *u, bt_gaps *g, double slop, bt_vel *d, const bt_inv *inv)
+static inline double bt_project_contact(const bt_contact *u, bt_gaps *g, double slop, bt_vel *d, const bt_inv *inv)
 {
     bt_vel da = d[u->a], db = d[u->b];
     double most = 0;
     for (int i = 0; i < u->n; i++) {
-        const double p = bt_max(0, g->push[i] - bt_opening(u, g, slop, i, &da, &db) * u->mn[i]);
-        const double step = p - g->push[i];
-        g->push[i] = p;
+        const double p = bt_max(0, g->multiplier[i] - bt_opening(u, g, slop, i, &da, &db) * u->mn[i]);
+        const double step = p - g->multiplier[i];
+        g->multiplier[i] = p;
         bt_apply(u, step, step * u->ran[i], step * u->rbn[i], 0, inv[u->a], inv[u->b], &da, &db);
         most = bt_max(most, fabs(step) * u->w[i]);
     }

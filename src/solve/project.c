@@ -3,7 +3,7 @@
 //
 // With the gaps predicted for the end of the step, g2 = g + Δt J_n U2, find displacements D = M⁻¹ J_nᵀ p with
 //     0 ≤ p ⟂ J_n D + g2 + slop ≥ 0
-// by the same rows without friction, in rounds over the points that push or overlap (rounds.h). Touching contacts (g2 ≥
+// by the same rows without friction, in rounds over the points that bear or overlap (rounds.h). Touching contacts (g2 ≥
 // −slop) take part, so that pushing two floes apart does not press either into a third. Velocity-level correction
 // (Baumgarte) would add kinetic energy and load that is not there (Metrikin 2014).
 #include <math.h>
@@ -28,7 +28,7 @@ static void find_overlap(bt_world *w, bt_idx k, const void *context, bt_totals *
         bt_gaps *g = &cell->gaps[j];
         for (int i = 0; i < 3; i++) cell->work.before[j][i] = 0;
         for (int i = 0; i < u->n; i++) {
-            g->push[i] = 0;
+            g->multiplier[i] = 0;
             g->after[i] = g->gap[i] + w->par.dt * bt_normal_velocity(u, i, &w->bodies.vel[u->a], &w->bodies.vel[u->b]);
             if (cell->laws.limits) g->after[i] += cell->laws.limits[j].grown[i]; // what has given way in this step
             t->most = bt_max(t->most, -g->after[i]);
@@ -53,10 +53,10 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
         bool on = p->plain;
         for (int i = 0; i < u->n; i++) {
             const double open = bt_opening(u, g, w->par.slop, i, &d[u->a], &d[u->b]);
-            const double r = fabs(bt_max(0, g->push[i] - open * u->mn[i]) - g->push[i]) * u->w[i];
+            const double r = fabs(bt_max(0, g->multiplier[i] - open * u->mn[i]) - g->multiplier[i]) * u->w[i];
             worst = bt_max(worst, r);
             sum += r * r;
-            on = on || g->push[i] > 0 || g->push[i] != cell->work.before[j][i] || !(open >= 0);
+            on = on || g->multiplier[i] > 0 || g->multiplier[i] != cell->work.before[j][i] || !(open >= 0);
         }
         t->most = bt_max(t->most, worst);
         bad += worst > near;
@@ -66,15 +66,15 @@ static void residual_of_cell(bt_world *w, bt_idx k, const void *context, bt_tota
     bt_rounds_found(p, cell, sum, rows, bad, t);
 }
 
-static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+static void project_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const bt_sweep *o = context;
     bt_cell *cell = &w->cells->cell[k];
     if (cell->work.n_list == 0) return;
-    if (bt_batch_pushes(cell) && !o->problem->plain) { // fields are shaken plain, and keep their bits
+    if (bt_batch_projects(cell) && !o->problem->plain) { // fields are shaken plain, and keep their bits
         int64_t done = 0;
         double most = 0;
-        const double against = bt_batch_push(cell, w->par.slop, w->solver->shift, w->bodies.inv, o, &done, &most);
+        const double against = bt_batch_project(cell, w->par.slop, w->solver->shift, w->bodies.inv, o, &done, &most);
         t->most = bt_max(t->most, most);
         bt_sum_add(&t->sum[BT_SWEEP_UPDATES], (double)done);
         if (o->moves) bt_rounds_moved(cell, o, against, t);
@@ -82,19 +82,22 @@ static void push_cell(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     }
     bt_moved moved;
     if (o->moves) bt_moved_begin(&moved, cell);
-    for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++)
-        bt_rounds_move(o, cell->gaps[cell->work.list[j]].push, cell->work.before[cell->work.list[j]], moved.y[j], 2);
-    for (bt_idx j = 0; j < cell->work.n_list; j++)
-        t->most = bt_max(t->most, bt_push_contact(&cell->contacts[cell->work.list[j]],
-                                                  &cell->gaps[cell->work.list[j]], w->par.slop, w->solver->shift,
-                                                  w->bodies.inv));
+    for (bt_idx j = 0; o->moves && j < cell->work.n_list; j++) {
+        const bt_idx u = cell->work.list[j];
+        bt_rounds_move(o, cell->gaps[u].multiplier, cell->work.before[u], moved.y[j], 2);
+    }
+    for (bt_idx j = 0; j < cell->work.n_list; j++) {
+        const bt_idx u = cell->work.list[j];
+        t->most = bt_max(t->most, bt_project_contact(&cell->contacts[u], &cell->gaps[u], w->par.slop,
+                                                     w->solver->shift, w->bodies.inv));
+    }
     bt_sum_add(&t->sum[BT_SWEEP_UPDATES], cell->work.n_list);
     if (!o->moves) return;
     double against = 0;
     for (bt_idx j = 0; j < cell->work.n_list; j++) {
         const bt_idx u = cell->work.list[j];
         for (int i = 0; i < 2; i++)
-            against += bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].push[i], cell->work.before[u][i],
+            against += bt_rounds_against(cell->contacts[u].w[i], cell->gaps[u].multiplier[i], cell->work.before[u][i],
                                          moved.y[j][i]);
     }
     bt_moved_end(&moved, cell, o, against, t);
@@ -124,7 +127,7 @@ void bt_solver_project(bt_world *w)
             memset(s->shift + ts->cell[k].first, 0, (size_t)(ts->cell[k].end - ts->cell[k].first) * sizeof *s->shift);
     }
     bt_problem p = {.residual = residual_of_cell,
-                    .sweep = push_cell,
+                    .sweep = project_cell,
                     .vel = s->shift,
                     .tolerance = 0.1 * w->par.slop,
                     .cap = 0.9,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Looks, sweeps over lists, momentum and its cap; method and reasons in rounds.h.
+// Residual passes, sweeps over lists, momentum and its cap; method and reasons in rounds.h.
 #include "solve/rounds.h"
 
 #include <limits.h>
@@ -17,9 +17,9 @@
 #define NARROWER 1.25   // of the distance of the cap from 1, and of the length of a round
 #define WIDER 1.5
 #define LEAST_CAP 0.3   // less is none
-#define CALM 0.3         // of the limit of work, beyond it
-#define HARD 0.5         // of the limit of work: from here on the best unknowns are kept
-#define FAR 4            // tolerances: a residual that is not left at the limit of work
+#define NO_MOMENTUM 0.3 // of the limit of work, beyond it: without momentum
+#define HARD 0.5        // of the limit of work: from here on the best unknowns are kept
+#define FAR 4           // tolerances: a residual that is not left at the limit of work
 #define LEAST_SWEEP 0.01 // of the contacts, that a sweep counts for against the limit of work at least
 enum { ROUNDS = 3, MOST_LENGTH = 300, FREE_LENGTH = 400, FEW_BAD = 100, MOST_MORE = 2 };
 
@@ -309,13 +309,13 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
     momentum m = {.theta = 1};
     double best = INFINITY;
     const double all_work = p->limit * (p->plain ? 1 : (double)(work->contacts + 1));
-    // between them no momentum
-    double calm = spent(p, work) + all_work, limit = calm + (p->plain ? 0 : CALM * all_work);
+    // between the two no momentum
+    double fast = spent(p, work) + all_work, limit = fast + (p->plain ? 0 : NO_MOMENTUM * all_work);
     int more = 0; // further attempts
     bool settled = true; // velocities, and the residual, are those of the impulses
     bool all = false;    // the last round was over the whole field
     for (int n = 0; work->residual > p->tolerance && spent(p, work) < limit; n++) {
-        const bool last = !p->plain && spent(p, work) >= calm;
+        const bool last = !p->plain && spent(p, work) >= fast;
         if (last) {
             // from where momentum came nearest
             if (a.cap > 0 && back_to_best(w, p, work, best)) settled = true, all = false;
@@ -323,10 +323,10 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         } else if (n % ROUNDS == 0 && !p->plain) adapt(&a, p, work->squares);
         const bool part = !p->plain && n % 2 == 1 && FEW_BAD * work->bad < work->listed, on = all && !part && !settled;
         if (part) keep_near_bad(w);
-        settled = run_round(w, p, a.length, a.cap, on, last ? limit : calm, &m, work) && !part;
+        settled = run_round(w, p, a.length, a.cap, on, last ? limit : fast, &m, work) && !part;
         all = !part;
         bt_rounds_residual(w, p, settled, work);
-        if (p->keep && !p->plain && spent(p, work) > calm - HARD * all_work) keep_better(w, p, work, &best);
+        if (p->keep && !p->plain && spent(p, work) > fast - HARD * all_work) keep_better(w, p, work, &best);
         if (!settled && work->residual <= p->tolerance) {
             bt_rounds_residual(w, p, true, work);
             settled = true;
@@ -335,7 +335,7 @@ void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work)
         if (p->plain || !p->keep || more++ == MOST_MORE) continue;
         a = (pace){.cap = p->cap, .mark = INFINITY, .length = p->length};
         all = false;
-        calm = spent(p, work) + HARD * all_work, limit = calm + CALM * all_work;
+        fast = spent(p, work) + HARD * all_work, limit = fast + NO_MOMENTUM * all_work;
     }
     if (!settled) bt_rounds_residual(w, p, true, work);
     back_to_best(w, p, work, best);

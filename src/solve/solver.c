@@ -282,15 +282,6 @@ static bt_problem contact_problem(const bt_world *w)
     return p;
 }
 
-double bt_solver_residual(bt_world *w, double *rms)
-{
-    const bt_problem p = contact_problem(w);
-    bt_work work = {0};
-    bt_rounds_residual(w, &p, false, &work);
-    if (rms) *rms = work.rows > 0 ? sqrt(work.squares / (double)work.rows) : 0;
-    return work.residual;
-}
-
 /// Start from the impulses of the step before. True when there are any.
 static bool warm_start(bt_world *w)
 {

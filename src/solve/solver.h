@@ -69,10 +69,6 @@ void bt_solver_solve(bt_world *w);
 /// rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *w);
 
-/// Natural-map residual at the present velocities and impulses: largest, and root mean square (or NULL), m/s.
-/// Collective.
-double bt_solver_residual(bt_world *w, double *rms);
-
 /// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
 bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);
 

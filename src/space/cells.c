@@ -369,7 +369,7 @@ void bt_cells_remember(bt_cell *t, const bt_memory *r)
     t->laws.memory[t->laws.n_memory++] = *r;
 }
 
-static bt_memory trace_of(const bt_gid *gid, const bt_pair *p)
+static bt_memory memory_of(const bt_gid *gid, const bt_pair *p)
 {
     return (bt_memory){.a = gid[p->a], .b = gid[p->b], .part = {p->part[0], p->part[1]}, .n_points = p->n_points,
                       .feature = {p->feature[0], p->feature[1]}, .value = {p->ln[0], p->ln[1], p->lt}};
@@ -384,15 +384,15 @@ bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n)
             cap += t->cell[k].search.pairs[i].n_points > 0;
         if (t->cell[k].own) cap += t->cell[k].laws.n_memory;
     }
-    bt_memory *trace = bt_alloc((size_t)cap, sizeof *trace);
+    bt_memory *memory = bt_alloc((size_t)cap, sizeof *memory);
     *n = 0;
     for (bt_idx k = 0; k < t->n; k++) {
         const bt_cell *cell = &t->cell[k];
-        for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) trace[(*n)++] = cell->laws.memory[i];
+        for (bt_idx i = 0; cell->own && i < cell->laws.n_memory; i++) memory[(*n)++] = cell->laws.memory[i];
         for (bt_idx i = 0; cell->own && i < cell->search.n_pairs; i++)
-            if (cell->search.pairs[i].n_points > 0) trace[(*n)++] = trace_of(w->bodies.gid, &cell->search.pairs[i]);
+            if (cell->search.pairs[i].n_points > 0) memory[(*n)++] = memory_of(w->bodies.gid, &cell->search.pairs[i]);
     }
-    return trace;
+    return memory;
 }
 
 bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
@@ -407,17 +407,18 @@ bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b)
     return bt_cells_at(t, at[0], at[1]);
 }
 
-void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
+/// Put memory, in any order, into the pair lists of empty cells.
+static void put_memory(bt_world *w, bt_memory *memory, int64_t n)
 {
     bt_cells *t = w->cells;
-    if (n > 0) qsort(trace, (size_t)n, sizeof *trace, bt_memory_by_names);
+    if (n > 0) qsort(memory, (size_t)n, sizeof *memory, bt_memory_by_names);
     for (int64_t k = 0; k < n; k++) {
-        const bt_idx a = bt_world_index(w, trace[k].a), b = bt_world_index(w, trace[k].b);
+        const bt_idx a = bt_world_index(w, memory[k].a), b = bt_world_index(w, memory[k].b);
         // a floe that has shot so far away from a large body that its rank does not hold it any more
         if (a < 0 || b < 0) continue;
         bt_cell *cell = &t->cell[bt_cells_of_pair(w, a, b)];
-        if (trace[k].law != 0) {
-            bt_cells_remember(cell, &trace[k]);
+        if (memory[k].law != 0) {
+            bt_cells_remember(cell, &memory[k]);
             continue;
         }
         if (cell->search.n_pairs == cell->search.cap_pairs) {
@@ -427,10 +428,10 @@ void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n)
         }
         bt_pair *p = &cell->search.pairs[cell->search.n_pairs++];
         *p = (bt_pair){
-            .a = a, .b = b, .axis = -1, .n_points = trace[k].n_points, .reach = -INFINITY, .lt = trace[k].value[2]};
-        memcpy(p->part, trace[k].part, sizeof p->part);
-        memcpy(p->feature, trace[k].feature, sizeof p->feature);
-        memcpy(p->ln, trace[k].value, sizeof p->ln);
+            .a = a, .b = b, .axis = -1, .n_points = memory[k].n_points, .reach = -INFINITY, .lt = memory[k].value[2]};
+        memcpy(p->part, memory[k].part, sizeof p->part);
+        memcpy(p->feature, memory[k].feature, sizeof p->feature);
+        memcpy(p->ln, memory[k].value, sizeof p->ln);
     }
 }
 
@@ -448,31 +449,31 @@ bool bt_cells_adjacent(const bt_cells *t, const int32_t p[2], const int32_t q[2]
 /// Leave out what cannot touch under the new labels: floes that have shot apart within one step, by more than the
 /// margin they had (the last solution may be one that did not converge). No cell has both in its block, and no rank may
 /// hold both.
-static void drop_parted(const bt_world *w, bt_memory *trace, int64_t *n)
+static void drop_parted(const bt_world *w, bt_memory *memory, int64_t *n)
 {
     const bt_bodies *b = &w->bodies;
     int64_t kept = 0;
     for (int64_t k = 0; k < *n; k++) {
-        const bt_idx i = bt_world_index(w, trace[k].a), j = bt_world_index(w, trace[k].b);
+        const bt_idx i = bt_world_index(w, memory[k].a), j = bt_world_index(w, memory[k].b);
         const bool one_large = b->large[i] || b->large[j];
-        if (one_large || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j])) trace[kept++] = trace[k];
+        if (one_large || bt_cells_adjacent(w->cells, b->cell[i], b->cell[j])) memory[kept++] = memory[k];
     }
     *n = kept;
 }
 
-/// Bodies to their ranks and places under the labels they have, and cells around them with these traces, which are
+/// Bodies to their ranks and places under the labels they have, and cells around them with this memory, which is
 /// released.
-static void place(bt_world *w, bt_memory *trace, int64_t n)
+static void place(bt_world *w, bt_memory *memory, int64_t n)
 {
     bt_cells *t = w->cells;
     for (bt_idx k = 0; k < t->n; k++) free_cell(&t->cell[k]);
     t->n = 0;
-    if (w->exchange) trace = w->exchange->migrate(w, trace, &n);
+    if (w->exchange) memory = w->exchange->migrate(w, memory, &n);
     sort_bodies(w);
     make_cells(w);
-    bt_cells_put_memory(w, trace, n);
+    put_memory(w, memory, n);
     if (w->exchange) w->exchange->connect(w);
-    free(trace);
+    free(memory);
     t->labelled = true;
 }
 
@@ -486,13 +487,13 @@ static void relabel(bt_world *w, bool renew, double margin)
         t->n_labellings++;
     }
     int64_t n;
-    bt_memory *trace = bt_cells_take_memory(w, &n);
-    if (renew) drop_parted(w, trace, &n);
-    place(w, trace, n);
+    bt_memory *memory = bt_cells_take_memory(w, &n);
+    if (renew) drop_parted(w, memory, &n);
+    place(w, memory, n);
     t->relabel = false;
 }
 
-void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n) { place(w, trace, n); }
+void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n) { place(w, memory, n); }
 
 void bt_cells_begin(bt_world *w)
 {

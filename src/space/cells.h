@@ -78,7 +78,7 @@ _Static_assert(sizeof(bt_contact) == 192, "three cache lines");
 typedef struct bt_gaps {
     double gap[2];         ///< m
     double after[2];       ///< gaps that U2 leaves at the end of the step, m
-    double push[2];        ///< multipliers of the position projection, kg m
+    double multiplier[2];  ///< multipliers of the position projection, kg m
     int32_t pair;          ///< its pair in the cell
 } bt_gaps;
 
@@ -243,15 +243,13 @@ int bt_memory_by_names(const void *p, const void *q);
 /// Append a record to the memory of a cell.
 void bt_cells_remember(bt_cell *t, const bt_memory *r);
 
-/// Traces of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
+/// Impulses of the pairs in contact, and what contact laws remember of pairs, that this rank owns, [*n]; the caller
 /// frees.
 bt_memory *bt_cells_take_memory(const bt_world *w, int64_t *n);
 /// Collective. Cells as another run left them: their geometry and the labels of all bodies, which every rank holds,
-/// have been set, and the traces [n], which are released, are those of all ranks. A domain has been created, but
+/// have been set, and the memory [n], which is released, is that of all ranks. A domain has been created, but
 /// nothing is distributed yet.
-void bt_cells_restore(bt_world *w, bt_memory *trace, int64_t n);
-/// Put traces, in any order, into the pair lists of empty cells.
-void bt_cells_put_memory(bt_world *w, bt_memory *trace, int64_t n);
+void bt_cells_restore(bt_world *w, bt_memory *memory, int64_t n);
 
 /// Cell that owns the contacts of bodies a and b, −1 = not here.
 bt_idx bt_cells_of_pair(const bt_world *w, bt_idx a, bt_idx b);

@@ -18,7 +18,7 @@ typedef struct bt_exchange {
     bool (*due)(const bt_world *w);
     /// After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong now.
     /// Takes and returns the memory. Collective.
-    bt_memory *(*migrate)(bt_world *w, bt_memory *trace, int64_t *n);
+    bt_memory *(*migrate)(bt_world *w, bt_memory *memory, int64_t *n);
     /// After the cells have been made: what is exchanged with whom. Collective.
     void (*connect)(bt_world *w);
     /// After a phase: send what its border cells changed in v (an array over the bodies), and receive what others did.

@@ -12,6 +12,7 @@
 #include "partition/domain.h"
 #include "space/cells.h"
 #include "tow/tow.h"
+#include "base/elementary.h"
 
 /// Is it a body that a program may change? The answer is the same on all ranks, which hold bodies of their own.
 static bool may_change(const bt_world *w, bt_gid gid, const double x[3], bt_errors *err)
@@ -59,7 +60,7 @@ static double obstacle_of(const bt_world *w, bt_idx i)
     for (bt_idx j = 0; j < b->n; j++) {
         double d[2];
         bt_bodies_offset(w, i, j, d);
-        if (j == i || hypot(d[0], d[1]) > b->radius[i] + b->radius[j]) continue;
+        if (j == i || bt_hypot(d[0], d[1]) > b->radius[i] + b->radius[j]) continue;
         const bool first = b->gid[i] < b->gid[j];
         const bt_idx one = first ? i : j, other = first ? j : i;
         for (int p = bt_part_first(b, one); p >= 0; p = bt_part_next(b, one, p))

@@ -83,7 +83,7 @@ static void advance(bt_world *w)
     bt_environment_advance(w);
     if (!(w->par.period_x > 0)) ts->x0 = w->par.x0 + w->drift_x;
     if (!(w->par.period_y > 0)) ts->y0 = w->par.y0 + w->drift_y;
-    const bool calm = bt_forces_rest(w);
+    const bool can_sleep = bt_forces_rest(w);
     double farthest = 0, out = 0;
 #pragma omp parallel for schedule(dynamic, 16) reduction(max : farthest, out) if (BT_MANY(ts->n_busy, BT_FEW_CELLS))
     for (bt_idx j = 0; j < ts->n_busy; j++) {
@@ -100,7 +100,7 @@ static void advance(bt_world *w)
         ts->moved[k] += path;
         if (!last) farthest = bt_max(farthest, path);
         if (!moves || last) continue;
-        if (!calm || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
+        if (!can_sleep || !at_rest(w, t)) ts->asleep[k] = BT_AWAKE;
         // where forces have been informed, they would find what they found
         else if (!ts->asleep[k]) ts->asleep[k] = BT_ASLEEP_NEW;
     }

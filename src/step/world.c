@@ -68,7 +68,7 @@ static uint64_t mix_double(uint64_t h, double x)
 
 /// Of what a contact law other than the rigid one remembers. The first of them counts as no law: so states keep their
 /// names.
-static uint64_t hash_trace(const bt_memory *r)
+static uint64_t hash_memory(const bt_memory *r)
 {
     const uint64_t where = (uint64_t)(r->law - 1) << 32 | (uint64_t)r->part[0] << 16 | r->part[1];
     uint64_t h = mix(mix(mix((uint64_t)r->a) ^ (uint64_t)r->b) ^ where);
@@ -91,7 +91,7 @@ uint64_t bt_world_hash(const bt_world *w)
     }
     for (bt_idx k = 0; k < w->cells->n; k++)
         for (bt_idx i = 0; w->cells->cell[k].own && i < w->cells->cell[k].laws.n_memory; i++)
-            sum += hash_trace(&w->cells->cell[k].laws.memory[i]);
+            sum += hash_memory(&w->cells->cell[k].laws.memory[i]);
     sum = bt_domain_sum_words(w, sum) + mix((uint64_t)w->step);
     if (w->window) sum = mix(sum ^ bt_window_hash(w->window));
     if (w->environment) sum = mix_double(mix_double(sum, w->drift_x), w->drift_y);

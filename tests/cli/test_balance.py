@@ -274,7 +274,7 @@ def test_contacts_never_add_energy(tmp_path, mode, restitution, friction):
     assert r.summary["contact_work_j"] == pytest.approx(work.sum(), rel=1e-12)
 
 
-def test_work_that_is_positive_is_told(tmp_path):
+def test_work_that_is_positive_is_reported(tmp_path):
     r = run(tmp_path, changed(TOW, ice__restitution=1, solver__tolerance=1e-6))
     work, energy = r.series("contact_work", "kinetic_energy")
     gained = int(np.sum(work > 1e-10 * energy))
@@ -282,7 +282,7 @@ def test_work_that_is_positive_is_told(tmp_path):
     assert bool(warned(r, f"in {gained} of 300 steps the contacts added energy")) == (gained > 0)
 
 
-def test_unconverged_steps_are_told(tmp_path):
+def test_unconverged_steps_are_reported(tmp_path):
     r = run(tmp_path, changed(TOW, solver__max_sweeps=2))
     unconverged, residual, sweeps, updates = r.series("unconverged", "residual", "sweeps", "unit_updates")
     n = r.summary["unconverged_steps"]

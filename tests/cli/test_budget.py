@@ -157,9 +157,9 @@ def test_every_stratum_of_each_distribution_holds_one_value(small):
             x = f[f"parameters/{key}"][::2]
             assert np.array_equal(f[f"parameters/{key}"][1::2], x)
             assert sorted(np.floor(12 * function(x) + 1e-9).astype(int).tolist()) == list(range(12)), key
-        told = dict(f["parameters/ice.friction"].attrs)
-    assert told["source"] in ("a book, p. 3", b"a book, p. 3") and b"triangular from 0.1 to 0.5" in np.bytes_(
-        told["distribution"])
+        attributes = dict(f["parameters/ice.friction"].attrs)
+    assert attributes["source"] in ("a book, p. 3", b"a book, p. 3") and b"triangular from 0.1 to 0.5" in np.bytes_(
+        attributes["distribution"])
 
 
 def test_a_study_end_to_end(small):

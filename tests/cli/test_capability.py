@@ -178,7 +178,7 @@ def test_what_is_refused(tmp_path):
     assert "0.05 to 0.95" in found_in(tmp_path, THRUST, "--share", 1, code=2)
 
 
-def test_runs_that_fail_are_replaced_and_a_spent_budget_is_told(tmp_path, monkeypatch):
+def test_runs_that_fail_are_replaced_and_a_spent_budget_is_reported(tmp_path, monkeypatch):
     """Every third field fails: others stand for it; and a search without time says so."""
     case = write_case(tmp_path, THRUST)
     runs = case_runs.CaseRuns(case, tmp_path, "capability", Path(BERGTOW), [], 1, np.inf, np.inf)

@@ -61,15 +61,15 @@ def test_every_number_of_a_case_says_where_it_is_from(name):
         "x", "y", "seed", "title", "frame", "shape", "ends", "mode", "size_law", "thickness_law", "tilt", "type",
         "conversion"
     }
-    told = 0
+    marked = 0
     lists_on_one_line = re.sub(r"\],\n\s+\[", "], [", (FIELD / f"{name}.yml").read_text())
     for line in lists_on_one_line.splitlines():
         match = re.match(r"\s*(?:- )?(\w+): ", line)
         if not match or match[1] in plain or line.startswith("#"):
             continue
         assert re.search(r"\[[PRA]\]", line), line
-        told += 1
-    assert told > 20
+        marked += 1
+    assert marked > 20
     assert "SCENARIO" in (FIELD / f"{name}.yml").read_text()
 
 

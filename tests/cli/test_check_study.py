@@ -67,7 +67,7 @@ def test_the_study_in_numbers(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["base.yml", "study.yml"]
 
 
-def test_time_steps_that_are_too_large_are_told(tmp_path):
+def test_time_steps_that_are_too_large_are_reported(tmp_path):
     head, table = rows(
         checked(tmp_path, {
             "base": "base.yml", "set": {"run.duration": 10},
@@ -136,7 +136,7 @@ def test_a_fault_of_a_value_names_its_line_of_the_study(tmp_path):
     assert result.returncode == CASE and "study.yml:4: ice.x_max=99: " in result.stderr
 
 
-def test_faults_of_the_study_and_of_the_base_are_told_once(tmp_path):
+def test_faults_of_the_study_and_of_the_base_are_reported_once(tmp_path):
     found = checked(tmp_path, changed(STUDY, set={"ice.sise": 1}, repeats="many"), CASE)
     assert len(found) == 2 and all(f.startswith("bergtow: study.yml:") for f in found)
     found = checked(tmp_path, STUDY | {"base": "none.yml"}, IO)

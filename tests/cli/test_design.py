@@ -55,14 +55,14 @@ def page(made, tmp_path_factory):
         yield driver
 
 
-def told(program, *arguments):
+def printed(program, *arguments):
     result = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, timeout=60)
     assert result.returncode == 0, result.stderr
     return result.stdout
 
 
 def pages_of(path):
-    return told("pdftotext", "-layout", path, "-").split("\f")[:-1]
+    return printed("pdftotext", "-layout", path, "-").split("\f")[:-1]
 
 
 # ---- the command
@@ -239,7 +239,7 @@ def test_pages_of_the_pdf(made):
 
 def test_the_ink_on_the_pages(made, tmp_path):
     from PIL import Image
-    told("pdftoppm", "-r", "20", "-gray", made / "report.pdf", tmp_path / "p")
+    printed("pdftoppm", "-r", "20", "-gray", made / "report.pdf", tmp_path / "p")
     filled = []
     for path in sorted(tmp_path.glob("p-*.pgm")):
         ink = np.asarray(Image.open(path)) < 200
@@ -254,19 +254,19 @@ def test_the_pdf_reads_in_order_and_is_searchable(made):
         f" Appendix {letter} {h} " for letter, h in zip("ABC", HEADINGS[-3:])]
     places = [text.index(mark) for mark in marks]
     assert places == sorted(places) and text.index("Owners & Sons <x>") < places[0]
-    raw = re.sub(r"\s+", "", told("pdftotext", "-raw", made / "report.pdf", "-"))
+    raw = re.sub(r"\s+", "", printed("pdftotext", "-raw", made / "report.pdf", "-"))
     with Run(made / "members/c001-r001") as run:
         assert [k for k in run.case if k not in raw] == []
     assert "signature" in text and "prepared" in text
 
 
 def test_fonts_are_embedded_and_figures_are_vectors(made):
-    fonts = told("pdffonts", made / "report.pdf").splitlines()[2:]
+    fonts = printed("pdffonts", made / "report.pdf").splitlines()[2:]
     assert fonts and all(re.search(r" yes (yes|no ) yes ", line) for line in fonts), fonts
-    assert told("pdfimages", "-list", made / "report.pdf").splitlines()[2:] == []
+    assert printed("pdfimages", "-list", made / "report.pdf").splitlines()[2:] == []
 
 
-def test_no_path_of_the_machine_is_told(made):
+def test_no_path_of_the_machine_is_reported(made):
     """Neither in the page nor anywhere in the PDF; the replay is a run's report."""
     for name in ("report.html", "report.pdf"):
         content = streams(made / name)

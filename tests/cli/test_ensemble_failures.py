@@ -57,11 +57,11 @@ def page(monkeypatch):
             for name, rest in re.findall(r'<tr[^>]*><th scope="row"><code>(c\d+-r\d+)</code></th>(.*?)</tr>', text,
                                          re.S)
         }
-        told = {
+        reported = {
             name: re.sub(r"<[^>]*>", "", rest).strip()
             for name, rest in re.findall(r"<details><summary><code>(c\d+-r\d+)</code>: (.*?)</details>", text, re.S)
         }
-        return text.split('<section id="method"')[0], rows, told
+        return text.split('<section id="method"')[0], rows, reported
     return made
 
 
@@ -80,12 +80,12 @@ def test_a_bad_value(tmp_path, page):
         })
     result = ensemble(tmp_path)
     assert result.returncode in (CASE, IO) and "2 members finished, 2 failed, 0 left" in result.stdout
-    warnings, rows, told = page(tmp_path)
+    warnings, rows, reported = page(tmp_path)
     assert "2 members failed" in warnings and "c002-r001: " in warnings and "not complete" not in warnings
     assert [re.search("finished|failed|waiting", rows[f"c00{k}-r001"])[0]
             for k in (1, 2, 3, 4)] == ["finished", "failed", "failed", "finished"]
-    assert told["c002-r001"].startswith(
-        "failed") and "output.window_start" in told["c002-r001"] and "none.h5" in told["c003-r001"]
+    assert reported["c002-r001"].startswith(
+        "failed") and "output.window_start" in reported["c002-r001"] and "none.h5" in reported["c003-r001"]
 
 
 @pytest.fixture
@@ -124,8 +124,8 @@ def test_a_full_disk_of_one_member(quiet, tmp_path, tmpfs, page, size):
     assert (result.returncode == IO and "member c002-r001 failed (4)" in result.stderr
             and "No space left" in result.stderr and "2 members finished, 1 failed" in result.stdout)
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
-    warnings, rows, told = page(tmp_path)
-    assert "1 member failed" in warnings and "c002-r001: " in warnings and "No space left" in told[
+    warnings, rows, reported = page(tmp_path)
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "No space left" in reported[
         "c002-r001"] and "failed" in rows["c002-r001"] and "finished" in rows["c003-r001"]
     subprocess.run(["mount", "-o", "remount,size=64m", bad], check=True)
     before = len(journal(tmp_path))
@@ -215,17 +215,17 @@ def test_a_dead_rank(tmp_path, page):
     assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == 2
     # the rest came first; and what the file says of the one that ended the program is as new as the file
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 0, "c003-r001": 1}
-    warnings, rows, told = page(tmp_path)
+    warnings, rows, reported = page(tmp_path)
     assert "1 member whose process died; the first: c002-r001: its process died in 1 attempt" in warnings
-    assert "waiting" in rows["c002-r001"] and "its process died" in told["c002-r001"]
+    assert "waiting" in rows["c002-r001"] and "its process died" in reported["c002-r001"]
     # those between the third and the eighteenth would be alike
     (tmp_path / "all/members/c002-r001/attempts").write_text("." * 18)
     for attempts in 19, 20:
         assert with_a_dead_rank(tmp_path, "c002-r001") not in (DONE, IO) and died(tmp_path, "c002-r001") == attempts
     assert with_a_dead_rank(tmp_path, "none") == NUMERIC
     assert statuses(tmp_path) == {"c001-r001": 1, "c002-r001": 2, "c003-r001": 1}
-    warnings, rows, told = page(tmp_path)
-    assert "1 member failed" in warnings and "c002-r001: " in warnings and "died in each of 20 attempts" in told[
+    warnings, rows, reported = page(tmp_path)
+    assert "1 member failed" in warnings and "c002-r001: " in warnings and "died in each of 20 attempts" in reported[
         "c002-r001"] and "failed" in rows["c002-r001"]
 
 

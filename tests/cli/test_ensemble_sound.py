@@ -109,7 +109,7 @@ def test_a_damaged_member_is_run_again(quiet, copy, damage):
     assert ensemble(copy).stderr == "" and len(started(copy)) == before + 1
 
 
-def test_on_two_ranks_damage_is_told_once(quiet, copy):
+def test_on_two_ranks_damage_is_reported_once(quiet, copy):
     for k, damage in enumerate(("last byte", "summary cut", "record empty")):
         DAMAGES[damage](copy / f"all/members/c00{1 + k // 2}-r00{1 + k % 2}")
     before = len(started(copy))
@@ -253,10 +253,10 @@ def test_damage_while_a_call_is_at_work(tmp_path):
     while started(tmp_path).count(long_one.name) < 2:
         time.sleep(0.01)
     flip(short / "result.h5", -1)
-    told = child.communicate(timeout=60)[1]
+    reported = child.communicate(timeout=60)[1]
     assert (child.returncode == IO
             and "member c002-r001 is not sound: all/members/c002-r001/result.h5: has changed since the member "
-            "finished; the same call runs it again" in told)
+            "finished; the same call runs it again" in reported)
     with h5py.File(tmp_path / "all/ensemble.h5") as f:
         assert list(f["members/status"][()]) == [
             1, 0

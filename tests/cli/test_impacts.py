@@ -206,12 +206,12 @@ def test_none_tells_nothing_and_changes_nothing(line, tmp_path):
     with h5py.File(r.dir / "result.h5") as f:
         assert "impacts" not in f and "panels" not in f
         assert np.all(np.isnan(f["series/collisions"][:])) and np.all(np.isnan(f["series/collision_resistance"][:]))
-    told = {f"/series/{n}" for n in ("collisions", "collision_resistance", "impact_peak", "largest_push")}
+    reported = {f"/series/{n}" for n in ("collisions", "collision_resistance", "impact_peak", "largest_push")}
     assert {
         n
         for n in differing(line.dir / "result.h5", r.dir / "result.h5", but=("/case", "/case_as_given"))
         if not n.startswith(("/impacts", "/panel", "/sample"))  # the last two: their axes
-    } == told
+    } == reported
 
 
 def test_the_resolved_file_holds_what_follows_from_other_keys(line, tmp_path):

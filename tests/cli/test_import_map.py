@@ -117,10 +117,10 @@ def test_places_on_the_ellipsoid(tmp_path, crs, lon, lat):
     for ring, drawn in zip(rings, RINGS):
         np.testing.assert_allclose(plane_area(ring), geodesic_area(places(drawn, lon, lat)), rtol=3e-7,
                                    atol=0.1)  # as good as geodesic areas are
-    told = record["plane"]
+    reported = record["plane"]
     farthest = max(np.hypot(*r.T).max() for r in RINGS)
-    np.testing.assert_allclose(told["farthest_m"], farthest, atol=near)
-    assert told["length_error"] < 5e-8 and told["area_error"] < 5e-8  # PROJ differentiates numerically
+    np.testing.assert_allclose(reported["farthest_m"], farthest, atol=near)
+    assert reported["length_error"] < 5e-8 and reported["area_error"] < 5e-8  # PROJ differentiates numerically
     degrees, _ = outlines(map_, "--centre", f"{lon},{lat}", name="degrees-out.geojson")
     for ring, drawn in zip(degrees, RINGS):
         azimuth, _, d = GEOD.inv(*np.array([[lon, lat]] * len(ring)).T, *ring.T)
@@ -183,14 +183,14 @@ def test_the_program_reads_it(tmp_path):
     r = call("outlines", "map.geojson", "-o", "floes.geojson", "--record", "floes.json", "--box", "1km,3.6km",
              "--centre", "-135,74", cwd=tmp_path)
     assert r.returncode == DONE, r.stderr
-    told = json.loads((tmp_path / "floes.json").read_text())["floes"]
+    reported = json.loads((tmp_path / "floes.json").read_text())["floes"]
     _, domain, ice = r.stdout[r.stdout.index("in a case beside it:"):].splitlines()[:3]
     (tmp_path / "case.yml").write_text(f"run: {{dt: 1 s, duration: 3 s}}\n{domain.strip()}\n{ice.strip()}\n"
                                        "body: {shape: none}\n")
     done = run(tmp_path, tmp_path / "case.yml")
-    assert done.summary["warnings"] == [] and done.summary["outlines"]["read"] == 5 == told["floes"]
-    np.testing.assert_allclose(done.summary["concentration"], told["concentration"], rtol=1e-6)
-    np.testing.assert_allclose(done.summary["mean_size_m"], told["mean_size_m"], rtol=1e-6)
+    assert done.summary["warnings"] == [] and done.summary["outlines"]["read"] == 5 == reported["floes"]
+    np.testing.assert_allclose(done.summary["concentration"], reported["concentration"], rtol=1e-6)
+    np.testing.assert_allclose(done.summary["mean_size_m"], reported["mean_size_m"], rtol=1e-6)
     got, *_ = field(tmp_path, yaml.safe_load((tmp_path / "case.yml").read_text()))
     for ring, drawn in zip(got, RINGS[2::5], strict=True):  # the row in the middle, from west to east
         assert same_ring(ring, drawn[::-1, ::-1], 1e-3)
@@ -208,8 +208,8 @@ def test_what_the_program_wrote_comes_back(tmp_path):
         for a, b in zip(rings, back):
             assert abs(plane_area(a) - plane_area(b)) < 1e-3 * plane_area(a)
             assert np.abs(a.mean(axis=0) - b.mean(axis=0)[::-1]).max() < 2
-        told = record["floes"]
-        assert told["with_thickness"] == len(rings) and told["mean_thickness_m"] == thickness.mean()
+        reported = record["floes"]
+        assert reported["with_thickness"] == len(rings) and reported["mean_thickness_m"] == thickness.mean()
 
 
 def test_halves_at_the_180th_meridian_are_joined(tmp_path):
@@ -385,7 +385,7 @@ def test_every_change_is_counted(tmp_path):
 
 
 def test_too_many_vertices(tmp_path):
-    """A shore of 700 vertices, each of which matters at the tolerance, is made simpler still, and that is told."""
+    """A shore of 700 vertices, each of which matters at the tolerance, is made simpler still, and that is reported."""
     angle = 2 * np.pi * np.arange(700) / 700
     star = np.c_[np.cos(angle), np.sin(angle)] * (100 + 8 * (np.arange(700) % 2))[:, None]
     rings, record = outlines(write(tmp_path / "map.geojson", [star], "urn:x-bergtow:crs:local-metres-east-north"),

@@ -146,7 +146,7 @@ def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=
                       "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
                       "impact_peak": np.where(np.arange(N) >= 30, rng.exponential(4e4, N), 0)}
             members.append(made_up.member(0.9 * x, {"ice.concentration": a}, c, start=31.0, warnings=warned,
-                                          more=series, told=SERIES, summary={"concentration": a},
+                                          more=series, attributes=SERIES, summary={"concentration": a},
                                           case=text or CASE.format(pressure=pressure, load=load)))
     return made_up.write(folder, members)
 
@@ -187,8 +187,8 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
         assert d["tow"]["return_hours"] == pytest.approx(467.9, rel=1e-3) and d["tow"]["beyond_data"]
         assert d["tow"]["fields"] == 6 and d["tow"]["interval_95"][0] < d["tow"]["value"] < d["tow"]["interval_95"][1]
         assert d["tension"]["value"] > d["tow"]["value"] and "1 m thick" in d["holds_for"]
-    told = {w["what"] for w in second["warnings"]}
-    assert any("no upper bound" in w for w in told) and any("domain is narrow" in w for w in told)
+    warnings = {w["what"] for w in second["warnings"]}
+    assert any("no upper bound" in w for w in warnings) and any("domain is narrow" in w for w in warnings)
     assert not any("no upper bound" in w["what"] or "narrow" in w["what"] for w in first["warnings"])
     assert any("extrapolated to more than 10 times" in w["what"] for w in first["warnings"])
     assert "WARNING: rigid floes at 75 % and more" in text and "concentration 0.9 (90 %)" in text
@@ -231,17 +231,17 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     assert "no upper bound" not in found and "above the breaking load of the line: concentration 0.9 (2.00 MN" in found
 
 
-def test_too_little_is_told_and_not_guessed(tmp_path):
-    short = [made_up.member(np.arange(60.0), {}, 0, more={"tow_force": np.arange(60.0)}, told=SERIES)
+def test_too_little_is_reported_and_not_guessed(tmp_path):
+    short = [made_up.member(np.arange(60.0), {}, 0, more={"tow_force": np.arange(60.0)}, attributes=SERIES)
              for _ in range(2)]
     result = script("ensemble.py", made_up.write(tmp_path / "s", short), "--resamples", 1)
     assert result.returncode == 0 and "No design tow force" in result.stdout and "Traceback" not in result.stderr
     some = towed(tmp_path / "two", concentrations=(0.5,), fields=2)
     result = script("ensemble.py", some, "--resamples", 1, "--time-scale", 150)
     s = json.loads((some / "statistics.json").read_text())
-    told = [w["what"] for w in s["conditions"][0]["design"]["warnings"]]
-    assert "no value" in told and "refused" in s["conditions"][0]["design"]["tow"]
-    assert any("fewer than 5 fields" in w for w in told)
+    warnings = [w["what"] for w in s["conditions"][0]["design"]["warnings"]]
+    assert "no value" in warnings and "refused" in s["conditions"][0]["design"]["tow"]
+    assert any("fewer than 5 fields" in w for w in warnings)
 
 
 def test_members_without_their_folder_have_what_the_ensemble_holds(tmp_path):

@@ -411,7 +411,7 @@ def test_how_deep_a_corner_is_rounding(tmp_path, depth, admitted, geojson):
 
 @pytest.mark.parametrize("name", ["Thickness", "thicknes", "THICKNESS", "thick", "ice_thickness", "thickness_m",
                                   "ticknes", "height", "h"])
-def test_a_thickness_by_another_name_is_told(tmp_path, name):
+def test_a_thickness_by_another_name_is_reported(tmp_path, name):
     write(tmp_path, feature(ARROW, **{name: 0.4}), feature(BOX, thickness=0.6), **named(LOCAL))
     r = run(tmp_path, FRAMES["geographic"])
     text, = warned(r, "property `thickness`")

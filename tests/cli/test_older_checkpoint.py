@@ -50,7 +50,7 @@ def test_it_goes_on_to_the_same_bits(tmp_path):
     assert differing(whole.dir / "result.h5", tmp_path / "cut/result.h5") == []
 
 
-def test_what_is_missing_in_it_is_told(tmp_path):
+def test_what_is_missing_in_it_is_reported(tmp_path):
     run(tmp_path, changed(CRUSHING, run__duration=6), "--steps", 30, name="cut")
     as_it_was(tmp_path / "cut", "contacts/friction")
     (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)

@@ -25,10 +25,11 @@ def made_up(folder, concentration, mean, se=1e3, case=BERG, **summary):
     result = call("estimate", "--json", write_case(folder, changed(case, ice__concentration=concentration)))
     assert result.returncode == DONE, result.stderr
     numbers = json.loads((run / "summary.json").read_text())
-    told = json.loads(result.stdout)
+    reported = json.loads(result.stdout)
     numbers |= {
-        "estimates": told["estimates"], "estimate_labels": told["estimate_labels"], "mean_ice_resistance_n": mean,
-        "mean_ice_resistance_se_n": se, "concentration": concentration, "warnings": [], "reference": None
+        "estimates": reported["estimates"], "estimate_labels": reported["estimate_labels"],
+        "mean_ice_resistance_n": mean, "mean_ice_resistance_se_n": se, "concentration": concentration, "warnings": [],
+        "reference": None
     } | summary
     (run / "summary.json").write_text(json.dumps(numbers))
     return run

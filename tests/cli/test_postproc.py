@@ -62,7 +62,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
     throughout."""
     folder.mkdir(parents=True, exist_ok=True)
     n, frames = 100, len(path)
-    told = {
+    attributes = {
         "tow_force": {"role": "balance",
                       "label": "tow force"}, "ice_resistance": {"role": "balance", "label": "ice resistance"},
         "drag_force": {"role": "balance", "label": "drag"}, "inertia_force": {"role": "balance", "label": "inertia"},
@@ -95,7 +95,7 @@ def make_run(folder, frame="basin", ends="wall", path=((0.0, 0.0), (1.0, 0.0), (
         for name, (units, values) in series.items():
             data = f.create_dataset(f"series/{name}", data=values)
             data.attrs["units"], data.attrs["description"] = units, f"about {name}"
-            data.attrs.update(told.get(name, {}) | {"order": len(f["series"])})
+            data.attrs.update(attributes.get(name, {}) | {"order": len(f["series"])})
         f["floes/vertices"], f["floes/offsets"] = np.vstack([SQUARE, TRIANGLE]), np.array([0, 4, 7])
         f["floes/thickness"], f["floes/area"] = np.array([0.5, 0.25]), np.array([4.0, 1.5])
         f["frames/time"] = np.linspace(0.0, 10.0, frames)

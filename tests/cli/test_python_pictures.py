@@ -10,19 +10,11 @@ import h5py
 import numpy as np
 import pytest
 from harness import ROOT, TOW, call, changed, environment, run, write_case
+from python_package import bergtow
 
+pytestmark = pytest.mark.usefixtures("library")
 LIBRARY = ROOT / "build/release/libbergtow.so"
-sys.path.insert(0, str(ROOT / "postproc"))
-import bergtow  # noqa: E402
-
 TOWED = changed(TOW, run__duration=6, output={"panels": True, "window_start": 2})
-
-
-@pytest.fixture(scope="module", autouse=True)
-def library():
-    own = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL")}
-    made = subprocess.run(["make", "--no-print-directory", "lib"], cwd=ROOT, capture_output=True, text=True, env=own)
-    assert made.returncode == 0, made.stdout + made.stderr
 
 
 @pytest.fixture(scope="module")

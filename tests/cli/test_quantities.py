@@ -126,10 +126,10 @@ def test_every_series_is_in_the_file_as_it_is_listed(left):
         assert sorted(f["series"]) == sorted(q["name"] for q in quantities["series"])
         for order, q in enumerate(quantities["series"]):
             data = f["series"][q["name"]]
-            told = {k: v.decode() if isinstance(v, bytes) else v for k, v in data.attrs.items()}
-            assert told["order"] == order and [told[k] for k in ("units", "description", "applies")
-                                               ] == [q[k] for k in ("units", "description", "applies")]
-            assert [told.get(k)
+            attributes = {k: v.decode() if isinstance(v, bytes) else v for k, v in data.attrs.items()}
+            assert attributes["order"] == order and [attributes[k] for k in ("units", "description", "applies")
+                                                     ] == [q[k] for k in ("units", "description", "applies")]
+            assert [attributes.get(k)
                     for k in ("role", "label", "summary")] == [q[k] for k in ("role", "label", "summary")], q["name"]
             there = q["applies"] == "always" or q["applies"] in has
             assert np.all(np.isfinite(data[()]) if there else np.isnan(data[()])), q["name"]
@@ -194,11 +194,11 @@ def test_pictures_and_report_follow_the_roles(left):
                                             or q["name"] in ("ice_resistance", "tow_force")), q["name"]
         for q in (q for q in by_role["diagnostic"] if q["name"] == "moving_ice"):
             assert np.isfinite(run.number(q["summary"]))
-        told = {row["label"]: row for row in report_run.estimates(run)}
-        assert list(told) == [e["label"] for e in quantities["estimates"]]
+        rows = {row["label"]: row for row in report_run.estimates(run)}
+        assert list(rows) == [e["label"] for e in quantities["estimates"]]
         for e in run.estimates.values():
             ratio = e.numbers["simulated_over_estimate"]
-            assert (told[e.label]["ratio"] != "–") == (e.numbers["compares"] and ratio is not None)
+            assert (rows[e.label]["ratio"] != "–") == (e.numbers["compares"] and ratio is not None)
         if np.isfinite(run.number("mean_ice_resistance_n")):
             figure = plot_resistance.draw([plot_resistance.read(folder)])
             legend = {t.get_text() for t in figure.axes[0].get_legend().get_texts()}
@@ -230,9 +230,9 @@ def test_every_number_of_a_member_is_in_the_ensemble(ensemble):
                 if meaning["machine"]:
                     assert column not in f, key
                 elif value is not None:
-                    told = f[column].attrs
-                    assert f[column][m] == value and told["key"] == key, key
-                    assert told["description"] == meaning["description"] and told["units"] == meaning["units"], key
+                    attributes = f[column].attrs
+                    assert f[column][m] == value and attributes["key"] == key, key
+                    assert all(attributes[k] == meaning[k] for k in ("description", "units")), key
 
 
 def test_a_quantity_and_an_estimate_from_outside_are_in_ensembles(ensemble, tmp_path):
@@ -274,7 +274,7 @@ def test_files_of_an_earlier_version_are_read(ensemble, tmp_path):
     e = Ensemble(ensemble)
     e.meaning = {key: {} for key in e.meaning}
     e.__dict__.pop("estimates", None)
-    assert [name for name, told in e.estimates.items() if told["on_top"]] == ["open_water_drag"]
+    assert [name for name, estimate in e.estimates.items() if estimate["on_top"]] == ["open_water_drag"]
 
 
 # ---- what the examples compute

@@ -8,6 +8,7 @@ import pathlib
 
 import pytest
 
+import judge
 import random_cases
 from harness import BERGTOW, ROOT, USAGE, call
 
@@ -59,7 +60,7 @@ def test_random_cases(tmp_path, table):
     """Nothing crashes, hangs, loses a floe or a number; what ends well has let no guard through; most end well."""
     codes, wrong = collections.Counter(), []
     for seed in range(SEEDS):
-        code, found = random_cases.tried(seed, table, PROGRAM, tmp_path)
+        code, found = judge.tried(seed, table, PROGRAM, tmp_path)
         codes[code] += 1
         wrong += found
     assert not wrong, "\n".join(wrong)

@@ -449,7 +449,7 @@ def test_run_without_towed_body_and_with_a_broken_line(tmp_path):
 
 @pytest.mark.parametrize("harm, words", [("folder", "no such folder"), ("summary", "the run has not ended"),
                                          ("truncated", "not readable as HDF5"), ("frames", "/frames/pose")])
-def test_unusable_folders_are_told_and_leave_the_old_page(tow, tmp_path, harm, words):
+def test_unusable_folders_are_reported_and_leave_the_old_page(tow, tmp_path, harm, words):
     folder = tmp_path / "run"
     if harm != "folder":
         folder.mkdir()
@@ -509,7 +509,7 @@ tow:
 """
 
 
-class Told:
+class Stated:
     path = Path("nowhere/run")
     case_text, resolved_text, attributes = GIVEN, RESOLVED, {
         "command_line": "bergtow run a.yml --set tow.speed=0.2 --set=ice.sides=6 -o 'x y'"
@@ -517,7 +517,7 @@ class Told:
 
 
 def test_where_each_value_comes_from():
-    values = {v.key: v for v in report_case.values(Told)}
+    values = {v.key: v for v in report_case.values(Stated)}
     kinds = {k: v.kind for k, v in values.items()}
     assert kinds == {
         "run.dt": "given", "run.title": "given", "ice.size": "source", "ice.thickness": "assumed",
@@ -550,7 +550,7 @@ def test_what_a_study_sets_is_not_of_the_case_file(tmp_path):
         "0.2]}\nvariants: {thin: {ice.thickness: 1 cm}}\n"
     )
 
-    class Member(Told):
+    class Member(Stated):
         path = tmp_path / "members" / "c001-r001"
 
     values = {v.key: v for v in report_case.values(Member)}
@@ -584,13 +584,13 @@ def test_every_key_is_labelled(tow):
         assert {key for keys in report_run.KEY_VALUES.values() for key in keys} <= set(by_key)
 
 
-def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
+def test_ice_that_is_read_is_reported_as_it_is(tmp_path, monkeypatch):
     """Real size, thickness and concentration of the floes, not the defaults of a field that nobody made."""
     assert call("field", write_case(tmp_path, changed(TOW, ice__concentration=0.3)), "-o",
                 tmp_path / "made.geojson").returncode == 0
     drawn = json.loads((tmp_path / "made.geojson").read_text())
 
-    def told(name, thicknesses):
+    def run_of(name, thicknesses):
         for feature, t in zip(drawn["features"], thicknesses):
             feature["properties"] = {} if t is None else {"thickness": t}
         (tmp_path / "o.geojson").write_text(json.dumps(drawn))
@@ -601,7 +601,7 @@ def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
         return r, {v.key: (v.value, v.kind) for v in groups["Ice"]}, {v.key: v for v in values}
 
     n = len(drawn["features"])
-    r, ice, every = told("own", [0.5 + 0.4 * k / (n - 1) for k in range(n)])
+    r, ice, every = run_of("own", [0.5 + 0.4 * k / (n - 1) for k in range(n)])
     assert ice["floes"] == (str(n), "field") and ice["floe thickness"] == (
         "0.7 m, 0.5 to 0.9 m", "field") and ice["concentration"] == (f"{r.summary['concentration']:.4g}", "field")
     assert 0.29 < r.summary["concentration"] < 0.31
@@ -615,7 +615,7 @@ def test_ice_that_is_read_is_told_as_it_is(tmp_path, monkeypatch):
             and every["ice.size"].origin == "not used: the ice is read by ice.outlines")
     text = page_without_pictures(r.dir, tmp_path / "page.html", monkeypatch).read_text()
     assert ice["floe size"][0] in text and "as read" in text
-    some = told("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first
+    some = run_of("some", [None] + [0.5] * (n - 1))[1]  # the case's thickness is that of the first
     assert some["floe thickness"][0].endswith(
         ", 0.04 to 0.5 m") and some["ice.thickness"][0] == "0.04 m" and "ice.size" not in some
 

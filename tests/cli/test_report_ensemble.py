@@ -145,14 +145,14 @@ def test_page_stands_alone_and_text_stays_text(page):
     assert page.execute_script("return document.documentElement.scrollWidth") <= 380
 
 
-def test_members_of_other_builds_and_lost_folders_are_told(study):
+def test_members_of_other_builds_and_lost_folders_are_reported(study):
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         f.attrs["revision"] = "other"
     made_up.record(study / "members/c001-r001", Ensemble(study).study)
     e = Ensemble(study)
     assert "2 builds" in report_ensemble.provenance(e)[1]
     (study / "members/c001-r002").rename(study / "members/lost")
-    assert "cannot be read" in report_ensemble.told(e, 1)[0]
+    assert "cannot be read" in report_ensemble.reported(e, 1)[0]
     (study / "members/lost").rename(study / "members/c001-r002")
     with h5py.File(study / "members/c001-r001/result.h5", "a") as f:
         del f.attrs["revision"]
@@ -218,11 +218,11 @@ def test_a_half_finished_ensemble(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "status, behind, told",
+    "status, behind, reported",
     [(WAITING, False, "has no member that has finished; run the ensemble further"),
      (WAITING, True, "knows of none of the 1 members that have finished; run `bergtow ensemble`"),
      (FAILED, False, "no member that has finished; 2 failed, the first: c001-r001: it is wrong; mend the study")])
-def test_nothing_has_finished(tmp_path, status, behind, told):
+def test_nothing_has_finished(tmp_path, status, behind, reported):
     folder = made_up.write(tmp_path / "out", [
         member(np.ones(600), {"ice.concentration": 0.5}, 0)
         | {"status": status, "reason": "it is wrong\n" if status == FAILED else ""} for _ in range(2)
@@ -232,14 +232,14 @@ def test_nothing_has_finished(tmp_path, status, behind, told):
         (folder / "members/c001-r001/finished").write_text("")
     with pytest.raises(RunError) as error:
         report.main([str(folder)])
-    assert told in str(error.value)
+    assert reported in str(error.value)
     (folder / "ensemble.h5").unlink()
     (folder / "study.resolved.yml").write_text("seed: 1\n")
     with pytest.raises(RunError, match="holds no ensemble.h5; .*run it again"):
         report.main([str(folder)])
 
 
-def test_an_unusable_ensemble_is_told(tmp_path, capsys, monkeypatch):
+def test_an_unusable_ensemble_is_reported(tmp_path, capsys, monkeypatch):
     (tmp_path / "ensemble.h5").write_bytes(b"no")
     with pytest.raises(RunError, match="is no ensemble"):
         report.main([str(tmp_path)])

@@ -278,7 +278,7 @@ def test_a_damaged_ensemble_file_is_refused(tmp_path):
         Ensemble(folder)
 
 
-def test_what_cannot_be_checked_is_told(tmp_path, monkeypatch, capsys):
+def test_what_cannot_be_checked_is_reported(tmp_path, monkeypatch, capsys):
     folder = made_up.write(tmp_path / "a", [made_up.member(np.arange(30.0) + r, {}, 0) for r in range(2)])
     monkeypatch.setattr(soundness, "_XXH3", None)
     monkeypatch.setattr(soundness, "xxhash", None)
@@ -286,7 +286,7 @@ def test_what_cannot_be_checked_is_told(tmp_path, monkeypatch, capsys):
     assert "was not checked" in capsys.readouterr().out
 
 
-def test_members_without_a_folder_are_told(tmp_path, capsys):
+def test_members_without_a_folder_are_reported(tmp_path, capsys):
     folder = made_up.write(
         tmp_path / "a",
         [made_up.member(np.arange(30.0) + r, {}, 0, summary={"unconverged_steps": 1}) for r in range(3)])
@@ -376,8 +376,8 @@ def test_a_small_ensemble_of_the_program(tmp_path):
                 (r.number("mean_ice_resistance_n"), r.number("mean_ice_resistance_se_n"),
                  r.number("window.n_independent")),
                 rel=1e-9)
-            told = len(r.summary["warnings"])
-            assert bool(told) == bool(e.doubts(m))
+            reported = len(r.summary["warnings"])
+            assert bool(reported) == bool(e.doubts(m))
             assert len(e.impacts(m)[0]) == r.number("impacts.collisions")
     for c in s["conditions"]:
         assert c["resistance"]["mean"] == pytest.approx(

@@ -101,7 +101,7 @@ def test_tensions_of_the_branches(towed):
     assert (one >= 0).all() and (two >= 0).all()
 
 
-def test_a_stop_within_the_window_is_told(towed, tmp_path):
+def test_a_stop_within_the_window_is_reported(towed, tmp_path):
     assert warned(towed, "speed programme goes from 1.2 to 0 m/s within the window")
     steady = changed(VESSEL, run__duration=600, output={"window_start": 130})
     assert not warned(run(tmp_path, steady, "--quiet"), "speed programme")

@@ -45,13 +45,13 @@ def done(tmp_path_factory):
 def test_every_value_says_where_it_is_from(name):
     """Every number is reported, assumed or set by the script, but for the seed, places, and the time between frames."""
     plain = {"seed", "x", "y", "x_min", "frame_interval"}
-    told = 0
+    marked = 0
     for line in (FOLDER / f"{name}.yml").read_text().splitlines():
         match = re.match(r" +(\w+): \d", line)
         if match and match[1] not in plain:
             assert re.search(rf"# (assumed|reported)\b|{name}\.py sets it", line), line
-            told += 1
-    assert told > 8
+            marked += 1
+    assert marked > 8
 
 
 @pytest.mark.parametrize("heading", ["Arching", "Cover", "Ship"])

@@ -57,7 +57,7 @@ def test_a_ramp_that_is_not_given_follows_from_the_line(slow, tmp_path):
     assert vx.max() < 0.75  # a jerked body swings to twice the speed
 
 
-def test_a_short_ramp_is_told_by_check_and_by_the_run(jerked, tmp_path):
+def test_a_short_ramp_is_reported_by_check_and_by_the_run(jerked, tmp_path):
     checked = call("check", write_case(tmp_path, changed(BERG, tow={**BERG["tow"], "ramp": 5})))
     assert checked.returncode == DONE and "TOO SHORT: the start jerks the line" in checked.stdout
     assert "tow.ramp: 5 s is short for a body that swings on its line in" in checked.stdout
@@ -106,7 +106,7 @@ def test_a_run_within_its_ramp_has_no_window(tmp_path):
     assert r.summary["mean_tow_force_n"] is None and "window              none" in r.result.stdout
 
 
-def test_the_width_of_the_domain_is_told(tmp_path):
+def test_the_width_of_the_domain_is_reported(tmp_path):
     narrow = changed(BERG, ice__concentration=0.85)
     checked = call("check", write_case(tmp_path, narrow))
     assert re.search(r"domain width +5 body widths, 13\.\d floe sizes, periodic images: arches of rigid floes POSSIBLE",
@@ -129,7 +129,7 @@ def test_dense_rigid_ice_says_that_its_load_has_no_upper_bound(tmp_path):
     assert "arches of floes POSSIBLE" in yields and "can carry arches of floes" in yields
 
 
-def test_packed_ice_that_reaches_the_end_wall_is_told(tmp_path):
+def test_packed_ice_that_reaches_the_end_wall_is_reported(tmp_path):
     """In basin-80 it was seen at 180 to 200 s: a run of 165 s ends before it, one of 360 s does not."""
     basin = ROOT / "cases/basin/basin-80.yml"
     for duration, wanted in ((165, False), (360, True)):

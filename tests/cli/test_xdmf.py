@@ -145,8 +145,8 @@ def test_the_printed_table_says_the_same(run):
     force = summary["mean_ice_resistance_n"]
     low, high = (summary[f"mean_ice_resistance_{end}_n"] for end in ("low", "high"))
     said = re.search(r"ice resistance +([\d.]+) (k?)N, 95 % interval ([\d.]+) (k?)N to ([\d.]+) (k?)N", table).groups()
-    told = [float(said[i]) * (1000 if said[i + 1] else 1) for i in (0, 2, 4)]
-    assert told == pytest.approx([force, low, high], rel=1e-3)
+    reported = [float(said[i]) * (1000 if said[i + 1] else 1) for i in (0, 2, 4)]
+    assert reported == pytest.approx([force, low, high], rel=1e-3)
     assert f"{summary['window']['start_s']:g} to 60 s (found by MSER-5)" in table
     assert "computed / measured = 2" in table
     shares = "detect 3.6 %, colour 7.1 %, forces 10.7 %, solve 14.3 %, advance 17.9 %, exchange 21.4 %, output 25.0 %"

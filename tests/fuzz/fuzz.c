@@ -30,7 +30,7 @@ bt_fuzz_file bt_fuzz_open(const uint8_t *data, size_t n)
 
 void bt_fuzz_close(bt_fuzz_file *f) { close(f->fd); }
 
-void bt_fuzz_told(bt_status status, bt_errors *err)
+void bt_fuzz_reported(bt_status status, bt_errors *err)
 {
     bt_fuzz_check((status == BT_OK) == (err->n == 0), "status and messages do not agree");
     for (size_t i = 0; i < err->n; i++) {

@@ -36,7 +36,7 @@ void bt_fuzz_close(bt_fuzz_file *f);
 
 /// Abort unless a status and its messages go together: none with BT_OK, at least one otherwise, each a line of
 /// printable text. Clears err.
-void bt_fuzz_told(bt_status status, bt_errors *err);
+void bt_fuzz_reported(bt_status status, bt_errors *err);
 
 /// Abort with the text unless good.
 void bt_fuzz_check(bool good, const char *text);

@@ -35,7 +35,7 @@ static void read_again(const bt_case *c)
     free(twice);
     free(text);
     bt_case_free(&d);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     bt_fuzz_close(&f);
 }
 
@@ -45,7 +45,7 @@ void bt_fuzz_case(const uint8_t *data, size_t n)
     bt_case c;
     bt_errors err = {0};
     const bt_status status = bt_case_read(&c, f.path, NULL, 0, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     if (status == BT_OK) {
         bt_estimate_input in;
         bt_estimate_conditions(&c, &in);
@@ -69,7 +69,7 @@ static void run_a_little(const bt_case *c, const bt_field *f, bt_errors *err)
             bt_fuzz_check(isfinite(w->bodies.pose[i].x) && isfinite(w->bodies.pose[i].y),
                           "a pose is not finite after three steps");
     }
-    bt_fuzz_told(status, err);
+    bt_fuzz_reported(status, err);
     bt_roster_free(&roster);
     bt_world_free(w);
 }
@@ -82,7 +82,7 @@ void bt_fuzz_begin_run(const uint8_t *data, size_t n, const char *const *set, in
     bt_case c;
     bt_errors err = {0};
     bt_status status = bt_case_read(&c, file.path, set, n_set, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     if (status == BT_OK && !names_files(&c) && bt_case_expected_floes(&c) < 60 && c.n_floes < 20) {
         // Few sweeps and little shaking, so that many inputs are tried.
         c.ice.shake = bt_min(c.ice.shake, 0.5);
@@ -91,11 +91,11 @@ void bt_fuzz_begin_run(const uint8_t *data, size_t n, const char *const *set, in
         bt_field f;
         bt_field_init(&f);
         status = bt_field_generate(&c, &f, &err);
-        bt_fuzz_told(status, &err);
+        bt_fuzz_reported(status, &err);
         bt_lead_stats lead;
         if (status == BT_OK) {
             status = bt_lead_open(&c, &f, &lead, &err);
-            bt_fuzz_told(status, &err);
+            bt_fuzz_reported(status, &err);
         }
         if (status == BT_OK && f.n < 1000) run_a_little(&c, &f, &err);
         bt_field_free(&f);

@@ -271,7 +271,7 @@ static bool take_up_arrays(bt_snapshot *s)
     if (status == BT_OK) status = bt_running_load_field(&f, &lead, s);
     if (status == BT_OK) status = bt_setup_world(&c, &f, &r.w, &r.roster, &err);
     if (status == BT_OK) status = bt_running_load(&r, s, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     // The hash is all that was wrong: a hostile file would have the right one.
     const bool loaded = status == BT_OK || (status == BT_ERR_NUMERIC && !s->faulty);
     if (loaded) step_on(&r);
@@ -293,7 +293,7 @@ static bool take_up_file(const kept_run *r, const bt_snapshot *s)
     const bt_status status = bt_run_resume(
         &bt_comm_alone,
         &(bt_run_options){.dir = r->dir, .threads = 1, .max_steps = STEPS, .quiet = true, .dump_step = -1}, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     free(path);
     free(before);
     free(result);

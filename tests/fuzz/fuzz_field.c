@@ -90,7 +90,7 @@ void bt_fuzz_field(const uint8_t *data, size_t n)
     bt_field_init(&f);
     bt_errors err = {0};
     const bt_status status = bt_field_read_as(&f, path, nonconvex, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     for (bt_idx i = 0; i < f.n; i++) {
         const int corners = (int)(f.offsets[i + 1] - f.offsets[i]);
         const double *v = f.vertices + 2 * f.offsets[i];

@@ -60,7 +60,7 @@ void bt_fuzz_outlines(const uint8_t *data, size_t n)
     bt_field_init(&f);
     bt_errors err = {0};
     const bt_status status = bt_field_read_outlines(&c, &f, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     if (status == BT_OK) check_floes(&f, c.ice.nonconvex);
     else bt_fuzz_check(f.n == 0, "a refused file left floes");
     bt_field_free(&f);

@@ -22,7 +22,7 @@ void bt_fuzz_study(const uint8_t *data, size_t n)
     bt_study s;
     bt_errors err = {0};
     const bt_status status = bt_study_read(&s, f.path, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     const int64_t members = status == BT_OK ? bt_study_n_members(&s) : 0;
     bt_fuzz_check(status != BT_OK || (members > 0 && members <= BT_MAX_MEMBERS), "a study of no or too many members");
     for (int64_t m = 0; m < members && m < 5; m++) check_member(&s, m);

@@ -11,7 +11,7 @@ void bt_fuzz_table(const uint8_t *data, size_t n)
     bt_table t = {0};
     bt_errors err = {0};
     const bt_status status = bt_table_read(&t, f.path, &err);
-    bt_fuzz_told(status, &err);
+    bt_fuzz_reported(status, &err);
     bt_fuzz_check((status == BT_OK) == (t.n > 0), "an accepted table without rows, or a refused one with rows");
     const double most = t.n > 0 ? bt_table_fastest(&t) : 0;
     for (int64_t i = 0; i < t.n; i++) {

@@ -4,7 +4,7 @@ import collections
 import json
 import os
 
-import random_cases
+import judge
 from harness import ROOT, call
 
 PROGRAM = ROOT / "build/asan/bergtow"
@@ -16,7 +16,7 @@ def test_random_cases(tmp_path):
     table = json.loads(call("--list-keys", "--json").stdout)
     codes, wrong = collections.Counter(), []
     for seed in range(FIRST, FIRST + CASES):
-        code, found = random_cases.tried(seed, table, PROGRAM, tmp_path)
+        code, found = judge.tried(seed, table, PROGRAM, tmp_path)
         codes[code] += 1
         wrong += found
         if found:

@@ -24,14 +24,14 @@ def test_a_sound_division():
 
 
 @pytest.mark.parametrize("again", range(3))
-@pytest.mark.parametrize("how, told, count", [("lost", "held by no rank: id {};", 599),
+@pytest.mark.parametrize("how, reported, count", [("lost", "held by no rank: id {};", 599),
                                               ("doubled", "held by several ranks: id {};", 601)])
-def test_lost_and_doubled(how, told, count, again):
+def test_lost_and_doubled(how, reported, count, again):
     """More than once: a rank that leaves before the message is out takes the other one down with it."""
     result, gid, more = spoil(how)
     assert result.returncode == NUMERIC, result.stderr
     assert more == []
-    assert told.format(gid) in ours(result)[0], result.stderr
+    assert reported.format(gid) in ours(result)[0], result.stderr
     assert f"after a migration {count} of 600 bodies are owned" in ours(result)[-1]
 
 

@@ -12,7 +12,7 @@ from test_ranks_output import mpirun, ours
 WIDE = {"domain__length": 16, "domain__width": 9}
 
 
-def told(text):
+def reported(text):
     return sorted(line for line in text.splitlines() if "failure.h5" not in line)
 
 
@@ -22,7 +22,7 @@ def test_a_floe_beyond_a_wall_is_named_once(tmp_path, ranks):
     one = run(tmp_path, case, "--quiet", code=NUMERIC)
     several = mpirun(ranks, "run", write_case(tmp_path, case), "-o", tmp_path / "several", "--quiet")
     assert several.returncode == NUMERIC
-    assert told(one.result.stderr) == sorted(line for line in ours(several) if "failure.h5" not in line)
+    assert reported(one.result.stderr) == sorted(line for line in ours(several) if "failure.h5" not in line)
     assert (tmp_path / "several/failure.h5").exists()
 
 

@@ -2,7 +2,7 @@
 """Floes in convex parts on any number of ranks and threads: the same bits. Parts and what their contacts knew travel
 with the floe.
 
-What turns these tests red: traces that forget which parts they were of, marks of parts left behind in a migration,
+What turns these tests red: contact memory that forgets its parts, marks of parts left behind in a migration,
 parts in the order of memory.
 """
 import json

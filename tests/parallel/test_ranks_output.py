@@ -141,7 +141,7 @@ def test_rows_that_span_several_pieces(tmp_path):
     (["run", "case.yml", "-o", "/proc/nowhere/out"], IO, "/proc/nowhere/out: cannot make the folder"),
     (["run", "case.yml", "-o", "taken"], IO, "holds a result"),
 ], ids=lambda v: "_".join(map(str, v)).replace("/", "") if isinstance(v, list) else "")
-def test_an_error_is_told_once_and_all_leave_with_its_code(tmp_path, arguments, code, fragment):
+def test_an_error_is_reported_once_and_all_leave_with_its_code(tmp_path, arguments, code, fragment):
     write_case(tmp_path, SHORT)
     (tmp_path / "taken").mkdir()
     (tmp_path / "taken/result.h5").write_text("a result")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A run that is stopped or killed on some ranks ends, on others, as the run that was never stopped.
 
-What turns these tests red (tried): traces of contacts gathered from one rank alone, the state saved after the open
+What turns these tests red (tried): contact memory gathered from one rank alone, the state saved after the open
 collisions have been closed, the entry of the series under way left out, the frame that the end of --steps adds kept,
 the panel loads or the stall left out, a checkpoint without the result that it counts on.
 """
@@ -110,11 +110,11 @@ def test_killed_again_and_again(whole):
 def test_a_signal_to_all_ranks(whole):
     """mpirun hands on SIGUSR2: all stop after the same step, with a checkpoint."""
     folder, path, _ = whole
-    p = started(2, "run", "case.yml", "-o", "told", "--quiet", "--threads", 1, cwd=folder)
-    while not (folder / "told/checkpoint.h5").exists() and p.poll() is None:
+    p = started(2, "run", "case.yml", "-o", "signalled", "--quiet", "--threads", 1, cwd=folder)
+    while not (folder / "signalled/checkpoint.h5").exists() and p.poll() is None:
         time.sleep(0.01)
     p.send_signal(signal.SIGUSR2)
     _, err = p.communicate(timeout=60)
-    assert p.returncode == SIGNAL and "bergtow resume told" in err, err
-    done(1, "resume", "told", "--quiet", "--threads", 1, cwd=folder)
-    assert_same_result(path, folder / "told")
+    assert p.returncode == SIGNAL and "bergtow resume signalled" in err, err
+    done(1, "resume", "signalled", "--quiet", "--threads", 1, cwd=folder)
+    assert_same_result(path, folder / "signalled")

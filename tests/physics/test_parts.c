@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Floes that are not convex: contacts of their parts against distances of the outlines, bays, shores of several parts,
 // balances.
-#include "scene.h"
+#include "all_pairs.h"
 
 #include "bergtow/outline.h"
 
@@ -120,7 +120,7 @@ static double least_gap(const bt_world *w, double margin, double *nx, double *ny
 {
     bt_manifold *m;
     bt_idx n;
-    bt_contacts_brute_force(w, margin, &m, &n);
+    brute_force(w, margin, &m, &n);
     double least = INFINITY;
     for (bt_idx k = 0; k < n; k++)
         for (int j = 0; j < m[k].n_points; j++)
@@ -210,10 +210,10 @@ static void detect_equals_brute_force_with_parts(void **state)
             for (bt_idx k = 0; k < w->cells->n; k++)
                 for (bt_idx j = 0; j < w->cells->cell[k].search.n_pairs; j++)
                     w->cells->cell[k].search.pairs[j].n_points = 0;
-            bt_contacts_detect_all(w, margin);
+            detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, have = 0;
-            bt_contacts_brute_force(w, margin, &want, &n);
+            brute_force(w, margin, &want, &n);
             bool *taken = bt_alloc((size_t)n, sizeof *taken);
             for (bt_idx k = 0; k < w->cells->n; k++)
                 for (bt_idx j = 0; j < w->cells->cell[k].n_contacts; j++) {

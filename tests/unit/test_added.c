@@ -50,7 +50,7 @@ static void a_shape_is_a_waterline(void **state)
     bt_case_free(&c);
 }
 
-static void unknown_shapes_are_told_of_it(void **state)
+static void unknown_shapes_are_reported(void **state)
 {
     (void)state;
     bt_case c;
@@ -111,7 +111,7 @@ int main(void)
         bt_errors_print(&err);
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_shape_is_a_waterline),
-        cmocka_unit_test(unknown_shapes_are_told_of_it),
+        cmocka_unit_test(unknown_shapes_are_reported),
         cmocka_unit_test(what_will_not_do_is_refused),
         cmocka_unit_test(a_key_is_a_key_of_the_case),
     };

@@ -173,29 +173,29 @@ static void overlap(knot_of_floes *s, uint64_t *rng)
         if (scene_uniform(rng) < 0.1) make_sheets(&s->contacts[i], s->inv, rng);
         for (int c = 0; c < s->contacts[i].n; c++) {
             s->gaps[i].after[c] = any(rng);
-            s->gaps[i].push[c] = bt_max(0, any(rng));
+            s->gaps[i].multiplier[c] = bt_max(0, any(rng));
         }
         for (int c = s->contacts[i].n; c < 3; c++) s->before[i][c] = 0;
     }
 }
 
 /// The same visit of the position projection with the scalar update.
-static double scalar_push(knot_of_floes *s, const bt_idx *order, double slop, const bt_sweep *o, double *most)
+static double scalar_projection(knot_of_floes *s, const bt_idx *order, double slop, const bt_sweep *o, double *most)
 {
     static double y[CONTACTS][3];
     double sum = 0;
     for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++)
-        bt_rounds_move(o, s->gaps[order[j]].push, s->before[order[j]], y[j], 2);
+        bt_rounds_move(o, s->gaps[order[j]].multiplier, s->before[order[j]], y[j], 2);
     for (bt_idx j = 0; j < s->cell.work.n_list; j++)
-        *most = bt_max(*most, bt_push_contact(&s->contacts[order[j]], &s->gaps[order[j]], slop, s->v, s->inv));
+        *most = bt_max(*most, bt_project_contact(&s->contacts[order[j]], &s->gaps[order[j]], slop, s->v, s->inv));
     for (bt_idx j = 0; o->moves && j < s->cell.work.n_list; j++)
         for (int c = 0; c < 2; c++)
-            sum += bt_rounds_against(s->contacts[order[j]].w[c], s->gaps[order[j]].push[c], s->before[order[j]][c],
-                                     y[j][c]);
+            sum += bt_rounds_against(s->contacts[order[j]].w[c], s->gaps[order[j]].multiplier[c],
+                                     s->before[order[j]][c], y[j][c]);
     return sum;
 }
 
-static void batches_push_as_single_updates_do(void **state)
+static void batches_project_as_single_updates_do(void **state)
 {
     (void)state;
     static knot_of_floes four, one;
@@ -209,16 +209,17 @@ static void batches_push_as_single_updates_do(void **state)
         const double slop = 0.1 * scene_uniform(&rng);
         int64_t done = 0;
         double most = 0, most_of_one = 0;
-        const double against = bt_batch_push(&four.cell, slop, four.v, four.inv, &o, &done, &most);
+        const double against = bt_batch_project(&four.cell, slop, four.v, four.inv, &o, &done, &most);
         assert_int_equal(done, four.cell.work.n_list);
         bt_batch_order(&four.cell, order);
-        CHECK_CLOSE(scalar_push(&one, order, slop, &o, &most_of_one), against, 1e-12 * (1 + fabs(against)));
+        CHECK_CLOSE(scalar_projection(&one, order, slop, &o, &most_of_one), against, 1e-12 * (1 + fabs(against)));
         bt_batch_unpack(&four.cell);
         CHECK_CLOSE(most, most_of_one, 0);
         for (int i = 0; i < BODIES; i++)
             assert_true(four.v[i].x == one.v[i].x && four.v[i].y == one.v[i].y && four.v[i].w == one.v[i].w);
         for (bt_idx i = 0; i < CONTACTS; i++) {
-            for (int c = 0; c < four.contacts[i].n; c++) assert_true(four.gaps[i].push[c] == one.gaps[i].push[c]);
+            for (int c = 0; c < four.contacts[i].n; c++)
+                assert_true(four.gaps[i].multiplier[c] == one.gaps[i].multiplier[c]);
             assert_memory_equal(&four.contacts[i], &one.contacts[i], sizeof four.contacts[i]);
         }
         free(four.cell.work.batch);
@@ -254,7 +255,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(batches_do_what_single_updates_do),
-        cmocka_unit_test(batches_push_as_single_updates_do),
+        cmocka_unit_test(batches_project_as_single_updates_do),
         cmocka_unit_test(each_listed_contact_is_in_one_batch),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -4,11 +4,11 @@
 #include <sys/resource.h>
 
 #include "space/pairs.h"
-#include "scene.h"
+#include "all_pairs.h"
 
 enum { SIDE = 20 }; // floes along one side of the square fields
 
-static bt_params calm_params(void)
+static bt_params cell_params(void)
 {
     bt_params p = scene_params(0.1, 1);
     p.slop = 1e-3;
@@ -73,7 +73,7 @@ static void check_cells(const bt_world *w)
 static void labels_follow_the_floes(void **state)
 {
     (void)state;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.water_u = 0.3; // cells go with the water: the field stays behind, and goes across
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, SIDE, SIDE, 0, 1);
@@ -98,7 +98,7 @@ static void labels_follow_the_floes(void **state)
 static void rest_costs_nothing_and_ends(void **state)
 {
     (void)state;
-    const bt_params p = calm_params();
+    const bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     enum { LONG = 60 };
     add_field(w, 0.5, 0.5, LONG, SIDE, 0, 0);
@@ -164,7 +164,7 @@ static void a_step_looks_at_busy_cells_alone(void **state)
     bt_world *w[2]; // the second looks at everything in every step
     bt_gid hitter = 0;
     for (int k = 0; k < 2; k++) {
-        bt_params p = calm_params();
+        bt_params p = cell_params();
         p.slop = 1e-5;
         p.tolerance = 1e-6;
         p.max_sweeps = 200;
@@ -200,7 +200,7 @@ static void a_step_looks_at_busy_cells_alone(void **state)
 static bt_world *tow_in_current(double u, double v, double speed, int steps, int64_t *active, int64_t *points,
                                 bool *projected)
 {
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.slop = 1e-5; // so that overlap is pushed out now and then
     p.tolerance = 1e-6;
     p.max_sweeps = 200;
@@ -254,7 +254,7 @@ static void uniform_current_is_a_moving_frame(void **state)
 static void old_displacements_are_forgotten(void **state)
 {
     (void)state;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.water_u = p.air_u = 0.25;
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 40, SIDE, 0.25, 0);
@@ -282,7 +282,7 @@ static void old_displacements_are_forgotten(void **state)
 /// A row of n touching squares of 1 m at rest, the first hit by a heavy one at 1 m/s, no restitution.
 static bt_world *hit_row(int n, double cell, int steps, bool *outrun, int64_t *repeats, double *lost)
 {
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.cell = cell;
     bt_world *w = bt_world_create(&p);
     double s[8];
@@ -376,8 +376,8 @@ static void check_contacts(bt_world *w, double margin)
 {
     bt_manifold *want;
     bt_idx n_want;
-    bt_contacts_detect_all(w, margin);
-    bt_contacts_brute_force(w, margin, &want, &n_want);
+    detect_all(w, margin);
+    brute_force(w, margin, &want, &n_want);
     assert_int_equal(w->cells->n_contacts, n_want);
     const bt_gid *gid = w->bodies.gid;
     uint64_t sum = 0, sum_want = 0;
@@ -400,7 +400,7 @@ static void few_cells_around_a_period(void **state)
     uint64_t seed = 11;
     for (int around = 1; around <= 5; around++) { // periods of room for 1 to 5 cells of 4 m
         for (int both = 0; both < 2; both++) {
-            bt_params p = calm_params();
+            bt_params p = cell_params();
             p.cell = 4;
             p.period_x = 4.2 * around;
             p.period_y = both ? 4.2 * around : 0;
@@ -441,7 +441,7 @@ static void floes_of_very_different_size(void **state)
 {
     (void)state;
     uint64_t seed = 5;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.cell = 2;
     bt_world *w = bt_world_create(&p);
     double v[2 * BT_MAX_VERTICES];
@@ -471,7 +471,7 @@ static void floes_of_very_different_size(void **state)
 static void a_body_far_away_covers_no_cell(void **state)
 {
     (void)state;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     add_field(w, 0.5, 0.5, 5, 5, 0, 0);
     const bt_gid berg = add_hitter(w, 2, 10, 2, 0, 0, BT_DYNAMIC, true);
@@ -497,7 +497,7 @@ static void a_body_far_away_covers_no_cell(void **state)
 static void no_floes_need_no_rows(void **state)
 {
     (void)state;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     p.size = 1e-9, p.dt = 1e-8, p.slop = 1e-12;
     p.period_y = 300;
     bt_world *w = bt_world_create(&p);
@@ -517,7 +517,7 @@ static void no_floes_need_no_rows(void **state)
 static void floes_find_a_body_at_rest(void **state)
 {
     (void)state;
-    bt_params p = calm_params();
+    bt_params p = cell_params();
     bt_world *w = bt_world_create(&p);
     for (int k = 0; k < 3; k++) {
         double s[8];
@@ -538,12 +538,12 @@ static void floes_find_a_body_at_rest(void **state)
 }
 
 /// A floe that leaves all lists behind in a step, farther than the largest margin, is reported; one just within is not.
-static void what_outruns_all_margins_is_told(void **state)
+static void what_outruns_all_margins_is_reported(void **state)
 {
     (void)state;
     const double dt = 0.1, sizes[] = {11, 13};
     for (int k = 0; k < 2; k++) {
-        bt_params p = calm_params();
+        bt_params p = cell_params();
         p.dt = dt;
         bt_world *w = bt_world_create(&p);
         double s[8];
@@ -570,7 +570,7 @@ int main(void)
         cmocka_unit_test(few_cells_around_a_period),
         cmocka_unit_test(floes_of_very_different_size),
         cmocka_unit_test(floes_find_a_body_at_rest),
-        cmocka_unit_test(what_outruns_all_margins_is_told),
+        cmocka_unit_test(what_outruns_all_margins_is_reported),
         cmocka_unit_test(a_body_far_away_covers_no_cell),
         cmocka_unit_test(no_floes_need_no_rows),
     };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Contact detection: the optimised path against all pairs, distances against an independent computation, features.
-#include "scene.h"
+#include "all_pairs.h"
 
 
 /// Distance of two separate convex polygons by brute force over vertices and edges (own arithmetic, no contact code).
@@ -129,10 +129,10 @@ static void detect_equals_brute_force(void **state)
         for (int step = 0; step < 60; step++) {
             // it comes and goes
             const double margin = bt_margin_for(w, 0.5 / w->par.dt * (step % 20 < 10 ? 0.05 : 0.12));
-            bt_contacts_detect_all(w, margin);
+            detect_all(w, margin);
             bt_manifold *want;
             bt_idx n, m;
-            bt_contacts_brute_force(w, margin, &want, &n);
+            brute_force(w, margin, &want, &n);
             contact *have = contacts_of(w, &m);
             assert_int_equal(m, n);
             total += n;
@@ -162,7 +162,7 @@ static void gaps_are_distances(void **state)
     for (int scene = 0; scene < 10; scene++) {
         bt_world *w = random_scene(&rng, 120, scene % 2, 25);
         const double margin = bt_margin_for(w, 0.5 / w->par.dt * 0.6);
-        bt_contacts_detect_all(w, margin);
+        detect_all(w, margin);
         bt_idx k = 0, n;
         contact *c = contacts_of(w, &n);
         for (bt_gid g = 0; g < w->bodies.n; g++)
@@ -204,7 +204,7 @@ static void arms_meet(void **state)
     bt_world *w = random_scene(&rng, 200, true, 15);
     bt_manifold *man;
     bt_idx n;
-    bt_contacts_brute_force(w, 0.1, &man, &n);
+    brute_force(w, 0.1, &man, &n);
     assert_true(n > 100);
     for (bt_idx k = 0; k < n; k++) {
         const bt_manifold *m = &man[k];
@@ -250,7 +250,7 @@ static void edge_contact_keeps_its_features(void **state)
     bt_world_add(w, &d);
     uint32_t features[2] = {0, 0};
     for (int s = 0; s < 50; s++) {
-        bt_contacts_detect_all(w, 0.05);
+        detect_all(w, 0.05);
         assert_int_equal(w->cells->n_contacts, 1);
         const bt_idx k = bt_cells_of_pair(w, 0, 1);
         bt_contact *u = &w->cells->cell[k].contacts[0];

@@ -94,7 +94,7 @@ static int every(int kind, int first, const char *path, bt_status (*work)(const 
     }
 }
 
-static void each_failed_call_is_told(void **state)
+static void each_failed_call_is_reported(void **state)
 {
     (void)state;
     char path[] = "/tmp/bergtow-faults-XXXXXX";
@@ -163,7 +163,7 @@ static void what_was_cut_off_early_is_ours(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_failed_call_is_told),
+        cmocka_unit_test(each_failed_call_is_reported),
         cmocka_unit_test(a_text_that_cannot_be_read),
         cmocka_unit_test(a_file_with_fewer_bytes_than_its_size),
         cmocka_unit_test(what_was_cut_off_early_is_ours),

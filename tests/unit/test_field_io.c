@@ -18,7 +18,7 @@
 #include "bergtow/shape.h"
 
 // HDF5 1.10 itself reads past the end of some damaged attributes, and loses some blocks. Which flipped bit
-// does it depends on the length of the case's text. Reads by our own code are still told.
+// does it depends on the length of the case's text. Reads by our own code are still reported.
 const char *__asan_default_suppressions(void);
 const char *__asan_default_suppressions(void) { return "interceptor_via_lib:libhdf5"; }
 

@@ -107,7 +107,7 @@ static void where_nothing_is_said(void **state)
     }
 }
 
-static void told_from_the_earliest_time_on(void **state)
+static void reported_from_the_earliest_time_on(void **state)
 {
     (void)state;
     const bt_packing p = {.time = 100, .way = 10, .packed = 0.9}, at_once = {.time = 0, .packed = 0.9};
@@ -129,7 +129,7 @@ int main(void)
         cmocka_unit_test(area_balances),
         cmocka_unit_test(towards_any_wall),
         cmocka_unit_test(where_nothing_is_said),
-        cmocka_unit_test(told_from_the_earliest_time_on),
+        cmocka_unit_test(reported_from_the_earliest_time_on),
     };
     return cmocka_run_group_tests_name("packing", tests, NULL, NULL);
 }

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 #include "space/phases.h"
-#include "scene.h"
+#include "all_pairs.h"
 
 /// What a pass has done so far.
 typedef struct {
@@ -101,7 +101,7 @@ static bt_world *fill(const scene *s, uint64_t *rng)
         d.x = s->at_x * s->length, d.y = s->at_y * s->width, d.large = true;
         bt_world_add(w, &d);
     }
-    bt_contacts_detect_all(w, 0.1);
+    detect_all(w, 0.1);
     return w;
 }
 

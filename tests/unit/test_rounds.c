@@ -2,7 +2,7 @@
 // What rounds do when the work is spent: on made-up problems whose residual after each sweep is given. Tried: unknowns
 // never kept, kept from the first sweep on, not put back, and put back although the problem is solved; no further
 // attempts, one for ever, and further ones although the result is near: each red.
-#include "scene.h"
+#include "all_pairs.h"
 
 #include "solve/rounds.h"
 
@@ -61,7 +61,7 @@ static double run(const double *residual)
         d.x = 1.0 * i;
         bt_world_add(w, &d);
     }
-    bt_contacts_detect_all(w, 0.1);
+    detect_all(w, 0.1);
     assert_true(w->cells->n_order > 0);
     const bt_problem p = {.residual = residual_of, .sweep = sweep, .keep = keep, .vel = w->bodies.vel,
                           .tolerance = 1, .cap = 0.9, .length = 1, .limit = 20};

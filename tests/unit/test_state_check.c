@@ -70,7 +70,7 @@ static const struct change {
     const char *name;
     int64_t at;          ///< which number, LAST = the last
     double value;
-    const char *told;    ///< array that the message names, where it is another
+    const char *reported;    ///< array that the message names, where it is another
 } changes[] = {
     {0, "field/offsets", 0, 1, NULL},
     {0, "field/offsets", 3, 1e18, NULL},
@@ -219,7 +219,7 @@ static void nonsense_is_refused_by_name(void **state)
                 fail_msg("%s: has no number %d to change", change->name, (int)change->at);
             set_number(i, change->at == LAST ? i->n * i->width - 1 : change->at, change->value);
             char wanted[80];
-            snprintf(wanted, sizeof wanted, "/%s", change->told ? change->told : change->name);
+            snprintf(wanted, sizeof wanted, "/%s", change->reported ? change->reported : change->name);
             const bt_status status = take_up(&kept[from].c, &s, &err);
             if (status != BT_ERR_CASE || err.n != 1 || !strstr(err.text[0], wanted))
                 fail_msg("%s [%d] = %g: status %d, %zu messages: %s", change->name, (int)change->at, change->value,

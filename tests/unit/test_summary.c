@@ -112,7 +112,7 @@ static void broken_number(bt_sample *s, int i)
     if (i == 400) s->ice_resistance = NAN;
 }
 
-static void every_doubt_is_told(void **state)
+static void every_doubt_is_reported(void **state)
 {
     (void)state;
     bt_case c = made_up_case();
@@ -131,7 +131,7 @@ static void every_doubt_is_told(void **state)
     t.floes_outside = 2;
     t.stall = (bt_stall){.windows = 3, .time = 12};
     json = summary_of(&c, 600, &t, FLOES, everything_wrong);
-    static const char *const told[] = {"stopped early: SIGTERM",
+    static const char *const reported[] = {"stopped early: SIGTERM",
                                        "200 of 600 steps met the sweep limit",
                                        "120 of 600 steps the contacts added energy",
                                        "overlap by up to 0.1 m",
@@ -141,8 +141,8 @@ static void every_doubt_is_told(void **state)
                                        "by the momentum of the ice",
                                        "crushed to a depth of 0.9 m, 45 % of the mean floe size",
                                        "stood still for 12 s of 60 s"};
-    for (size_t k = 0; k < sizeof told / sizeof *told; k++)
-        if (!strstr(json, told[k])) fail_msg("not told: %s in %s", told[k], json);
+    for (size_t k = 0; k < sizeof reported / sizeof *reported; k++)
+        if (!strstr(json, reported[k])) fail_msg("not reported: %s in %s", reported[k], json);
     assert_null(strstr(json, "independent samples of the"));
     assert_string_equal(json_value(json, "repeated_solves"), "450");
     assert_string_equal(json_value(json, "verdict"), "\"not steady\""); // a third of the steps did not converge
@@ -243,14 +243,14 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
     double programme[] = {0, 1, 40, 1, 50, 0.5};
     bt_event event[] = {{.time = 45, .kind = BT_EVENT_LINE_BROKEN, .subject = 1, .value = 7}};
     const bt_events events = {.event = event, .n = 1};
-    static const char *const told[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s",
+    static const char *const reported[] = {"the window begins at 20 s, before the ramp of the tow ends at 30 s",
                                        "a step in the window was left with a residual of 0.2 m/s",
                                        "1.2 % of the steps in the window did not converge",
                                        "the speed programme goes from 1 to 0.5 m/s within the window",
                                        "a line parted at 45 s",
                                        "stood still for 6 s of 60 s",
                                        "of the places ahead of the moving window stayed empty"};
-    for (size_t k = 0; k < sizeof told / sizeof *told; k++) {
+    for (size_t k = 0; k < sizeof reported / sizeof *reported; k++) {
         bt_case d = c;
         bt_run_totals t = totals(600);
         bt_window window = {.renewed = 50, .missed = k == 6 ? 10 : 0, .length = 10};
@@ -261,8 +261,8 @@ static void what_no_mean_goes_across_is_a_verdict(void **state)
         if (k == 6) t.window = &window;
         char *json = summary_of(&d, 600, &t, FLOES, k == 1 ? one_wild_step : k == 2 ? few_unconverged : sound_tow);
         assert_string_equal(json_value(json, "verdict"), "\"not steady\"");
-        if (!strstr(json_value(json, "reason"), told[k]))
-            fail_msg("wanted '%s', told %s", told[k], json_value(json, "reason"));
+        if (!strstr(json_value(json, "reason"), reported[k]))
+            fail_msg("wanted '%s', reported %s", reported[k], json_value(json, "reason"));
         free(json);
     }
 }
@@ -309,7 +309,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(summary_holds_the_numbers),
         cmocka_unit_test(the_peak_tension_is_of_the_strongest_branch),
-        cmocka_unit_test(every_doubt_is_told),
+        cmocka_unit_test(every_doubt_is_reported),
         cmocka_unit_test(the_window_serves_every_series),
         cmocka_unit_test(what_no_mean_goes_across_is_a_verdict),
         cmocka_unit_test(without_a_towed_body_forces_are_null),

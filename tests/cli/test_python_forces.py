@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""Forces that are Python functions: as those of the program, and what goes wrong in them."""
+import math
+
+import numpy as np
+import pytest
+from harness import changed, run
+from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, stepped
+
+pytestmark = pytest.mark.usefixtures("library")
+
+
+@pytest.mark.parametrize("case", [SHORT, LINE, WINDOW], ids=["speed", "line", "window"])
+def test_a_force_that_returns_zero_keeps_the_bits(case, tmp_path):
+    def nothing(bodies):
+        return np.zeros((len(bodies.id), 3))
+
+    there = run(tmp_path, case)
+    bergtow.run(case, tmp_path / "python", forces={"nothing": nothing}, threads=1)
+    assert bergtow.Result(tmp_path / "python").summary["state_hash"] == there.hash
+    ours, theirs = datasets_of(tmp_path / "python/result.h5"), datasets_of(there.dir / "result.h5")
+    assert not ours.pop("nothing_force").any()
+    for name, values in theirs.items():
+        np.testing.assert_array_equal(ours[name], values, name)
+
+
+class WaterDrag:
+    """Skin and form drag of water at rest, of all bodies, by the equations of bergtow/forces.h."""
+
+    def __init__(self, case):
+        with bergtow.Simulation(case) as sim:
+            self.skin, self.form, *_, self.yaw = sim.drags.T
+            moved = sim.motions != 2
+            place, outlines = sim.positions, [sim.outline(i) for i in range(sim.n_bodies)]
+        self.skin, self.form, self.yaw = (np.where(moved, x, 0) for x in (self.skin, self.form, self.yaw))
+        self.body = np.repeat(np.arange(len(place)), [len(o) for o in outlines])
+        own = np.concatenate(outlines) - place[self.body, :2]
+        c, s = np.cos(place[self.body, 2]), np.sin(place[self.body, 2])
+        self.corner = np.stack([c * own[:, 0] + s * own[:, 1], c * own[:, 1] - s * own[:, 0]], 1)
+        self.next = np.concatenate([np.roll(np.arange(len(o)), -1) + at for o, at in
+                                    zip(outlines, np.cumsum([0, *map(len, outlines)]))])
+
+    def __call__(self, bodies):
+        """drag of the water, in Python"""
+        u, load = bodies.velocity, bodies.load
+        bodies.drag(self.skin * np.sqrt(u[:, 0] ** 2 + u[:, 1] ** 2), (0, 0))
+        load[:, 6] += self.yaw * np.abs(u[:, 2])
+        turn = bodies.place[self.body, 2]
+        c, s = np.cos(turn), np.sin(turn)
+        p = np.stack([c * self.corner[:, 0] - s * self.corner[:, 1], s * self.corner[:, 0] + c * self.corner[:, 1]], 1)
+        e = p[self.next] - p
+        v = -u[self.body]
+
+        def inflow(at):  # -v.n times the length of the edge, where the local velocity of the water is v - ω × r
+            return -((v[:, 0] - v[:, 2] * at[:, 1]) * e[:, 1] - (v[:, 1] + v[:, 2] * at[:, 0]) * e[:, 0])
+
+        start, end = inflow(p), inflow(p[self.next])
+        wet = (start > 0) | (end > 0)
+        zero = start / np.where(start == end, 1, start - end)
+        low, high = np.where(start < 0, zero, 0), np.where(end < 0, zero, 1)
+        for side in (-1, 1):
+            t = 0.5 * (low + high + side / math.sqrt(3) * (high - low))
+            g = 0.5 * (high - low) * self.form[self.body] * np.maximum(0, start + t * (end - start))
+            g = np.where(wet, g, 0)
+            r = p + np.where(wet, t, 0)[:, None] * e
+            for column, value in ((3, g), (4, g * r[:, 0]), (5, g * r[:, 1]), (6, g * (r ** 2).sum(1))):
+                np.add.at(load[:, column], self.body, value)
+
+
+@pytest.mark.parametrize("base", [SHORT, LINE], ids=["speed", "line"])
+def test_water_drag_in_python_is_that_of_the_program(base, tmp_path):
+    own = {"air_form": 0, "air_skin": 0}
+    with_drag = changed(base, run__duration=10, ice__drag=own, body__drag=own)
+    none = own | {"water_form": 0, "water_skin": 0}
+    without = changed(with_drag, ice__drag=none, body__drag=none)
+    program = bergtow.run(with_drag, tmp_path / "program", threads=1)
+    python = bergtow.run(without, tmp_path / "python", forces={"python_drag": WaterDrag(with_drag)}, threads=1)
+    with program.open() as a, python.open() as b:
+        for name, same in (("ice_resistance",) * 2, ("tow_force",) * 2, ("drag_force", "python_drag_force")):
+            mean = float(a[name].mean())
+            assert mean != 0 and abs(float(b[same].mean()) - mean) < 1e-9 * abs(mean), name
+        assert not b["drag_force"].any()
+        assert float(a["drag_force"].mean()) > 0.01 * float(a["tow_force"].mean())
+
+
+def test_a_force_may_be_returned_and_is_part_of_the_balance():
+    def current(bodies):
+        force = np.zeros((len(bodies.id), 2))
+        force[bodies.towed] = -7, 0
+        return force
+
+    with bergtow.Simulation(SHORT, threads=1, forces={"hold_back": current}) as sim:
+        sim.step(40)
+        assert math.isclose(sim["hold_back_force"], 7, rel_tol=1e-12)
+        rest = sim["ice_resistance"] + sim["drag_force"] + sim["inertia_force"]
+        assert math.isclose(sim["tow_force"], rest + 7, rel_tol=1e-9)
+
+
+def test_a_drag_pulls_towards_its_velocity():
+    """So strong that a step takes every floe there; of each its own velocity."""
+    def drag(bodies):
+        bodies.drag(1e9, np.stack([np.full(len(bodies.id), 0.03), -0.01 * (1 + bodies.id % 3)], 1))
+
+    with bergtow.Simulation(changed(SHORT, ice__concentration=0.2), threads=1, forces={"strong": drag}) as sim:
+        sim.step()
+        free = np.flatnonzero(sim.motions == 0)
+        wanted = np.stack([np.full(len(free), 0.03), -0.01 * (1 + free % 3)], 1)
+        near = np.abs(sim.velocities[free, :2] - wanted).max(axis=1) < 1e-4
+        assert len(free) > 10 and near.mean() > 0.8  # the others are in contact
+
+
+def test_a_moment_may_be_returned():
+    def returned(bodies):
+        answer = np.zeros((len(bodies.id), 3))
+        answer[:, 2] = 0.5 * bodies.inertia
+        return answer
+
+    def added(bodies):
+        bodies.moment[:] += 0.5 * bodies.inertia
+
+    hashes = []
+    for function in (returned, added):
+        with bergtow.Simulation(changed(SHORT, ice__concentration=0.2), threads=1, forces={"turn": function}) as sim:
+            before = sim.velocities[:, 2]
+            sim.step()
+            free = sim.motions == 0
+            gained = (sim.velocities[:, 2] - before)[free] / sim.dt
+            assert np.median(gained) == pytest.approx(0.5, rel=0.05)
+            hashes.append(sim.state_hash)
+    assert hashes[0] == hashes[1]
+
+
+def test_what_goes_wrong_in_a_force_is_reported():
+    class Own(Exception):
+        pass
+
+    def raises(bodies):
+        if bodies.time > 1:
+            raise Own("a reason")
+
+    def no_number(bodies):
+        bodies.force[3, 0] = math.nan
+
+    def drives(bodies):
+        bodies.drag(-1, (0, 0))
+
+    with pytest.raises(Own, match="a reason"):
+        stepped(SHORT, forces={"wrong": raises})
+    with pytest.raises(bergtow.BergtowError, match="force wrong: a number that it has filled in is not finite"):
+        stepped(SHORT, forces={"wrong": no_number})
+    with pytest.raises(bergtow.BergtowError, match="force wrong: its linear part drives a body"):
+        stepped(SHORT, forces={"wrong": drives})
+    with pytest.raises(bergtow.BergtowError, match="lower-case letters"):
+        stepped(SHORT, forces={"Not a name": raises})
+    with pytest.raises(bergtow.BergtowError, match="there is a force of this name"):
+        stepped(SHORT, forces={"drag": raises})
+    with bergtow.Simulation(SHORT, forces={"mine": drives}):
+        with pytest.raises(bergtow.BergtowError, match="belongs to a simulation that has not ended"):
+            bergtow.Simulation(SHORT, forces={"mine": drives})
+
+
+def test_floes_at_rest_wake_when_a_force_begins():
+    """Open water around a floe far from the tow: it rests until it is pushed."""
+    def later(bodies):
+        if bodies.time > 2:
+            bodies.force[0] = 0, 0.02
+
+    with bergtow.Simulation(changed(SHORT, tow__speed=0.01), threads=1, forces={"later": later}) as sim:
+        before = sim.positions[0]
+        sim.step(20)
+        assert (sim.positions[0] == before).all()
+        sim.step(1)
+        m = sim.masses[0, 0]
+        assert math.isclose(sim.velocities[0, 1], 0.1 * 0.02 / m, rel_tol=1e-12)

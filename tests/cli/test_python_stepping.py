@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""Simulations stepped from Python: the same bits as the command, what is saved and taken up, bodies and contacts."""
+import math
+import re
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from harness import CASE, CLOSING, NUMERIC, ROOT, call, changed, differing, environment, run, write_case
+from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, stepped
+
+pytestmark = pytest.mark.usefixtures("library")
+
+
+# --- the same bits ---------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("case", [SHORT, LINE, WINDOW], ids=["speed", "line", "window"])
+def test_the_state_is_that_of_the_command(case, tmp_path):
+    there = run(tmp_path, case)
+    result = bergtow.run(case, tmp_path / "python", threads=2)
+    assert result.summary["state_hash"] == there.hash == stepped(case)
+    ours, theirs = datasets_of(tmp_path / "python/result.h5"), datasets_of(there.dir / "result.h5")
+    assert ours.keys() == theirs.keys()
+    for name, values in theirs.items():
+        np.testing.assert_array_equal(ours[name], values, name)
+
+
+def test_simulations_that_are_stepped_in_turn_keep_apart(tmp_path):
+    pushed = []
+
+    def push(bodies):
+        pushed.append(bodies.time)
+        bodies.force[:, 1] = 0.3
+
+    with bergtow.Simulation(SHORT, threads=1) as a, bergtow.Simulation(SHORT, threads=1, forces={"push": push}) as b:
+        while a.steps_left:
+            a.step(5)
+            b.step(3)
+        assert len(pushed) == b.steps == 36
+        assert a.state_hash == run(tmp_path, SHORT).hash != b.state_hash
+
+
+def test_an_early_end_is_that_of_the_option_steps(tmp_path):
+    case = changed(SHORT, output__frame_interval=2)  # the last of the frames is that of the end
+    there = run(tmp_path, case, "--steps", 33)
+    with bergtow.Simulation(case, tmp_path / "python", threads=1) as sim:
+        sim.step(33)
+    here = bergtow.Result(tmp_path / "python")
+    assert here.summary["n_steps"] == 33 and here.summary["state_hash"] == there.hash
+    with h5py.File(here.folder / "result.h5") as ours, h5py.File(there.dir / "result.h5") as theirs:
+        np.testing.assert_array_equal(ours["frames/pose"], theirs["frames/pose"])
+
+
+def test_resume_goes_on_from_a_checkpoint_of_the_library(tmp_path):
+    with pytest.raises(ZeroDivisionError):
+        with bergtow.Simulation(SHORT, tmp_path / "python", threads=1) as sim:
+            sim.step(20)
+            sim.checkpoint()
+            sim.step(5)
+            1 / 0
+    assert not (tmp_path / "python/summary.json").exists()
+    assert call("resume", tmp_path / "python").returncode == 0
+    assert bergtow.Result(tmp_path / "python").summary["state_hash"] == run(tmp_path, SHORT).hash
+
+
+def test_a_run_is_taken_up_here(tmp_path):
+    """One of the command, and its end; with a force, which has to be there as it was; at another checkpoint. In a
+    process of its own, for forces belong to the process."""
+    whole = run(tmp_path, LINE)
+    run(tmp_path, LINE, "--steps", 20, name="part")
+    script = tmp_path / "resume.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow, shutil
+def push(bodies): bodies.force[bodies.towed] += 5, 5
+def refused(*words, **more):
+    try:
+        bergtow.Simulation.resume(*words, **more)
+    except bergtow.BergtowError as error:
+        print(error)
+shutil.copytree("part", "later")
+with bergtow.Simulation.resume("part", threads=1) as sim:
+    assert sim.steps == 20 and sim.case["tow.speed"] == bergtow.Case("case.yml")["tow.speed"]
+    while sim.steps_left: sim.step(7)
+refused("part")
+refused("none")
+with bergtow.Simulation("case.yml", "pushed", forces=dict(push=push), threads=1) as sim:
+    sim.step(15)
+    sim.checkpoint()
+    shutil.copy("pushed/checkpoint.h5", "early.h5")
+    sim.step(15)
+    sim.checkpoint()
+    shutil.copytree("pushed", "copy")
+    sim.step(10**6)
+    pushed = sim.state_hash
+for checkpoint in None, "early.h5":
+    with bergtow.Simulation.resume("copy", checkpoint=checkpoint, forces=dict(push=push), threads=1) as sim:
+        assert sim.steps == (15 if checkpoint else 30)
+        sim.step(10**6)
+        assert sim.state_hash == pushed
+        if not checkpoint: sim.drop()
+with bergtow.Simulation.resume("later", forces=dict(push=push), threads=1) as sim:
+    sim.step(10**6)
+""")
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    finished, missing = result.stdout.strip().splitlines()
+    assert "is finished" in finished and "no such folder" in missing
+    hashes = [bergtow.Result(tmp_path / name).summary["state_hash"] for name in ("part", "copy", "later")]
+    assert hashes[0] == whole.hash and len(set(hashes)) == 3
+    with h5py.File(tmp_path / "later/result.h5") as f:  # a force that has come later was 0 before
+        assert [(x == 0).all() for x in np.split(f["series/push_force"][:], [20])] == [True, False]
+    shutil.rmtree(tmp_path / "copy")
+    shutil.copytree(tmp_path / "part", tmp_path / "copy")
+    shutil.copy(tmp_path / "early.h5", tmp_path / "copy")
+    result = call("resume", tmp_path / "copy/early.h5")
+    assert result.returncode == CASE and "the run had push, which a program had added" in result.stderr
+
+
+def test_a_force_that_has_acted_is_named_and_wanted(tmp_path):
+    """One on a floe alone, where every series of forces is 0 or NaN; none where a force of the process was silent."""
+    script = tmp_path / "save.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow
+def nudge(bodies): bodies.force[bodies.id == 3, 1] += 1e-3
+def still(bodies): pass
+for name, forces in dict(nudged=dict(still=still, nudge=nudge), silent=dict(still=still)).items():
+    with bergtow.Simulation({SHORT!r}, name, forces=forces, threads=1) as sim:
+        sim.step(10)
+        sim.checkpoint()
+        sim.drop()
+with bergtow.Simulation.resume("nudged", forces=dict(still=still, nudge=nudge), threads=1) as sim:
+    sim.step(1)
+    sim.drop()
+try:
+    bergtow.Simulation.resume("nudged", threads=1)
+except bergtow.BergtowError as error:
+    print(error)
+""")
+    result = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "the run had nudge, which a program had added" in result.stdout
+    refused = call("resume", tmp_path / "nudged", "--quiet")
+    assert refused.returncode == CASE and "the run had nudge, which a program had added" in refused.stderr
+    assert call("resume", tmp_path / "silent", "--quiet").returncode == 0
+
+
+def test_two_ranks_have_the_state_of_one(tmp_path):
+    case = write_case(tmp_path, changed(SHORT, ice__concentration=0.7))
+    script = tmp_path / "ranks.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow, numpy as np, os, pathlib
+bergtow.start_mpi()
+def nothing(bodies): bodies.force[:] = 0 * bodies.place[:, :2]
+with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1) as sim:
+    while sim.steps_left: sim.step(10)
+    said = np.isfinite(sim.positions[:, 0]).sum(), sim.n_bodies, sim.state_hash
+    (pathlib.Path(__file__).parent / ("rank" + os.environ["OMPI_COMM_WORLD_RANK"])).write_text("%d %d %s" % said)
+""")
+    result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, script], capture_output=True,
+                            text=True, timeout=120,
+                            env=environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1))
+    assert result.returncode == 0, result.stdout + result.stderr
+    said = [(tmp_path / f"rank{k}").read_text().split() for k in range(2)]
+    assert {h for *_, h in said} == {run(tmp_path, case).hash}
+    assert any(int(held) < int(n) for held, n, _ in said)
+
+
+def test_the_state_before_a_step_that_failed_is_kept(tmp_path):
+    """As by the command, from the start and from a checkpoint; not where it cannot be made again."""
+    theirs = run(tmp_path, CLOSING, "--quiet", code=NUMERIC, name="theirs")
+    with bergtow.Simulation(SHORT, threads=1, forces={"over": lambda bodies: bodies.force.__iadd__(1)}) as sim:
+        sim.step(1)  # what has acted elsewhere in this process, and is over, does not make a state one of its own
+
+    def fails(name, between=lambda sim: None, **more):
+        with pytest.raises(bergtow.BergtowError) as raised:
+            with bergtow.Simulation(CLOSING, tmp_path / name, **more) as sim:
+                sim.step(9)
+                between(sim)
+                sim.step(sim.steps_left)
+        file = tmp_path / name / "failure.h5"
+        assert raised.value.status == NUMERIC and (str(file) in str(raised.value)) == file.exists()
+        return file, re.search(r"step \d+: floe", str(raised.value))[0]
+
+    def push(sim):
+        sim.set_velocity(0, 0.5, 0)
+
+    for name, between in {"begun": lambda sim: None, "kept": bergtow.Simulation.checkpoint,
+                          "pushed": lambda sim: (push(sim), sim.checkpoint())}.items():
+        file, step = fails(name, between)
+        assert step in call("resume", file, "--quiet").stderr
+        there = [n for n in differing(theirs.dir / "failure.h5", file)
+                 if not n.startswith(("/about", "/case", "/clock"))]
+        assert (there == []) == (name != "pushed")
+    assert not fails("changed", push)[0].exists()
+    assert not fails("forced", forces={"nothing": lambda bodies: None})[0].exists()
+
+
+# --- bodies, contacts, numbers ---------------------------------------------------------------------------------------
+
+def test_contacts_add_up_to_the_force_on_the_body():
+    with bergtow.Simulation(changed(LINE, ice__concentration=0.8), threads=1) as sim:
+        sim.step(40)
+        outline, place = sim.outline(sim.towed), sim.positions[sim.towed]
+        force, touching = np.zeros(2), 0
+        for c in sim.contacts[sim.contacts["normal_impulse"].max(1) > 0]:
+            if sim.towed not in (c["a"], c["b"]):
+                continue
+            n, sign = c["normal"], 1 if c["b"] == sim.towed else -1
+            t = np.array([-n[1], n[0]])
+            force += sign * (n * c["normal_impulse"].sum() + t * c["tangential_impulse"]) / sim.dt
+            for point in c["point"][:c["n_points"]]:
+                edges = np.roll(outline, -1, 0) - outline
+                along = np.clip(((point - outline) * edges).sum(1) / (edges ** 2).sum(1), 0, 1)
+                assert np.hypot(*(outline + along[:, None] * edges - point).T).min() < 0.02
+                assert np.hypot(*(point - place[:2])) < sim.radii[sim.towed] + 0.02
+                touching += 1
+        assert touching > 2
+        np.testing.assert_allclose(force, [sim["ice_force_x"], sim["ice_force_y"]], rtol=1e-9)
+
+
+def test_bodies_are_changed_by_hand_within_limits():
+    with bergtow.Simulation(changed(SHORT, ice__concentration=0.1, tow__speed=0.01), threads=1) as sim:
+        place = sim.positions
+        sim.set_velocity(0, 0.2, -0.1, 0.3)
+        assert (sim.velocities[0] == (0.2, -0.1, 0.3)).all()
+        sim.step(1)
+        assert np.allclose(sim.positions[0] - place[0], 0.1 * np.array([0.2, -0.1, 0.3]), rtol=0.1)
+        free = next((x, y) for x in np.arange(6, 14, 0.5) for y in np.arange(-3, 3, 0.5)
+                    if np.hypot(*(sim.positions[:, :2] - (x, y)).T)[:sim.towed].min() > 1.5
+                    and abs(x - sim.positions[sim.towed, 0]) > 3)
+        sim.set_position(1, *free, 0.5)
+        assert np.allclose(sim.positions[1], (*free, 0.5))
+        sim.step(5)
+        assert np.allclose(sim.positions[1], (*free, 0.5), atol=1e-3)
+        for refused, match in (((2, *free, 0), "would lie over body 1"), ((2, 99, 0, 0), "outside of the domain"),
+                               ((2, math.nan, 0, 0), "finite"), ((sim.towed, 5, 0, 0), "prescribed"),
+                               ((99999, 5, 0, 0), "there is none")):
+            before = sim.state_hash
+            with pytest.raises(bergtow.BergtowError, match=match):
+                sim.set_position(*refused)
+            assert sim.state_hash == before
+        with pytest.raises(bergtow.BergtowError, match="prescribed"):
+            sim.set_velocity(sim.towed, 1, 0)
+    with bergtow.Simulation(LINE) as sim, pytest.raises(bergtow.BergtowError, match="is towed"):
+        sim.set_position(sim.towed, 6, 0, 0)
+
+
+def test_a_floe_that_is_pushed_by_hand_hits_another():
+    floes = [{"shape": "square", "length": 0.8, "x": x, "y": 0} for x in (8, 10)]
+    case = changed(SHORT, ice__concentration=0, tow__speed=0.01, floes=floes)
+    with bergtow.Simulation(case, threads=1) as sim:
+        sim.step(3)  # both rest, and cells with them
+        sim.set_velocity(0, 1, 0)
+        sim.step(30)
+        assert sim.velocities[1, 0] > 0.1 and sim.positions[0, 0] < sim.positions[1, 0] - 0.79
+
+
+def test_errors_of_numbers_and_of_what_has_ended():
+    with bergtow.Simulation(SHORT) as sim:
+        assert math.isnan(sim["ice_resistance"])
+        with pytest.raises(KeyError, match="no series of this name"):
+            sim["resistance_of_ice"]
+        with pytest.raises(bergtow.BergtowError, match="no folder for a checkpoint"):
+            sim.checkpoint()
+    with pytest.raises(bergtow.BergtowError, match="has ended"):
+        sim.step()
+
+
+def test_a_result_is_not_replaced_unless_asked(tmp_path):
+    bergtow.run(SHORT, tmp_path / "out")
+    with pytest.raises(bergtow.BergtowError, match="holds a result"):
+        bergtow.run(SHORT, tmp_path / "out")
+    bergtow.run(SHORT, tmp_path / "out", replace=True)

@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: MIT
+// Checks across the keys of a case, and the numbers that follow from it.
+#include "case/case_check.h"
+#include "case_text.h"
+
+#include <math.h>
+
+static void cross_checks_refuse(void **state)
+{
+    (void)state;
+    static const struct { const char *set, *fragment;
+    } bad[] = {
+        {"run.dt=11", "--set run.dt=11: 11 s is longer than run.duration"},
+        {"run.dt=1e-9", "steps of run.duration"},
+        {"output.frame_interval=1e-6", "frames, at most"},
+        {"output.window_start=10", "not before the end of the run"},
+        {"body.shape=square;body.length=11", "spans 11 m along y in a domain of 10 m"},
+        {"body.x=0.5", "is outside the domain"},
+        {"body.y=4.5", "is outside the domain"},
+        {"body.x=100", "is outside the domain"},
+        {"ice.x_min=80", "the ice region is empty"},
+        {"ice.x_max=73", "outside the domain, which ends at 72 m"},
+        {"ice.y_min=-6", "outside the domain, which begins at -5 m"},
+        {"ice.x_min=-1", "outside the domain"},
+        {"ice.y_max=6", "outside the domain"},
+        {"ice.size=11", "larger than the ice region"},
+        {"ice.size=1 mm", "floes, at most 20000000"},
+        {"ice.size_law=power", "needs a smallest size"},
+        {"ice.size_min=3;ice.size_max=2", "is not below ice.size_max"},
+        {"ice.size_law=power;ice.size_min=2;ice.size_max=20", "ice.size_max=20: 20 m is larger"},
+        {"ice.size_law=lognormal;ice.size_min=2;ice.size_max=3", "not between"},
+        {"domain.ends=periodic;domain.ends_closing=0.1", "needs a wall to move"},
+        {"domain.sides=open;domain.sides_closing=0.1", "needs a wall to move"},
+        {"domain.sides_closing=1", "brings the walls together after 5 s"},
+        {"tow.mode=line;tow.line_length=0", "needs a line"},
+        {"tow.mode=line;tow.line_stiffness=0", "needs a stiffness"},
+        {"body.shape=none;tow.mode=speed", "no body to tow"},
+        {"tow.mode=none;tow.speed=1", "has no effect with tow.mode: none"},
+        {"body.vx=1", "has no effect with tow.mode: speed"},
+        {"body.shape=square;tow.speed=10", "a wall stands after 67 m"},
+        {"body.shape=square;tow.direction=90;tow.speed=1", "a wall stands after 4 m"},
+        {"body.shape=square;tow.direction=180;tow.speed=1", "a wall stands after 3 m"},
+        {"body.shape=polygon", "body.vertices: is missing"},
+        {"body.vertices=[[0,0],[1,0],[0,1]]", "the shape is not polygon"},
+        {"body.shape=polygon;body.vertices=[[0,0],[0,1],[1,0]]", "the waterline is refused"},
+        {"body.shape=square;body.width=1", "the shape is square"},
+        {"water.tilt=geostrophic", "needs the Coriolis force"},
+        {"water.slope_x=0.001", "has no effect without water.tilt"},
+        {"tow.programme=[[0,1],[5,2],[5,0]]", "point 3 is at 5 s, not after the one before"},
+        {"tow.programme=[[0,1],[5,60]]", "point 2: 60 is out of range; give a value in [0, 50] m/s"},
+        {"tow.programme=[[0 m,1]]", "point 1: m is the unit of a length and this is a time"},
+        {"tow.programme=[[0,0],[5,1]];tow.speed=2", "has no effect with tow.programme, whose largest speed is 1 m/s"},
+        {"tow.programme=[[0,0],[5,1]];tow.ramp=4", "reaches its largest speed at 5 s"},
+        {"tow.mode=none;tow.programme=[[0,1]]", "has no effect with tow.mode: none"},
+        {"body.shape=square;tow.programme=[[0,8],[10,8]]", "a wall stands after 67 m; shorten the run to 8.37 s"},
+        {"tow.waypoints=[]", "has 0 points"},
+        {"tow.waypoints=[[9,0],[9,0]]", "way-point 2 is where the one before it"},
+        {"tow.turn_radius=3", "no effect without tow.waypoints"},
+        {"tow.waypoints=[[20,0],[20,2]];tow.turn_radius=3", "leaves no room for a turn"},
+        {"tow.waypoints=[[20,0]];tow.direction=10", "is not the direction from the body to the first way-point"},
+        {"tow.mode=line;tow.waypoints=[[9,0]]", "is not ahead of where the towing end starts, (10"},
+        {"tow.waypoints=[[6,0],[6,10]];tow.speed=1", "into a wall after"},
+        {"domain.ends=moving;tow.waypoints=[[40,0],[41,3]]", "the leg from way-point 1 leads 71.5651 deg from x"},
+        {"tow.mode=none;tow.waypoints=[[9,0]]", "have no effect with tow.mode: none"},
+        {"tow.mode=line;tow.line.type=dyneema", "a named line needs a diameter"},
+        {"tow.mode=line;tow.line.diameter=0.1", "has no effect without a named line"},
+        {"tow.mode=line;tow.line.branches=2;tow.branch2.length=0.9", "do not both reach the middle"},
+        {"tow.mode=thrust", "tow.vessel.mass: is 0 and tow.mode thrust needs it"},
+        {"tow.mode=thrust;tow.vessel.mass=1;tow.vessel.bollard_pull=1;tow.vessel.free_resistance=2",
+         "thrust does not grow with speed"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        char copy[128];
+        const char *set[8];
+        int n = 0;
+        snprintf(copy, sizeof copy, "%s", bad[i].set);
+        for (char *part = strtok(copy, ";"); part; part = strtok(NULL, ";")) set[n++] = part;
+        bt_case c;
+        bt_errors err = {0};
+        if (read_text_with(&c, base, set, n, &err) != BT_ERR_CASE) fail_msg("accepted: %s", bad[i].set);
+        if (!has(&err, bad[i].fragment)) fail_with(&err, bad[i].fragment);
+        bt_errors_free(&err);
+        bt_case_free(&c);
+    }
+}
+
+static void cross_checks_let_pass(void **state)
+{
+    (void)state;
+    static const char *const good[] = {
+        "tow.speed=6.7", // 6.7 × (10 − 2.5) = 50 m of 67 m: the ramp counts
+        "domain.ends=open;tow.speed=50",
+        "domain.ends=periodic;tow.speed=50",
+        "tow.mode=none",
+        "body.shape=none",
+        "tow.mode=line;body.vx=1",
+        "tow.speed=0",
+        "ice.concentration=0;ice.size=1 mm",
+        "domain.sides=open;body.length=11;body.x=12",
+        "domain.sides_closing=0.4",
+        "body.vertices=none",
+        "body.x=none",
+        "domain.length=0.3;domain.x0=-0.1;ice.x_max=0.2;body.shape=none;ice.size=0.1",
+        "ice.size_law=power;ice.size_min=0.5;ice.size_max=5",
+        "water.tilt=geostrophic;water.latitude=75",
+        "tow.programme=[[0,8],[10,0]]",
+        "tow.programme=[[0,0],[1,7],[8,7]];tow.speed=7;tow.ramp=1",
+        "tow.waypoints=[[20,0],[40,3]];tow.direction=0;tow.turn_radius=10",
+        "tow.mode=line;tow.waypoints=[[11,0],[9,0]]",
+        "tow.mode=line;tow.line.branches=2;tow.branch2.length=5.5",
+        "tow.mode=line;tow.line.type=steel-wire;tow.line.diameter=20 mm",
+        "tow.mode=thrust;tow.vessel.mass=1 t;tow.vessel.bollard_pull=1 kN;tow.vessel.free_speed=2;tow.speed=50",
+    };
+    for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
+        char copy[128];
+        const char *set[8];
+        int n = 0;
+        snprintf(copy, sizeof copy, "%s", good[i]);
+        for (char *part = strtok(copy, ";"); part; part = strtok(NULL, ";")) set[n++] = part;
+        bt_case c;
+        bt_errors err = {0};
+        if (read_text_with(&c, base, set, n, &err)) fail_with(&err, good[i]);
+        if (c.tow.mode == BT_TOW_NONE) assert_true(c.tow.speed == 0);
+        if (c.body.shape == BT_BODY_ABSENT) assert_true(c.tow.mode == BT_TOW_NONE && bt_case_body_mass(&c) == 0);
+        assert_true(bt_case_reference_speed(&c) > 0);
+        bt_case_free(&c);
+    }
+}
+
+static void floes_by_hand_are_checked(void **state)
+{
+    (void)state;
+    static const struct { const char *floe, *fragment;
+    } bad[] = {
+        {"{x: 1, length: 1}", "a.yml:2: floes[0].y: missing"},
+        {"{x: 5, y: 0}", "a.yml:2: floes[0]: has no length"},
+        {"{x: 71.8, y: 0, length: 1}", "outside the domain in x"},
+        {"{x: 9, y: 6, length: 1}", "outside the domain in y"},
+        {"{x: 9, y: 0, shape: polygon}", "has shape polygon and no vertices"},
+        {"{x: 9, y: 0, shape: none}", "did you mean"},
+        {"{x: 9, y: 0, length: 1, vertices: [[0,0],[1,0],[0,1]]}", "the shape is not polygon"},
+        {"{x: 9, y: 0, shape: polygon, vertices: [[0,0],[2,0],[1,0.1],[0,2]]}", "outline is refused"},
+        {"{x: 9, y: 0, length: 1, x: 2}", "duplicate key"},
+        {"{x: 9, y: 0, length: 0}", "out of range"},
+        {"{x: 9, y: 0, shape: polygon, vertices: [[0,0],[1,0]]}", "has 2 points"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+        char text[256];
+        bt_case c;
+        bt_errors err = {0};
+        snprintf(text, sizeof text, "%sfloes: [%s]\n", base, bad[i].floe);
+        if (read_text(&c, text, &err) != BT_ERR_CASE) fail_msg("accepted: %s", bad[i].floe);
+        if (i != 5 && !has(&err, bad[i].fragment)) fail_with(&err, bad[i].fragment);
+        if (err.n != 1) fail_with(&err, bad[i].floe);
+        bt_errors_free(&err);
+        bt_case_free(&c);
+    }
+    char text[256];
+    bt_case c;
+    bt_errors err = {0};
+    snprintf(text, sizeof text, "%sfloes: [{x: 71.8, y: 0, length: 1, fixed: true}]\n", base);
+    if (read_text(&c, text, &err)) fail_with(&err, "a fixed body may stand in a wall");
+    bt_case_free(&c);
+}
+
+// The tow end after time t against the integral of its speed.
+static void tow_distance_is_the_integral_of_the_ramped_speed(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_case_defaults(&c);
+    c.tow.speed = 0.7;
+    c.tow.ramp = 3;
+    double way = 0, dt = 1e-4;
+    for (int i = 0; i < 80000; i++) {
+        way += dt * c.tow.speed * bt_min(1, (i + 0.5) * dt / c.tow.ramp);
+        if (i % 9999 == 0) assert_true(fabs(bt_case_tow_distance(&c, (i + 1) * dt) - way) < 1e-9);
+    }
+    bt_case_free(&c);
+}
+
+// Expected number of floes of a power law against a sum over a fine histogram of N(>d) ~ d^-a.
+static void expected_floes_of_a_power_law(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_errors err = {0};
+    const char *set[] = {"ice.size_law=power",    "ice.size_min=0.5", "ice.size_max=5",
+                         "ice.concentration=0.5", "body.shape=none",  ""};
+    static const char *const exponents[] = {"ice.size_exponent=1.5", "ice.size_exponent=2", "ice.size_exponent=2.5"};
+    for (int e = 0; e < 3; e++) {
+        set[5] = exponents[e];
+        if (read_text_with(&c, base, set, 6, &err)) fail_with(&err, "refused");
+        double a = c.ice.size_exponent, count = 0, area = 0;
+        for (int i = 0; i < 100000; i++) {
+            double d0 = 0.5 + 4.5 * i / 100000, d1 = 0.5 + 4.5 * (i + 1) / 100000, d = (d0 + d1) / 2,
+                   n = pow(d0, -a) - pow(d1, -a);
+            count += n;
+            area += n * BT_PI / 4 * d * d;
+        }
+        double want = 0.5 * 720 * count / area;
+        assert_true(fabs(bt_case_expected_floes(&c) / want - 1) < 1e-6);
+        bt_case_free(&c);
+    }
+}
+
+static void steps_do_not_gain_one_by_round_off(void **state)
+{
+    (void)state;
+    bt_case c;
+    bt_case_defaults(&c);
+    c.run.duration = 450, c.run.dt = 0.1;
+    assert_true(bt_case_steps(&c) == 4500);
+    c.run.duration = 0.3, c.run.dt = 0.1; // the quotient is 2.9999999999999996
+    assert_true(bt_case_steps(&c) == 3);
+    c.run.duration = 2.1, c.run.dt = 0.3; // the quotient is 7.000000000000001
+    assert_true(bt_case_steps(&c) == 7);
+    c.run.duration = 1e7, c.run.dt = 0.01;
+    assert_true(bt_case_steps(&c) == 1000000000);
+    c.run.duration = 1, c.run.dt = 0.3;
+    assert_true(bt_case_steps(&c) == 4);
+    bt_case_free(&c);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(cross_checks_refuse),
+        cmocka_unit_test(cross_checks_let_pass),
+        cmocka_unit_test(floes_by_hand_are_checked),
+        cmocka_unit_test(tow_distance_is_the_integral_of_the_ramped_speed),
+        cmocka_unit_test(expected_floes_of_a_power_law),
+        cmocka_unit_test(steps_do_not_gain_one_by_round_off),
+    };
+    return cmocka_run_group_tests_name("case, checks", tests, make_folder, remove_folder);
+}
