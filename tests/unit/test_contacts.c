@@ -292,7 +292,7 @@ static void points_that_all_but_coincide_are_not_solved_together(void **state)
     bt_world_add(w, &d);
     d.x = 1.01, d.y = 1 - 1e-6;
     bt_world_add(w, &d);
-    bt_contacts_detect_all(w, 0.05);
+    detect_all(w, 0.05);
     assert_int_equal(w->cells->n_contacts, 1);
     const bt_contact *u = &w->cells->cell[bt_cells_of_pair(w, 0, 1)].contacts[0];
     assert_int_equal(u->n, 2);
