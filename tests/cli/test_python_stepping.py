@@ -24,7 +24,7 @@ def test_the_state_is_that_of_the_command(case, tmp_path):
     assert result.summary["state_hash"] == there.hash == stepped(case)
     ours, theirs = datasets_of(tmp_path / "python/result.h5"), datasets_of(there.dir / "result.h5")
     # forces that other tests have added to this process, and taken back, are 0, or NaN where nothing is towed
-    ours = {name: v for name, v in ours.items() if not name.endswith("_force") or name in theirs or np.nan_to_num(v).any()}
+    ours = {n: v for n, v in ours.items() if not n.endswith("_force") or n in theirs or np.nan_to_num(v).any()}
     assert ours.keys() == theirs.keys()
     for name, values in theirs.items():
         np.testing.assert_array_equal(ours[name], values, name)
