@@ -32,7 +32,7 @@ try:
 except ImportError:  # map_read.need_libraries tells it
     pass
 
-MOST_VERTICES = 128      # src/geometry/shape.h
+MOST_VERTICES = 128      # include/bergtow/shape.h
 SAME = 0.9               # of both areas: traced twice; of the smaller one: it lies in the other
 THIN = 1e-4              # of the tolerance and of the reader's: below it detail is rounding
 READER = 1e-3            # overlap that src/field/field_admit.c takes, of the mean size

@@ -9,7 +9,7 @@
 // and Newton's method of free drift and the exact circles of Coriolis need to know what is linear, quadratic or a
 // rotation.
 //
-// The laws of the program (src/force/laws.c), per body, in the order of integration [model: Yulmetov & Løset 2017,
+// The laws of the program (src/force/laws.h), per body, in the order of integration [model: Yulmetov & Løset 2017,
 // section 1; coefficients: see the case schema]; m: its mass, M = m (1 + C_m):
 //   Coriolis   exact rotation of U − U_b by (m/M) f Δt (inertial circles keep their speed), U_b: the velocity
 //              in geostrophic balance with the sea-surface tilt, or 0
