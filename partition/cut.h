@@ -52,5 +52,4 @@ bt_cut_quality bt_cut_measure(const bt_graph *g, int n_parts, const int *part, c
 /// Every label in 0 ... n_parts − 1, groups together, and no part empty unless there are fewer vertices than parts.
 bool bt_cut_is_valid(const bt_graph *g, int n_parts, const int *part);
 
-
 #endif

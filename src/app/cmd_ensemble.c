@@ -43,7 +43,8 @@ static const struct argp_option ensemble_options[] = {
      0},
     {"jobs", 'j', "N", 0,
      "processes on this machine that share the members; default as many as the cores are enough for, with one thread "
-     "for each 15,000 floes of a member, where no number of threads is given, and 1 under mpirun or srun",
+     "for each 15,000 floes of a member, where no number of threads is given; always 1 under mpirun or srun, and with "
+     "--steps",
      0},
     {"steps", KEY_STEPS, "N", 0, "stop each member after N steps of this call; the same call goes on", 0},
     {"max-wall", KEY_WALL, "TIME", 0,
@@ -79,6 +80,7 @@ int bt_cmd_ensemble(int argc, char **argv)
     bt_jobs jobs = {.argc = argc, .argv = argv};
     o.run.helpers = &(bt_ensemble_helpers){.start = bt_jobs_start, .end = bt_jobs_end, .of = &jobs};
     o.run.job = bt_jobs_is_one();
+    if (o.run.job) o.run.retry = false; // the call that started it has forgotten the failures, and records new ones
     bt_study s;
     bt_errors err = {0};
     bt_status status = bt_comm_agree(comm, bt_study_read(&s, o.file.path, &err));

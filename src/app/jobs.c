@@ -35,11 +35,11 @@ void bt_jobs_start(void *of, int n, int threads)
     int k = 0;
     words[k++] = "bergtow";
     words[k++] = "ensemble";
-    for (int i = 1; i < j->argc; i++) words[k++] = j->argv[i];
     snprintf(j->threads, sizeof j->threads, "%d", threads);
-    words[k++] = "--threads";
+    words[k++] = "--threads"; // before the user's words, among which -- may end the options
     words[k++] = j->threads;
     words[k++] = "--no-wait";
+    for (int i = 1; i < j->argc; i++) words[k++] = j->argv[i];
     words[k] = NULL;
 
     char parent[24];

@@ -357,8 +357,8 @@ bt_key bt_case_keys[] = {
          "speed the tolerance refers to; 0 = tow speed, or the largest speed prescribed"),
     INT("solver.max_sweeps", solver.max_sweeps, "500", "[1, 1e6]",
         "limit of the work of a step, which is then left and counted as not converged: six updates of every contact "
-        "for each of so many sweeps, residual passes counted as updates; up to two and a half times that where the "
-        "residual is far off; assumed"),
+        "for each of so many sweeps, residual passes counted as updates; up to three times that where the residual is "
+        "far off; assumed"),
     INT("solver.inner_sweeps", solver.inner_sweeps, "2", "[1, 100]",
         "times a cell that still changes is swept before the next has its turn"),
     INT("solver.turn_rows", solver.turn_rows, "100000", "[0, 1e12]",

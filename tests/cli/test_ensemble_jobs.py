@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from harness import BERGTOW, DONE, SIGNAL, TOW, changed, differing, environment, write_case
+from harness import BERGTOW, CASE, DONE, SIGNAL, TOW, changed, differing, environment, write_case
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
@@ -87,6 +87,21 @@ def test_the_cores_are_shared_by_what_members_keep_busy(folder):
     found = ensemble(folder, "large", "--max-wall", 1e-3)  # before the first member begins
     assert found.returncode == SIGNAL, found.stderr
     assert shares(found) == (max(1, cores // 2), cores // max(1, cores // 2))
+
+
+def test_jobs_leave_the_failures_of_the_call(folder):
+    """Failed members are tried again once, not once by each process; and -- may end the options."""
+    study = STUDY | {"parameters": {"run.duration": [3, 8, 4]}}  # 3 and 4 are too short for the window
+    (folder / "study.yml").write_text(json.dumps(study))
+    assert ensemble(folder, "out", "--jobs", 1).returncode == CASE
+    path = folder / "out/journal.jsonl"
+    before = len(path.read_text().splitlines())
+    call = subprocess.run([BERGTOW, "ensemble", "-o", "out", "--jobs", "3", "--retry-failed", "--", "study.yml"],
+                          cwd=folder, env=open_environment(), capture_output=True, text=True, timeout=300)
+    assert call.returncode == CASE and "usage" not in call.stderr.lower() and "3 at a time" in call.stdout
+    events = [json.loads(line) for line in path.read_text().splitlines()[before:]]
+    assert sorted(e["member"] for e in events if e["event"] == "failed") == [
+        f"c{c:03}-r{r:03}" for c in (1, 3) for r in (1, 2, 3)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL], ids=["TERM", "KILL"])

@@ -102,6 +102,15 @@ def test_a_limit_of_wall_time(tmp_path):
         assert ensemble(tmp_path, "all", bad).returncode == USAGE
 
 
+def test_a_limit_of_wall_time_leaves_whole_fields(quiet, tmp_path):
+    """Without one the longest members come first, so that the last do not wait for a long one."""
+    prepare(tmp_path)
+    assert ensemble(tmp_path, "all", "--max-wall", 1000).returncode == DONE
+    fields, costly = ([e["member"].split("-") for e in journal(f) if e["event"] == "start"] for f in (tmp_path, quiet))
+    assert [r for _, r in fields] == sorted(r for _, r in fields)
+    assert [c for c, _ in costly] != [c for c, _ in fields] and costly[0][0] == costly[1][0] == costly[2][0]
+
+
 def test_values_in_place_of_those_of_the_study(tmp_path):
     prepare(tmp_path, STUDY | {"repeats": 1})
     given = ("--set", "run.duration=10", "--set", "output.frame_interval=5")

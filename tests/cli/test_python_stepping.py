@@ -151,6 +151,33 @@ except bergtow.BergtowError as error:
     assert call("resume", tmp_path / "silent", "--quiet").returncode == 0
 
 
+def test_forces_are_taken_up_in_their_order(tmp_path):
+    """Another order adds up with other rounding."""
+    script = tmp_path / "forces.py"
+    script.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT / "postproc")!r})
+import bergtow
+def left(bodies): bodies.force[3, 1] += 1e-3
+def right(bodies): bodies.force[4, 1] -= 1e-3
+forces = {{name: globals()[name] for name in sys.argv[2:]}}
+begin = bergtow.Simulation.resume if sys.argv[1] == "resume" else lambda *a, **k: bergtow.Simulation({SHORT!r}, *a, **k)
+try:
+    with begin("out", forces=forces, threads=1) as sim:
+        sim.step(10)
+        sim.checkpoint()
+        sim.drop()
+except bergtow.BergtowError as error:
+    sys.exit(str(error))
+""")
+
+    def go(*words):
+        return subprocess.run([sys.executable, script, *words], capture_output=True, text=True, cwd=tmp_path)
+
+    assert go("run", "left", "right").returncode == 0
+    assert "the run had left, right, which a program had added" in go("resume", "right", "left").stderr
+    assert go("resume", "left", "right").returncode == 0
+
+
 def test_two_ranks_have_the_state_of_one(tmp_path):
     case = write_case(tmp_path, changed(SHORT, ice__concentration=0.7))
     script = tmp_path / "ranks.py"

@@ -332,7 +332,7 @@ static void laws_of_a_jam(void **state)
     (void)state;
     const double h = 0.1, speed = 0.5;
     bt_params p = params(0.01);
-    p.max_sweeps = 1; // far off it is two and a half times that
+    p.max_sweeps = 1; // far off, up to three times that
     p.raft_line = 2 * pressure / h, p.raft_sheet = 1e3, p.raft_rise = 1e3;
     bt_world *w = bt_world_create(&p);
     uint64_t seed = 1;

@@ -236,18 +236,25 @@ static void arms_meet(void **state)
     bt_world_free(w);
 }
 
-/// Two squares edge to edge: two points at the ends of the shared edge, the same features while they slide a little.
-static void edge_contact_keeps_its_features(void **state)
+/// Squares of 1 m at the origin and at (x, y).
+static bt_world *two_squares(double x, double y)
 {
-    (void)state;
     bt_params p = scene_params(0.1, 1);
     bt_world *w = bt_world_create(&p);
     double v[8];
     scene_square(1, v);
     bt_body_def d = scene_prism(4, v, 900);
     bt_world_add(w, &d);
-    d.x = 1.01, d.y = 0.3;
+    d.x = x, d.y = y;
     bt_world_add(w, &d);
+    return w;
+}
+
+/// Two squares edge to edge: two points at the ends of the shared edge, the same features while they slide a little.
+static void edge_contact_keeps_its_features(void **state)
+{
+    (void)state;
+    bt_world *w = two_squares(1.01, 0.3);
     uint32_t features[2] = {0, 0};
     for (int s = 0; s < 50; s++) {
         detect_all(w, 0.05);
@@ -284,14 +291,7 @@ static void edge_contact_keeps_its_features(void **state)
 static void points_that_all_but_coincide_are_not_solved_together(void **state)
 {
     (void)state;
-    bt_params p = scene_params(0.1, 1);
-    bt_world *w = bt_world_create(&p);
-    double v[8];
-    scene_square(1, v);
-    bt_body_def d = scene_prism(4, v, 900);
-    bt_world_add(w, &d);
-    d.x = 1.01, d.y = 1 - 1e-6;
-    bt_world_add(w, &d);
+    bt_world *w = two_squares(1.01, 1 - 1e-6);
     detect_all(w, 0.05);
     assert_int_equal(w->cells->n_contacts, 1);
     const bt_contact *u = &w->cells->cell[bt_cells_of_pair(w, 0, 1)].contacts[0];
