@@ -65,20 +65,56 @@ static void on_signal(int number) { stop_signal = number; }
 static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
 enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
-/// One line of the journal, in one write: lines of several processes do not mix.
+/// One line of the journal, in one write: lines of several processes do not mix. wall: NAN = not known.
 static void journal(const ensemble *e, const char *event, const bt_member *m, double wall, int code)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
-    char line[256];
+    char line[256], lasted[32] = "null";
+    if (isfinite(wall)) snprintf(lasted, sizeof lasted, "%.3f", wall);
     const int n = snprintf(line, sizeof line,
                            "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
-                           "%.3f, \"exit_code\": %d}\n",
-                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), wall, code);
+                           "%s, \"exit_code\": %d}\n",
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), lasted, code);
     const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
     close(fd);
+}
+
+/// A process that is killed between the end of a member and the line for it leaves that line out: here it is added. By
+/// one process at a time, with the lock of the folder.
+static void complete_journal(ensemble *e)
+{
+    // Whoever works on a member holds its lock until the line is written, so the locks are looked at first.
+    enum { OTHER, ENDED, SAID };
+    char *state = bt_alloc((size_t)e->n, 1);
+    for (int64_t i = 0; i < e->n; i++) {
+        const entry *x = &e->list[i];
+        const bool ended = bt_ensemble_state(x->folder, NULL, NULL) == BT_MEMBER_FINISHED;
+        state[x->index] = ended && !bt_member_held(x->folder) ? ENDED : OTHER;
+    }
+    char *path = bt_file_join(e->o->dir, "journal.jsonl"), *text = NULL;
+    size_t size;
+    bt_errors unheard = {0};
+    if (access(path, F_OK) == 0 && bt_file_read(path, "a journal", &text, &size, &unheard) == BT_OK) {
+        for (char *line = text, *end; (end = strchr(line, '\n')); line = end + 1) {
+            *end = 0;
+            int64_t condition, repeat;
+            const char *name = strstr(line, "\"member\": \"c");
+            if (!name || sscanf(name, "\"member\": \"c%" SCNd64 "-r%" SCNd64, &condition, &repeat) != 2) continue;
+            const int64_t i = (condition - 1) * e->s->repeats + repeat - 1;
+            // with fewer repeats than before, lines of members that are no longer asked for
+            if (i < 0 || i >= e->n || repeat > e->s->repeats || state[i] == OTHER) continue;
+            state[i] = strstr(line, "\"event\": \"finished\"") ? SAID : ENDED;
+        }
+        for (int64_t i = 0; i < e->n; i++)
+            if (state[e->list[i].index] == ENDED) journal(e, "finished", &e->list[i].m, NAN, 0);
+    }
+    bt_errors_free(&unheard);
+    free(text);
+    free(path);
+    free(state);
 }
 
 /// The wall time that is left, s; infinite where none was given.
@@ -375,6 +411,7 @@ static bt_status gather(ensemble *e, bool wait)
     if (fd < 0 && wait) status = bt_file_fail(e->o->dir, "open the lock in the folder", errno, e->err);
     else if (fd >= 0 && bt_member_take_lock(fd, wait))
         status = bt_ensemble_gather(e->s, e->o->dir, &e->records, wait ? e->err : &unheard);
+    if (fd >= 0 && wait) complete_journal(e);
     if (fd >= 0) close(fd);
     bt_errors_free(&unheard);
     e->gathered = bt_clock();

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -96,6 +97,21 @@ def test_killed_and_called_again(quiet, tmp_path):
     assert sorted(j["member"]
                   for j in journal(tmp_path)
                   if j["event"] == "finished") == sorted(p.name for p in (tmp_path / "all/members").iterdir())
+
+
+def test_a_line_that_a_kill_kept_out_of_the_journal_is_added(quiet, tmp_path):
+    folder, _ = quiet
+    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
+    path = tmp_path / "all/journal.jsonl"
+    lines = path.read_text().splitlines(keepends=True)
+    lost = [k for k, line in enumerate(lines) if '"finished", "member": "c003-r002"' in line]
+    assert len(lost) == 1
+    path.write_text("".join(lines[:lost[0]] + lines[lost[0] + 1:]))
+    assert ensemble(tmp_path).returncode == DONE
+    assert path.read_text().splitlines(keepends=True)[:-1] == lines[:lost[0]] + lines[lost[0] + 1:]
+    added = journal(tmp_path)[-1]
+    assert (added["event"], added["member"], added["wall_time_s"]) == ("finished", "c003-r002", None)
+    assert ensemble(tmp_path).returncode == DONE and len(journal(tmp_path)) == len(lines)
 
 
 def test_interrupted(quiet, tmp_path):
