@@ -70,12 +70,12 @@ static void journal(const ensemble *e, const char *event, const bt_member *m, do
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
-    char line[256], lasted[32] = "null";
-    if (isfinite(wall)) snprintf(lasted, sizeof lasted, "%.3f", wall);
+    char line[256], took[32] = "null";
+    if (isfinite(wall)) snprintf(took, sizeof took, "%.3f", wall);
     const int n = snprintf(line, sizeof line,
                            "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
                            "%s, \"exit_code\": %d}\n",
-                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), lasted, code);
+                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), took, code);
     const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
     if (fd < 0) return;
     if (write(fd, line, (size_t)n) == n) fsync(fd);
