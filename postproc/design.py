@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
 """From a case or a study to the report of the design tow force, as a page and as PDF.
 
-    design.py CASE.yml -o DIR --budget 13          DIR/design.yml, the ensemble, report.html, report.pdf, replay.html
+    design.py CASE.yml -o DIR --budget 14          DIR/design.yml, the ensemble, report.html, report.pdf, replay.html
     design.py STUDY.yml -o DIR                     the same of a study, with the fields that it asks for
 
-Of a case a study is made: over concentrations, with as many fields of each as the budget allows. The first field of
-each condition is run, then some of those that fit into what is left, by the time which the last ones took, and so on;
-so conditions have equally many, and nothing is cut off half-way. Should the time run out all the same, the fields that
-are complete in every condition are taken. Members are independent: one process of one thread a core. The same call
-goes on where an earlier one ended.
+Of a case a study is made: over concentrations, with as many fields of each as the budget allows. Two fields of each
+condition are run, then as many as fit into what is left, by the time which these took; members go field by field, so
+conditions have equally many, and should the time run out all the same, the fields that are complete in every condition
+are taken. Members are independent: one process of one thread a core. The same call goes on where an earlier one ended.
 """
 import argparse
 import os
@@ -33,12 +32,12 @@ from report_case import TITLE_BLOCK
 import numpy as np
 import yaml
 
-BUDGET = 13.0                # min
+BUDGET = 14.0                # min
 CONCENTRATIONS = "0.6,0.7,0.8,0.9"
 MOST_FIELDS = 40
-RESERVE = 45.0, 15.0         # s of the budget for pages, and for the statistics of each condition
+RESERVE = 30.0, 10.0         # s of the budget for pages, and for the statistics of each condition
 MARGIN = 0.95                # of what is left is given to fields
-SHARE = 0.6                  # of these are run before it is measured anew how long one takes
+FIRST = 2                    # fields by which it is measured how long one takes: they keep two cores busy
 REPLAY_FRAMES = 120
 FEW = 5                      # fields below which nothing is known of the scatter between them
 
@@ -65,25 +64,20 @@ class Work:
             return None
 
     def ensemble(self, study):
-        """Run the members that are not there yet, one process a core. True when all have settled. Errors: RunError."""
+        """Run the members that are not there yet, a process of one thread a core. True when all have settled. Errors:
+        RunError."""
         call = [str(self.program), "ensemble", str(study), "-o", str(self.folder), "--threads", "1"]
+        call += ["--jobs", str(self.jobs)]
         call += [part for text in self.given for part in ("--set", text)]
         if np.isfinite(self.end):
             call += ["--max-wall", f"{max(1.0, self.left()):.0f}"]
         before = self.made()
-        first = subprocess.Popen(call + ["--quiet"] * self.quiet, stderr=subprocess.PIPE, text=True)
-        # the folder and its study are the first's to make
-        time.sleep(1.0)
-        others = [subprocess.Popen([*call, "--quiet", "--no-wait"], stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.DEVNULL) for _ in range(self.jobs - 1) if first.poll() is None]
-        said = first.communicate()[1]
-        for other in others:
-            other.wait()
-        if first.returncode not in (0, STOPPED) and self.made() == before:  # refused; not a member that failed
-            raise RunError(study, (said.strip().splitlines() or [f"exit code {first.returncode}"])[0],
+        done = subprocess.run(call + ["--quiet"] * self.quiet, stderr=subprocess.PIPE, text=True)
+        if done.returncode not in (0, STOPPED) and self.made() == before:  # refused; not a member that failed
+            raise RunError(study, (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[0],
                            "mend the case or the study")
-        sys.stderr.write(said)
-        return first.returncode == 0
+        sys.stderr.write(done.stderr)
+        return done.returncode == 0
 
 
 def reads_ice(case):
@@ -134,7 +128,7 @@ def seconds_a_field(e):
 
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
-    n = 1
+    n = min(FIRST, a.fields)
     whole_round = work.ensemble(write_study(a, case, n))
     if not whole_round and fields_done(Ensemble(a.output)) < 1:
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
@@ -145,7 +139,6 @@ def run_case(work, a, case):
         more = min(int(MARGIN * work.left() / rate), a.fields - n)
         if more < 1:
             break
-        more = int(np.ceil(SHARE * more))
         start = time.monotonic()
         whole_round = work.ensemble(write_study(a, case, n + more))
         rate = (time.monotonic() - start) / more

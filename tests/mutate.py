@@ -8,7 +8,8 @@ seconds; with --wide, for survivors, the slow ones named with it, all scenes and
 
 They are taken in an order drawn with a fixed seed, so that a part of the list is a fair sample of it. A test counts
 only where it passes without a mutant, which is looked at as well. Results are kept in build/mutate/results.json, by
-text: a call goes on where the last one ended. Exit code 1 where a mutant survives that mutants.py does not explain.
+text: a call goes on where the last one ended, the first one in a new clone from the table in tests/. Exit code 1 where
+a mutant survives that mutants.py does not explain.
 Kept own rather than mull or universalmutator: those change operators at random, need a whole suite a mutant (15 minutes
 here), and know of no barrier, order or sync; a list says why each line matters."""
 import argparse
@@ -34,6 +35,7 @@ HERE = ROOT / "build/mutate"
 RESULTS = HERE / "results.json"
 SOUND = HERE / "sound.json"
 PAST = HERE / "past.json"
+TABLE = ROOT / "tests/mutants-result.csv"
 SEED = 20
 # Seconds of a clock, generous since a busy machine must not kill a mutant; what computes without an end is stopped by
 # its processor time: scenes take half a second of it, the slowest test of a part twenty.
@@ -254,6 +256,16 @@ def verdict(mutant, kept):
     return ("does not build" if r["by"].startswith("does not build") else "killed"), r["by"]
 
 
+def known_of_table():
+    """What the table that is kept with the source says: killed and surviving mutants, by their reasons."""
+    if not TABLE.exists():
+        return {}
+    with open(TABLE, newline="") as f:
+        of = {(r["file"], r["mutant"]): {"by": r["by"] if r["outcome"] == "killed" else None, "seconds": 0}
+              for r in csv.DictReader(f)}
+    return {name_of(m): of[m[0], m[3]] for m in listed() if (m[0], m[3]) in of}
+
+
 def report(mutants, kept, table):
     """Score, and what survives; as a table of all, too."""
     found = [(m, *verdict(m, kept)) for m in mutants]
@@ -287,7 +299,7 @@ def main():
     p.add_argument("--report", nargs="?", const="", help="only print what is known; into a table, too")
     a = p.parse_args()
     HERE.mkdir(parents=True, exist_ok=True)
-    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    kept = json.loads(RESULTS.read_text()) if RESULTS.exists() else known_of_table()
     mutants = [m for m in listed() if a.only in " ".join(m[:4])]
     random.Random(SEED).shuffle(mutants)
     alive = a.wide or a.again

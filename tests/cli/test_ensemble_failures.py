@@ -197,7 +197,9 @@ def with_a_dead_rank(folder, member, all_of_them=False):
         for line in journal(folder)[known:]:
             known += 1
             if line["event"] == "start" and line["member"] == member:
-                time.sleep(0.3 if all_of_them else 0)  # the other has begun something
+                if all_of_them:  # the other has time to begin something, however short the member is
+                    os.kill(line["pid"], signal.SIGSTOP)
+                    time.sleep(0.3)
                 for process in children(p.pid) if all_of_them else [line["pid"]]:
                     os.kill(process, signal.SIGKILL)
         time.sleep(0.005)
