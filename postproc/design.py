@@ -171,8 +171,12 @@ def make_replay(work, a, left):
     if m is None:
         return
     with Run(e.folder(m)) as run:
-        if run.number("wall_time_s") > left or reads_ice({"ice": {k.split(".", 1)[1]: v for k, v in run.case.items()
-                                                                  if k.startswith("ice.")}}):
+        if reads_ice({"ice": {k.split(".", 1)[1]: v for k, v in run.case.items() if k.startswith("ice.")}}):
+            return
+        takes = run.number("wall_time_s")
+        if takes > left:
+            print(f"no replay: the tow takes {takes:.0f} s, and {max(0, left):.0f} s of the budget are left; the same "
+                  "call with a larger --budget adds it")
             return
         step = run.value("run.duration") / REPLAY_FRAMES
     with tempfile.TemporaryDirectory(dir=a.output, prefix="replay-") as folder:

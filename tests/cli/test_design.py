@@ -76,6 +76,14 @@ def test_the_study_that_it_makes(made):
     assert {"report.html", "report.pdf", "replay.html", "ensemble.h5"} <= {p.name for p in made.iterdir()}
 
 
+def test_a_replay_for_which_no_time_is_left_is_named(made, capsys):
+    before = {p.name: p.stat().st_mtime_ns for p in made.iterdir()}
+    a = design.arguments([str(made.parent / "case.yml"), "-o", str(made)])
+    design.make_replay(design.Work(BERGTOW, made, [], 2, np.inf, True), a, -3.0)
+    assert "no replay" in (said := capsys.readouterr().out) and "and 0 s of the budget are left" in said
+    assert {p.name: p.stat().st_mtime_ns for p in made.iterdir()} == before
+
+
 @pytest.mark.parametrize("value, low, high, words", [
     (123456.0, 100000.0, 150000.0, ("123 kN", "100 to 150 kN")), (123456.0, 20000.0, 1.5e6, ("100 kN", "0 to 1500 kN")),
     (5.2e6, 4.13e6, np.inf, ("5.2 MN", "4.1 to no bound MN")), (595.2e3, 593e3, 597e3, ("595 kN", "593 to 597 kN")),
