@@ -39,7 +39,8 @@ def same(folder, case, sets, bergtow):
         return [line for line in text.splitlines() if not line.startswith("#")]
 
     resolved = (folder / "case.resolved.yml").read_text(encoding="utf-8")
-    return f"({revision}," in version and "dirty" not in revision and keys(twin) == keys(resolved)
+    of_commit = revision != "unknown" and "dirty" not in revision
+    return of_commit and f"({revision}," in version and keys(twin) == keys(resolved)
 
 
 def run(a, name, **values):

@@ -398,7 +398,8 @@ MUTANTS = {
         ("bt_domain_largest(w, force);", "", "contact force of ghosts"),
         ("b->motion[i] != BT_DYNAMIC || i == towed", "i == towed", "fixed floes move the budget"),
     ]),
-    "partition/halo.c": (RANKS + ["parallel/test_ranks.py"], [
+    "partition/halo.c": (RANKS + ["parallel/test_ranks.py::test_floes_at_a_free_body_that_other_ranks_hold",
+                                  "parallel/test_ranks.py"], [
         ("solver = is_under(d, cell) ? d->large_owner : -1;", "solver = -1;",
          "floes beside the body keep old velocities"),
         ("for (int32_t dy = -2; dy <= 2; dy++)", "for (int32_t dy = -1; dy <= 1; dy++)", "speeds of cells at two"),

@@ -11,9 +11,11 @@
 Digests depend on the elementary functions of libm and on the compiler: scenes.json holds a fingerprint() of both.
 """
 import argparse
+import functools
 import hashlib
 import json
 import math
+import operator
 import os
 import pathlib
 import re
@@ -218,7 +220,8 @@ def draw_outlines(folder, name, binary):
         drawn.pop("crs", None)
     for k, feature in enumerate(drawn["features"]):
         ring = [(x + east, y + north) for x, y in feature["geometry"]["coordinates"][0][:-1]]
-        middle, out = [sum(c) / len(ring) for c in zip(*ring)], []
+        # sum() compensates from Python 3.12 on, and the last bit would depend on the release
+        middle, out = [functools.reduce(operator.add, c) / len(ring) for c in zip(*ring)], []
         for i, (p, q) in enumerate(zip(ring, ring[1:] + ring[:1])):
             bay = 1 - 0.03 * ((3 * k + 5 * i) % 8)
             out += [list(p), [m + ((a + b) / 2 - m) * bay for a, b, m in zip(p, q, middle)]]
@@ -271,7 +274,8 @@ def items_of(folder):
     def attributes(at, holder):
         for key, value in holder.attrs.items():
             if key != "description":
-                items[f"{at}@{key}"] = "there" if key in VOLATILE else repr(value)
+                plain = value.item() if isinstance(value, np.generic) else value  # NumPy 2 has another repr of its own
+                items[f"{at}@{key}"] = "there" if key in VOLATILE else repr(plain)
 
     def take(name, item):
         if isinstance(item, h5py.Group):

@@ -28,11 +28,18 @@ def blocks(page):
         end = match.end()
 
 
-def clean_copy(to):
-    """The sources as git has them, with the objects that are built, so that make has little to do."""
+def sources():
+    """Names of the files that git has, or would take; of an unpacked archive all but what is built and made."""
+    if not (ROOT / ".git").exists():
+        return [p.relative_to(ROOT) for p in ROOT.rglob("*") if p.relative_to(ROOT).parts[0] not in ("build", "out")]
     listed = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT,
                             capture_output=True, text=True, check=True).stdout
-    for name in filter(None, listed.split("\0")):
+    return filter(None, listed.split("\0"))
+
+
+def clean_copy(to):
+    """The sources, with the objects that are built, so that make has little to do."""
+    for name in sources():
         if (ROOT / name).is_file():
             (to / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, to / name)

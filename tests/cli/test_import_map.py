@@ -297,11 +297,13 @@ def test_label_images(tmp_path):
     counts = counted(record)
     assert counts["holes"] == 1 and counts["cut kept"] == 2 and len(rings) == 7
     got = sorted(plane_area(r) / (4 / 0.9996 ** 2) for r in rings)
-    # of discs the tolerance, about half a pixel, takes as much as it adds; of a square it may tilt every side by that
+    # Of discs the tolerance, about half a pixel, takes as much as it adds, to a quarter of the 7 % that a shore half a
+    # pixel off is worth (which vertices stay differs between releases of GEOS); of a square it may tilt every side by
+    # that.
     for label, n in sizes.items():
-        assert min(abs(g - n) for g in got) < (20 if label in (5, 6) else 0.012 * n)
+        assert min(abs(g - n) for g in got) < (20 if label in (5, 6) else 0.018 * n)
     discs_ = np.count_nonzero((labels > 0) & (labels < 255)) + 9 - 2 * 400
-    assert abs(sum(g for g in got if abs(g - 400) > 20) / discs_ - 1) < 3e-3
+    assert abs(sum(g for g in got if abs(g - 400) > 20) / discs_ - 1) < 5e-3
     _, record = outlines(tif, "--cut", "drop", "--water", "0,7")
     assert counted(record)["cut"] == 1 and record["floes"]["floes"] == 5
     np.testing.assert_allclose(record["floes"]["imaged_share"], 1, atol=0.2)
@@ -364,11 +366,15 @@ def test_every_change_is_counted(tmp_path):
     rings, record = outlines(map_, "--centre", "200,105", "--box", "600,600", "--clear", "15", "--tolerance", "0.1",
                              "--least", "4", "--heading", "90")
     found = record["changes"]
-    assert counted(record) == {"crossing": 1, "several": 2, "holes": 1, "outside": 1, "clear": 1, "simplified": 2,
-                               "slivers": 1, "small": 1, "twice": 1, "within": 1, "overlaps": 1, "touching": 2}
+    counts = counted(record)
+    # the vertex at which a ring begins stays in GEOS before 3.12; later it may go, and the sliver is a triangle
+    assert (corner := counts.pop("simplified") - 2) in (0, 1)
+    assert counts == {"crossing": 1, "several": 2, "holes": 1, "outside": 1, "clear": 1, "slivers": 1, "small": 1,
+                      "twice": 1, "within": 1, "overlaps": 1, "touching": 2}
     change = {k: c["area_after_m2"] - c["area_before_m2"] for k, c in found.items()}
-    for kind, want in (("holes", 20), ("outside", -400), ("clear", -400), ("slivers", -1.5), ("small", -1),
-                       ("twice", -404), ("within", -64), ("overlaps", -50), ("several", 0), ("touching", 0)):
+    for kind, want in (("holes", 20), ("outside", -400), ("clear", -400), ("slivers", -0.75 * (2 - corner)),
+                       ("small", -1), ("twice", -404), ("within", -64), ("overlaps", -50), ("several", 0),
+                       ("touching", 0)):
         assert change[kind] == pytest.approx(want, abs=0.02), kind
     # what was read, crossing rings as they are when mended, less what changed
     area = {k: plane_area(s) for k, s in shapes.items() if isinstance(s, list) or isinstance(s, np.ndarray)}
@@ -534,5 +540,7 @@ def test_the_how_to(tmp_path):
     out = reader.folder / "out"
     assert "SYNTHETIC" in json.loads((out / "floes.geojson").read_text())["description"]
     summary = json.loads((out / "mosaic-tow/summary.json").read_text())
-    assert summary["warnings"] == [] and "SYNTHETIC" in summary["title"] and summary["n_floes"] > 200
+    # which vertices stay differs between releases of GEOS, and with them the largest overlap
+    assert all("bodies overlap by up to" in w for w in summary["warnings"]) and summary["max_overlap_relative"] < 0.02
+    assert "SYNTHETIC" in summary["title"] and summary["n_floes"] > 200
     assert (out / "floes.png").exists() and (out / "mosaic-tow/field.png").exists()

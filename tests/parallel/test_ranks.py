@@ -178,6 +178,21 @@ def test_the_same_bits(alone, name, ranks, threads):
     assert 0 <= r.summary["dealt_imbalance"] <= r.summary["worst_dealt_imbalance"]
 
 
+def test_floes_at_a_free_body_that_other_ranks_hold(tmp_path):
+    """Cells so large that a berg which is towed towards low x and y reaches floes that another rank holds, too; what it
+    does to them must come there before the next phase. Nothing is assigned anew in between, as that mends it."""
+    case = {
+        "run": {"dt": 0.1, "duration": 26},
+        "domain": {"length": 40, "width": 24},
+        "ice": {"concentration": 0.5, "size": 0.5},
+        "body": {"shape": "square", "length": 1.6, "x": 26, "y": 3},
+        "tow": {"mode": "line", "speed": 0.5, "ramp": 5, "direction": 225, "line_length": 3},
+        "solver": {"tile": 12},
+        "output": {"window_start": 10, "frame_interval": 5},
+    }
+    assert_same(run(tmp_path, case, "--threads", 1, "--quiet"), many(tmp_path, 3, 1))
+
+
 @pytest.mark.parametrize("name, ranks, threads", [("line", 3, 2), ("jam", 3, 1), ("seams", 2, 4), ("round", 4, 2),
                                                    ("ring", 2, 2), ("ring", 4, 1)])
 def test_the_division_is_sound(alone, name, ranks, threads):

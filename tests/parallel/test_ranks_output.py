@@ -172,7 +172,7 @@ def test_a_disk_that_fills_up_in_the_run(tmp_path, rank):
                     "-o",
                     "out",
                     program=("bash", "-c", limited, "bash", BERGTOW),
-                    options=("--mca", "btl", "self,tcp"),
+                    options=("--mca", "btl", "self,tcp", "--mca", "btl_tcp_if_include", "lo"),
                     cwd=tmp_path)
     assert result.returncode == IO, result.stderr
     assert len(ours(result)) == 1 and "out/result.part.h5: cannot write the file: File too large; raise" in ours(
