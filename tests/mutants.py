@@ -226,7 +226,8 @@ MUTANTS = {
         ("bt_domain_moved_elsewhere(w, wake_body);", "", "floes moved by other ranks sleep on"),
     ]),
     "src/contact/law.c": (["physics/test_crush", "physics/test_rafting", "scenes:crushing,rafting_press",
-                           "ranks:crushing_press,rafting_press"], [
+                           "ranks:crushing_press,rafting_press",
+                           "parallel/test_ranks.py::test_the_same_bits[crush-3-1]"], [
         ("if (!(approach > 0)) continue;", "", "what opens gives way"),
         ("l->grown[i] = w->par.dt * approach;", "l->grown[i] = approach;", "depth without the step"),
         ("bt_max(t->gaps[j].gap[i], 0) / w->par.dt;", "t->gaps[j].gap[i] / w->par.dt;", "place of an overlap"),
