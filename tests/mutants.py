@@ -66,7 +66,8 @@ MUTANTS = {
         ("b->vel_start[i] = u;", "", "the velocity at the start of the step is an old one"),
         ("if (t->asleep[k]) t->asleep[k] = BT_ASLEEP;", "", "a cell never falls asleep whole"),
     ]),
-    "src/force/impulses.c": (["physics/test_force_law", "cli/test_balance.py", "scenes:free_drift_start,speed"], [
+    "src/force/impulses.c": (["physics/test_force_law", "cli/test_balance.py", "scenes:free_drift_start,speed",
+                              "cli/test_environment.py::test_tilt_of_the_sea_along_a_course"], [
         ("q->dt * (a.jx - a.g * u->x + a.gy * f->w)", "q->dt * (a.jx - a.g * u->x)", "coupling left out of the record"),
         ("q->dt * (a.jy - a.g * u->y - a.gx * f->w)", "q->dt * (a.jy - a.g * f->y - a.gx * f->w)", "drag at U*"),
         ("l->turn == 0 ? 0 : l->turn / q->turn", "1", "all of the turn for each law"),

@@ -250,3 +250,23 @@ def test_keys_beside_a_table_and_a_table_that_is_missing(tmp_path):
     assert result.returncode == IO and "none.csv: cannot be read: No such file" in result.stderr
     result = call("check", write_case(tmp_path, changed(base, water={"tide": {"minor": 0.2, "major": 0.1}})))
     assert result.returncode == CASE and "water.tide.minor: 0.2 m/s is more than" in result.stderr
+
+
+@pytest.mark.parametrize("direction", [0, 120, np.degrees(np.arctan2(0.2, 0.3))])
+def test_tilt_of_the_sea_along_a_course(tmp_path, direction):
+    """A led body in a current that its slope balances: along the course the slope holds it back with what balances the
+    Coriolis force of the water, m f (U_x sin - U_y cos), with x to the north; nothing where the course is that of the
+    current."""
+    r = run(tmp_path, {
+        "run": {"dt": 1, "duration": 30},
+        "domain": {"frame": "geographic", "length": 2000, "width": 2000, "ends": "periodic", "sides": "periodic"},
+        "ice": {"concentration": 0, "size": 30, "thickness": 1},
+        "body": {"shape": "rectangle", "length": 60, "width": 30, "draft": 20, "sail": 5},
+        "tow": {"speed": 0.36, "direction": direction, "ramp": 1},
+        "water": {"latitude": 75, "current_x": 0.3, "current_y": 0.2, "tilt": "geostrophic"},
+        "output": {"window_start": 10},
+    })
+    tilt, coriolis, tow, drag = (s[-1] for s in r.series("tilt_force", "coriolis_force", "tow_force", "drag_force"))
+    a, mf = np.radians(direction), 900 * 60 * 30 * 25 * 2 * OMEGA * np.sin(np.radians(75))
+    assert abs(tilt - mf * (0.3 * np.sin(a) - 0.2 * np.cos(a))) < 1e-9 * mf and abs(coriolis) < 1e-9 * mf
+    assert tow == pytest.approx(drag + tilt, abs=1e-9 * mf)
