@@ -487,7 +487,8 @@ MUTANTS = {
         ("            if (!*f->errnum) *f->errnum = errno;\n            return -1;", "            return -1;",
          "a read error is called damage"),
     ]),
-    "src/base/h5util.c": (SYNC + ["unit/test_record_faults", "parallel/test_ranks_output.py"], [
+    "src/base/h5util.c": (SYNC + ["unit/test_record_faults", "parallel/test_ranks_output.py",
+                                "parallel/test_ranks_output.py::test_a_disk_that_fills_up_in_the_run"], [
         ("    *h->errnum = bt_file_sync(h->raw);\n", "", "what another rank wrote is not synced"),
         ("    *h->errnum = bt_file_put(h->raw, (off_t)address, data, bytes);\n",
          "    bt_file_put(h->raw, (off_t)address, data, bytes);\n", "failed writes of another rank pass"),
@@ -499,7 +500,7 @@ MUTANTS = {
         ("    if (*r->errnum) {\n        r->status = bt_file_fail", "    if (0) {\n        r->status = bt_file_fail",
          "a read error is called damage"),
     ]),
-    "src/output/record.c": (FILES + ENDS, [
+    "src/output/record.c": (FILES + ENDS + ["cli/test_replace.py::test_a_failed_end_keeps_the_old_result_aside"], [
         ("if (status == BT_OK) status = bt_file_rename(part, path, err);\n    free(part);", "free(part);", "no result"),
         ("    bt_h5_sync_raw(&r->h5);\n    bt_status status = bt_comm_agree(r->comm, close_file(r));",
          "    bt_status status = bt_comm_agree(r->comm, close_file(r));", "frames of other ranks are not synced"),
@@ -528,6 +529,7 @@ MUTANTS = {
          "not synced"),
     ]),
     "src/output/folder.c": (FILES + ["cli/test_replace.py::test_killed_after_a_fault",
+                                     "cli/test_replace.py::test_a_failed_end_keeps_the_old_result_aside",
                                      "cli/test_replace.py::test_a_name_that_cannot_be_moved_aside",
                                      "cli/test_replace.py::test_a_new_result_that_stands_is_not_taken_for_the_old_one"
                                      ], [
