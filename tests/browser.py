@@ -46,7 +46,7 @@ def opened(driver, path):
     until(lambda: driver.execute_script("return document.readyState === 'complete'"))
     messages = [json.loads(entry["message"])["message"] for entry in driver.get_log("performance")]
     urls = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    return [url for url in urls if not url.startswith("chrome://")]
+    return [url for url in urls if not url.startswith(("chrome://", "chrome-untrusted://"))]
 
 
 def complaints(driver):

@@ -17,7 +17,7 @@ within() {
   # shellcheck disable=SC2016
   unshare -m bash -c 'root=$1 && shift && mkdir -p "$root"/{proc,dev,sys} && mount --rbind /dev "$root/dev" &&
     mount --rbind /sys "$root/sys" && mount -t proc proc "$root/proc" &&
-    cp /etc/resolv.conf "$root/etc/" && exec chroot "$root" env -i \
+    cp /etc/resolv.conf /etc/hosts "$root/etc/" && exec chroot "$root" env -i \
     PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 CI=true \
     OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 "$@"' - "$@"
 }
