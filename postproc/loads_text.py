@@ -125,7 +125,7 @@ def signals(s, markdown):
         return "No loads: no member has a window with a towed body."
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. In "
             "the start: the largest before the window, which is in no other number. "
-            "Interval: 95 %, of the mean over fields; those of all other numbers are in statistics.json.")
+            "Interval: 95 %, of the mean over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
 
 

@@ -142,7 +142,7 @@ def statement(e, rows, c):
     "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
     case, loads = case_of(e, rows), c["loads"]
     tow = loads.get("tow_force")
-    tensions = [(loads[name]["design"], loads[name]["label"]) for name in TENSIONS
+    tensions = [(loads[name]["design"], loads[name]) for name in TENSIONS
                 if name in loads and "value" in loads[name]["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
@@ -159,7 +159,7 @@ def statement(e, rows, c):
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
                         "mean_95": tow["mean"]["interval_95"],
                         "largest": tow["largest"], "start_up": tow["start_up"]},
-        "tension": worst and {**worst[0], "label": worst[1]},
+        "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"]},
         "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
         "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
     }
