@@ -89,9 +89,8 @@ def worth(value, low, high):
 #: marks behind a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
-    "†": "by block maxima (GEV), since there are too few clusters above any threshold; values without this mark "
-         "are by clusters (GPD).",
-    "‡": "no more than the largest value simulated, within rounding."
+    "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few.",
+    "‡": "within rounding no more than the largest simulated."
 }
 
 
@@ -109,30 +108,36 @@ def design_row(c):
     """Cells of a condition in the answer."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
-        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 6]
+        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
         value, interval = worth(d["value"], *d["interval_95"])
         return [value + marks(d), interval]
     return [c["label"], *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
-            report_run.force(tow["largest"]), str(tow["fields"]), text_table.number(tow["hours"])]
+            report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
+            str(tow["fields"]), text_table.number(tow["hours"])]
 
 
 def answer(e, s, case):
     """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
-            "largest simulated", "fields", "hours"]
+            "largest simulated", "in the start", "fields", "hours"]
+    notes = ["Largest simulated: of the same moving mean."]
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
+    if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
+        notes.append("In the start: the largest before the window, which is in no other number.")
+    else:
+        head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
     figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
         s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key)))
     out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
     carried = "".join(cell for row in rows for cell in row[1:])
-    notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried]
-    out += [table(head, rows), lines(" ".join([*notes, "Largest simulated: of the same moving mean."]), faint=True)]
+    notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
+    out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line and vessel", "rows": report_method.holds(case, s)}] if case else []
     return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)

@@ -110,11 +110,16 @@ def _of_the_sample(e, rows, c, load):
     return out + _of_the_models(load)
 
 
+def start_exceeds(d):
+    """Does the start-up take more than the design value, or than the largest of the window where there is no value?"""
+    return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
+
+
 def _of_the_start(case, load):
     """The same of the start-up, which is in no number of the load. While the ramp accelerates the body, its inertia
     comes on top of ice and drag, and a longer ramp takes less; a peak at another time may have any cause."""
     found, d = load["start_up"], load["design"]
-    if found is None or found["largest"] <= d.get("value", load["largest"]):
+    if not start_exceeds(d | {"start_up": found, "largest": load["largest"]}):
         return []
     than = "the design value" if "value" in d else "the largest value of the window"
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])

@@ -118,6 +118,13 @@ def test_the_answer_is_the_design_statement(tmp_path):
     notes = " ".join(line for b in blocks if b["kind"] == "text" for line in b["lines"])
     assert [mark in notes for mark in report_ensemble.FOOTNOTES] == [mark in row[1] for mark in
                                                                      report_ensemble.FOOTNOTES]
+    head = next(b for b in blocks if b["kind"] == "table")["head"]
+    assert len(head) == len(row) and "in the start" not in head
+    s["conditions"][0]["design"]["tow"]["start_up"] = {"largest": 1.01 * d["value"], "time_s": 30.0}
+    with_start = next(b for b in report_ensemble.answer(e, s, None) if b["kind"] == "table")
+    started = dict(zip(with_start["head"], with_start["rows"][0]))
+    assert newtons(started["in the start"]) == pytest.approx(1.01 * d["value"], rel=0.006)
+    assert [started[name] for name in head] == row
     figure = next(b for b in blocks if b["kind"] == "figure")
     assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
 
