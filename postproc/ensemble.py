@@ -225,6 +225,7 @@ def load_columns(c, names):
         column("sd", x and x["sd"]["value"])
         column("p99", x and x["quantiles"]["99"]["value"])
         column("largest", x and x["largest"])
+        column("start_up", x and x["start_up"] and x["start_up"]["largest"])
         column("design", x and x["design"].get("value"))
         for k, end in enumerate(("low", "high")):
             column(f"design_{end}", x and x["design"].get("interval_95", (None, None))[k])

@@ -130,12 +130,15 @@ def statistics(e, rows, options):
     design_hours, out = stat_extreme.return_hours(options.probability, tow_hours), {}
     for name, (load, fields) in _fields(e, rows, options.time_scale or TIME_SCALE / shorter).items():
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
+        start_up = max((f["start_up"] for f in fields if f["start_up"]), key=lambda found: found["largest"],
+                       default=None)
         found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
             "label": load.label, "units": load.units, "description": load.description, "conversion": load.conversion,
             "time_scale_s": float(np.median([f["scale"] for f in fields])),
             "step_mean": bool(not load.conversion and any(f["scale"] < 1.5 * f["dt"] for f in fields)),
             "fields": len(fields), "hours": total, "gap_s": gap, **stat_load.summary(fields),
+            "start_up": start_up,
             "exceedance": stat_load.exceedance(fields, gap), **found, "design": {
                 "probability": options.probability, "tow_hours": tow_hours, **_design(found, design_hours, total)
             }

@@ -109,21 +109,23 @@ def _unit(s, name):
 
 def signals(s, markdown):
     """Mean, standard deviation and quantiles of every load."""
-    head = ["condition", "load", "mean", "interval", "sd", "5 %", "50 %", "95 %", "99 %", "largest", "unit", "over",
-            "hours"]
+    head = ["condition", "load", "mean", "interval", "sd", "5 %", "50 %", "95 %", "99 %", "largest", "in the start",
+            "unit", "over", "hours"]
     rows = []
     for name in names(s):
         factor, unit, first = _unit(s, name)
         def cells(x, factor=factor, unit=unit, first=first):
-            q = {k: number(v["value"] / factor) for k, v in x["quantiles"].items()}
+            q, start = {k: number(v["value"] / factor) for k, v in x["quantiles"].items()}, x["start_up"]
             return [first["label"], number(x["mean"]["value"] / factor), pair(x["mean"]["interval_95"], factor),
                     number(x["sd"]["value"] / factor), q["5"], q["50"], q["95"], q["99"],
-                    number(x["largest"] / factor), unit, f"{x['time_scale_s']:.3g} s", number(x["hours"])]
+                    number(x["largest"] / factor), number(start and start["largest"] / factor), unit,
+                    f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
     if not rows:
         return "No loads: no member has a window with a towed body."
-    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. "
-            "Interval: 95 %, of the mean over fields; those of all other numbers are in statistics.json.")
+    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. In "
+            "the start: the largest before the window, which is in no other number. "
+            "Interval: 95 %, of the mean over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
 
 

@@ -220,7 +220,10 @@ def scrubbed(text):
 
 
 def short(value):
-    """A value as the resolved case has it, with six digits in place of all; what rounding left of zero is zero."""
+    """A value as the resolved case has it, with six digits in place of all; what rounding left of zero is zero. Angles,
+    which it has in radians, are in degrees, as the keys ask for them."""
+    value = re.sub(r"(?<![\w.])(-?\d+\.?\d*(?:e[-+]?\d+)?) rad\b",
+                   lambda found: f"{np.degrees(float(found[1])):.6g} deg", value)
     def digits(found):
         number = float(found[0])
         return "0" if 0 < abs(number) < ZERO else found[0] if len(found[0]) < 8 else f"{number:.6g}"

@@ -24,6 +24,7 @@ import report_run
 import stat_fit
 import statement
 import style
+import text_table
 from bergtow_read import Run, RunError
 from report_case import scrubbed
 from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
@@ -77,46 +78,66 @@ def sections(markdown):
 def worth(value, low, high):
     """(value, interval) of a force in words, to the two digits that the wider side of the interval leaves; "no bound"
     where it has no end."""
-    ends = [abs(end - value) for end in (low, high) if np.isfinite(end)]
-    wide = max(ends, default=0.0)
     factor, unit = style.scale([value], "N")
-    if not wide > 0:
+    place = text_table.last_place(value / factor, low / factor, high / factor)
+    if place is None:
         return style.quantity(value, "N"), "–"
-    place = int(np.floor(np.log10(wide / factor))) - 1   # of the second digit
-    first = int(np.floor(np.log10(max(abs(value) / factor, 1e-300))))
-    place = min(max(place, first - 2), first)            # one to three digits of the value
-    def text(x):
-        return f"{round(x / factor, -place):.{max(0, -place)}f}" if np.isfinite(x) else "no bound"
-    return f"{text(value)} {unit}", f"{text(low)} to {text(high)} {unit}"
+    some = [text_table.to_place(x / factor, place) for x in (value, low, high)]
+    return f"{some[0]} {unit}", f"{some[1]} to {some[2]} {unit}"
+
+
+#: marks behind a design value, and their footnotes
+FOOTNOTES = {
+    "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
+    "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few.",
+    "‡": "within rounding no more than the largest simulated."
+}
+
+
+def marks(d):
+    """Those of FOOTNOTES that a design value carries."""
+    low, high = d["interval_95"]
+    factor = style.scale([d["value"]], "N")[0]
+    place = text_table.last_place(d["value"] / factor, low / factor, high / factor)
+    step = 10.0 ** place * factor if place is not None else 0.0
+    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] - d["largest"] <= step}
+    return "".join(mark for mark, there in carried.items() if there)
 
 
 def design_row(c):
     """Cells of a condition in the answer."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
-        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 6]
+        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
         value, interval = worth(d["value"], *d["interval_95"])
-        return [value + ("*" if d["beyond_data"] else ""), interval]
+        return [value + marks(d), interval]
     return [c["label"], *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
-            report_run.force(tow["largest"]), str(tow["fields"]), style.short(tow["hours"], 2)]
+            report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
+            str(tow["fields"]), text_table.number(tow["hours"])]
 
 
 def answer(e, s, case):
     """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
-            "largest simulated", "fields", "hours"]
+            "largest simulated", "in the start", "fields", "hours"]
+    notes = ["Largest simulated: of the same moving mean."]
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
+    if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
+        notes.append("In the start: the largest before the window, which is in no other number.")
+    else:
+        head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
     figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
         s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key)))
     out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
-    out += [table(head, rows), lines("* beyond the hours simulated: extrapolated by the tail of the distribution. "
-                                     "Largest simulated: of the same moving mean.", faint=True)]
+    carried = "".join(cell for row in rows for cell in row[1:])
+    notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
+    out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
     out += [{"kind": "pairs", "label": "line and vessel", "rows": report_method.holds(case, s)}] if case else []
     return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
@@ -253,6 +274,8 @@ def varied(e, values):
     for key, some in e.parameters.items():
         if len(set(some.tolist())) > 1:
             unit = e.units[key] if e.units[key] != "1" else ""
+            if unit in ("rad", "rad/s"):
+                some, unit = np.degrees(some), unit.replace("rad", "deg")
             words[key] = "varied" if some.dtype == object else \
                 f"varied, {np.nanmin(some):.4g} to {np.nanmax(some):.4g} {unit}".strip()
     return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
@@ -284,7 +307,7 @@ def context(folder, place=None, given=None, also=()):
     warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
-        "answer": answer(e, s, case),
+        "answer": answer(e, s, case), "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
         "method": report_method.method(s, case), "limits": report_method.limits(s, case),
         "assumed": [v for v in values if v.kind not in ("source", "default", "unused", "field")

@@ -7,7 +7,7 @@ import loads_text
 import stat_extreme
 import stat_profile
 from statement import RIGID
-from text_table import quantity
+from text_table import number, quantity
 
 
 def _one(texts, key, what):
@@ -27,7 +27,7 @@ def _amount(s):
     n = sum(c["members"]["used"] for c in s["conditions"])
     said = f"{n} tows in {len(s['conditions'])} conditions, each through an ice field of its own"
     if tows:
-        said += (f"; {_span([d['fields'] for d in tows])} fields and {_span([d['hours'] for d in tows])} hours of tow "
+        said += (f"; {_span([d['fields'] for d in tows])} fields and {_span([d['hours'] for d in tows], number)} hours of tow "
                  "a condition, the start-up left out")
     return said + "."
 
@@ -54,7 +54,8 @@ def method(s, case):
         f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on. At least "
         f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are asked for; otherwise there "
         "is no value.")
-    out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is stated.")
+    if any(c["design"]["tension"] for c in s["conditions"]):
+        out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is stated.")
     return out
 
 
@@ -102,7 +103,8 @@ def holds(case, s):
     rows = [("tow speed asked for", f"{', '.join(speeds)} m/s" if speeds else case.texts.get("tow.speed", "–"))]
     rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
                  if np.isfinite(case.breaking_load) else "none in the case: the line must bear the tension above"
-                 if case.mode != "speed" else "no line in the case: it must bear the tow force above"))
+                 if case.mode != "speed" else "no line in the case: it must bear the tow force above, "
+                 "which holds no dynamics of a line"))
     rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
                  if np.isfinite(case.bollard_pull) else "no vessel in the case: it must hold the tow force above"))
     return rows

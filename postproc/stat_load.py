@@ -48,8 +48,9 @@ def field_of(time, x, start, end, scale):
     Samples x [n] are means up to their time. Of x [n, k] each column is filtered by itself, and the largest is taken.
     """
     slack = 1e-9 * max(1.0, abs(end))
-    within = (time >= start - slack) & (time <= end + slack)
-    time, x = time[within], x[within]
+    before = time < start - slack
+    within = ~before & (time <= end + slack)
+    early, time, x = (time[before], x[before]), time[within], x[within]
     if len(time) < 2 or not np.isfinite(x).all():
         return None
     dt = float(np.median(np.diff(time)))
@@ -59,8 +60,21 @@ def field_of(time, x, start, end, scale):
     y = moving_mean(x, n) if n > 1 else x
     return {
         "time": time[n - 1:], "peak": y if y.ndim == 1 else y.max(axis=1), "start": float(time[n - 1]) - dt,
-        "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt
+        "hours": len(y) * dt / 3600, "dt": dt, "scale": n * dt, "start_up": start_up(*early, n)
     }
+
+
+def start_up(time, x, n):
+    """The largest mean of n samples in a row before the window, and the time of its last: {"largest", "time_s"}; None
+    where there are not so many, or the load is not there throughout any n of them."""
+    if len(x) < n:
+        return None
+    there = np.isfinite(x)
+    y = moving_mean(np.where(there, x, 0.0), n)
+    y = np.where(moving_mean(1.0 * ~there, n) > 0.5 / n, -np.inf, y)
+    y = y if y.ndim == 1 else y.max(axis=1)
+    k = int(np.argmax(y))
+    return {"largest": float(y[k]), "time_s": float(time[n - 1 + k])} if np.isfinite(y[k]) else None
 
 
 def _jackknife(value, without):

@@ -4,7 +4,8 @@ tow of stated length, its interval over fields, what it holds for, and what spea
 
     p = 1 - exp(-T / return time):    5 % in 24 h is the level of 468 h
 Warnings are facts about the model or the sample that an interval does not hold: rigid floes without a largest force, a
-domain that is too narrow, windows that are not steady, a tail that is extrapolated far.
+domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a start-up, which no number
+holds, that takes more than the value.
 """
 from dataclasses import dataclass
 
@@ -40,6 +41,7 @@ class Case:
     mode: str
     breaking_load: float   #: N, NaN without one
     bollard_pull: float    #: N, NaN without a vessel
+    ramp: float            #: s, over which the tow is brought to its speed
     texts: dict            #: {key: value as written}
 
 
@@ -52,7 +54,7 @@ def case_of(e, rows):
                 load, pull = run.value("tow.line.breaking_load", 0.0), run.value("tow.vessel.bollard_pull", 0.0)
                 mode = run.case.get("tow.mode", "")
                 return Case(not any(x > 0 for x in limits), mode, load if load > 0 and mode != "speed" else np.nan,
-                            pull if mode == "thrust" and pull > 0 else np.nan, run.case)
+                            pull if mode == "thrust" and pull > 0 else np.nan, run.value("tow.ramp", 0.0), run.case)
         except RunError:
             continue
     return None
@@ -108,6 +110,26 @@ def _of_the_sample(e, rows, c, load):
     return out + _of_the_models(load)
 
 
+def start_exceeds(d):
+    """Does the start-up take more than the design value, or than the largest of the window where there is no value?"""
+    return d["start_up"] is not None and d["start_up"]["largest"] > d.get("value", d["largest"])
+
+
+def _of_the_start(case, load):
+    """The same of the start-up, which is in no number of the load. While the ramp accelerates the body, its inertia
+    comes on top of ice and drag, and a longer ramp takes less; a peak at another time may have any cause."""
+    found, d = load["start_up"], load["design"]
+    if not start_exceeds(d | {"start_up": found, "largest": load["largest"]}):
+        return []
+    than = "the design value" if "value" in d else "the largest value of the window"
+    words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
+    ramp = case.ramp if case else 0.0
+    if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
+        return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
+                 "accelerates the body; a longer ramp takes less", force)]
+    return [(f"the start, which is left out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
+
+
 def _of_the_models(load):
     """Do the two models of the tail agree?"""
     over, blocks = (load[kind].get("levels", [None])[-1] for kind in ("over_threshold", "block_maxima"))
@@ -125,7 +147,7 @@ def statement(e, rows, c):
     "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
     case, loads = case_of(e, rows), c["loads"]
     tow = loads.get("tow_force")
-    tensions = [(loads[name]["design"], loads[name]["label"]) for name in TENSIONS
+    tensions = [(loads[name]["design"], loads[name]) for name in TENSIONS
                 if name in loads and "value" in loads[name]["design"]]
     worst = max(tensions, key=lambda found: found[0]["value"], default=None)
     warned = _of_the_case(e, rows, case, tow and tow["design"])
@@ -133,7 +155,7 @@ def statement(e, rows, c):
         warned.append((f"no tow force: no member has a window of {stat_load.LEAST_SCALES} time scales in which "
                        "something is towed", ""))
     else:
-        warned += _of_the_sample(e, rows, c, tow)
+        warned = _of_the_start(case, tow) + warned + _of_the_sample(e, rows, c, tow)
     breaking = case.breaking_load if case else np.nan
     if worst and worst[0]["value"] > breaking:
         warned.append(("the tension is above the breaking load of the line", quantity(breaking, "N")))
@@ -141,8 +163,8 @@ def statement(e, rows, c):
         "tow": tow and {**tow["design"], "time_scale_s": tow["time_scale_s"], "fields": tow["fields"],
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
                         "mean_95": tow["mean"]["interval_95"],
-                        "largest": tow["largest"]},
-        "tension": worst and {**worst[0], "label": worst[1]},
+                        "largest": tow["largest"], "start_up": tow["start_up"]},
+        "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"]},
         "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
         "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)
     }

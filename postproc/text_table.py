@@ -49,13 +49,31 @@ def number(value, digits=3):
     return short(value, digits) if abs(value) < 1e5 else f"{value:.{digits}g}"
 
 
+def last_place(value, low, high):
+    """Decimal place of the last digit that a value is worth: of the two digits that the wider side of its interval
+    leaves, and one to three of its own. None where no side has a width."""
+    wide = max((abs(end - value) for end in (low, high) if np.isfinite(end)), default=0.0)
+    if not wide > 0:
+        return None
+    first = int(np.floor(np.log10(max(abs(value), 1e-300))))
+    return min(max(int(np.floor(np.log10(wide))) - 1, first - 2), first)
+
+
+def to_place(value, place):
+    """A number to this decimal place, "no bound" where it is not finite."""
+    return f"{round(value, -place) + 0.0:.{max(0, -place)}f}" if np.isfinite(value) else "no bound"
+
+
 def level(value, ends, factor=1.0):
     """A level and its interval, to the digits that they are worth. An upper end FAR times the level away bounds
     nothing: it says that the sample does not know the tail."""
     low, high = ends
     if np.isfinite([value, high]).all() and value > 0 and high > FAR * value:
         high = np.inf
-    return number(value / factor), pair((low, high), factor)
+    place = last_place(value / factor, low / factor, high / factor)
+    if place is None or np.isnan([low, high]).any():
+        return number(value / factor), pair((low, high), factor)
+    return to_place(value / factor, place), " to ".join(to_place(v / factor, place) for v in (low, high))
 
 
 def pair(values, factor=1.0):

@@ -94,6 +94,21 @@ def test_numbers_have_the_digits_that_they_are_worth(value, low, high, words):
     assert report_ensemble.worth(value, low, high) == words
 
 
+@pytest.mark.parametrize("value, largest, model, beyond, marks", [
+    (854e3, 842e3, "GPD", True, "*"), (1192e3, 1184e3, "GEV", True, "*†‡"), (1180e3, 1190e3, "GPD", False, "‡"),
+    (850e3, 700e3, "GEV", False, "†")
+])
+def test_a_value_is_marked_by_its_tail(value, largest, model, beyond, marks):
+    d = {"value": value, "interval_95": (value - 17e3, value + 166e3), "largest": largest, "model": model,
+         "beyond_data": beyond}
+    assert report_ensemble.marks(d) == marks and all(mark in report_ensemble.FOOTNOTES for mark in marks)
+
+
+def test_angles_are_in_degrees():
+    some = ("1.3089969389957472 rad", "0 rad", "-1.5707963267948966 rad/s", "0 s 0.5235987755982988 rad", "3 m")
+    assert [report_case.short(v) for v in some] == ["75 deg", "0 deg", "-90 deg/s", "0 s 30 deg", "3 m"]
+
+
 @pytest.mark.parametrize("title, left", [
     ("Berg in 80 % broken ice", "Berg in broken ice: ice of 60 to 90 %"),
     ("Tow at 80 % of its speed", "Tow at 80 % of its speed: ice of 60 to 90 %"), (None, "berg: ice of 60 to 90 %")
@@ -106,8 +121,12 @@ def test_the_title_names_no_other_concentration(title, left):
 def test_levels_have_the_digits_that_they_are_worth():
     some = (99.96, 1642.0, 0.09996, 1.5e7, None)
     assert [text_table.number(v) for v in some] == ["100", "1640", "0.100", "1.5e+07", "–"]
-    assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1640", "87.4 to 10000")
-    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.64", "0.0874 to no bound")
+    assert text_table.level(1642.0, (87.44, 1e4), 1.0) == ("1600", "100 to 10000")
+    assert text_table.level(616.0, (467.0, 8770.0), 1.0) == ("600", "500 to 8800")
+    assert text_table.level(681.4e3, (667.2e3, 709.4e3), 1e3) == ("681", "667 to 709")
+    assert text_table.level(1642.0, (87.44, 1.7e5), 1e3) == ("1.6", "0.1 to no bound")
+    assert text_table.level(1642.0, (np.nan, np.nan), 1e3) == ("1.64", "–")
+    assert text_table.level(3.0, (-0.04, 5.0), 1.0) == ("3.0", "0.0 to 5.0")  # no minus zero
     assert report_case.short("2.60245e-16 m") == "0 m" and report_case.short("-3.24837e-17 m") == "0 m"
 
 

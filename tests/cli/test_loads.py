@@ -43,6 +43,17 @@ def test_the_filter_by_hand():
     assert filtered.tolist() == [[2, 1], [2, 3], [2, 3], [2, 1], [2, 1]]  # each by itself, then the largest
 
 
+def test_the_start_is_what_lies_before_the_window():
+    """Means over the same time that end before the window; where the load is not there they are passed over."""
+    time, x = np.arange(1.0, 15.0), np.array([np.nan, 5, 9, 1, 50, 50, 0, 0, 0, 0, 0, 0, 0, 0])
+    assert stat_load.field_of(time, x, 5.0, 14.0, 1.0)["start_up"] == {"largest": 9, "time_s": 3}
+    assert stat_load.field_of(time, x, 5.0, 14.0, 2.0)["start_up"] == {"largest": 7, "time_s": 3}
+    assert stat_load.field_of(time, x[::-1], 2.0, 13.0, 2.0)["start_up"] is None  # one sample is no mean of two
+    assert stat_load.start_up(time[:2], np.full(2, np.nan), 1) is None
+    panels = np.array([[4.0, 0, 4], [1.0, 7, 1]]).T
+    assert stat_load.start_up(time[:3], panels, 2) == {"largest": 4, "time_s": 2}
+
+
 def test_the_filter_leaves_impulses_alone():
     """What counts is the impulse: the same one in one step or in ten gives the same load over a long time."""
     time, one, ten = np.arange(1.0, 101.0), np.zeros(100), np.zeros(100)
@@ -134,13 +145,13 @@ CASE = ("tow:\n  mode: line\n  speed: 0.5 m/s\n  line:\n    breaking_load: {load
         "  crushing:\n    pressure: {pressure} Pa\n")
 
 
-def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None):
-    """Ensemble of AR(1) tow forces of mean 1 MN and 3 MN with a start-up jerk before the window, in 2 s samples."""
+def towed(folder, concentrations=(0.5, 0.9), fields=6, pressure=0, load=0, text=None, jerk=1e9):
+    """Ensemble of AR(1) tow forces of mean 1 MN and 3 MN with a start-up jerk before the window, in 1 s samples."""
     rng, members = np.random.default_rng(4), []
     for c, a in enumerate(concentrations):
         for _ in range(fields):
             x = made_up.ar1(0.8, N, rng, 1e6 * (1 + 2 * c), 2e5)
-            x[:30] = 1e9
+            x[:30] = jerk
             warned = ["domain.width: 15 body widths"] if a > 0.8 else []
             series = {"tow_force": x, "ice_resistance": 0.9 * x, "line_tension_1": 1.01 * x,
                       "vessel_thrust": np.full(N, np.nan), "largest_push": np.where(np.arange(N) < 30, 1e9, 1e5),
@@ -195,6 +206,25 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     rows = list(csv.DictReader(open(folder / "statistics.csv")))
     assert float(rows[1]["tow_force_design_n"]) == second["tow"]["value"] and float(
         rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
+
+
+def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_path):
+    """By its moving mean, and with its cause where it comes while the ramp lasts; not where it takes less."""
+    folder, text, s = statement
+    for c in s["conditions"]:
+        assert c["design"]["tow"]["start_up"] == {"largest": pytest.approx(1e9), "time_s": 30}
+        assert c["loads"]["line_tension_1"]["start_up"]["largest"] == pytest.approx(1.01e9)
+        assert c["design"]["warnings"][0]["what"].startswith("the start, which is left out, takes more than the design")
+    assert "WARNING: the start, which is left out, takes more than the design value, as the largest mean over 30 s " \
+        "(1.00 GN at 30 s)." in text.replace("1000 MN", "1.00 GN")
+    assert float(next(csv.DictReader(open(folder / "statistics.csv")))["tow_force_start_up_n"]) == pytest.approx(1e9)
+    ramp = CASE.format(pressure=0, load=0).replace("speed:", "ramp: {} s\n  speed:")
+    for ramp_s, jerk, words in ((20, 2e6, "while the ramp of 20 s accelerates the body; a longer ramp takes less: "
+                                 "concentration 0.5 (2.00 MN)."), (20, 1e6, None)):
+        some = towed(tmp_path / f"{jerk:g}", fields=5, text=ramp.format(ramp_s), jerk=jerk)
+        said = script("ensemble.py", some, "--resamples", 1).stdout
+        assert words in said if words else "the start, which is left out" not in said
+        assert "in the start" in said  # the column
 
 
 def test_a_warning_of_many_conditions_names_the_first():

@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 import ensemble  # noqa: E402
 import report  # noqa: E402
 import report_ensemble  # noqa: E402
+import report_method  # noqa: E402
 import stat_budget  # noqa: E402
 from bergtow_read import RunError  # noqa: E402
 from command import plain  # noqa: E402
@@ -113,8 +114,40 @@ def test_the_answer_is_the_design_statement(tmp_path):
     ends = row[2].removesuffix(" N").split(" to ")
     assert [float(v) for v in ends if v != "no bound"] == pytest.approx(
         [v for v in d["interval_95"] if np.isfinite(v)], abs=max(0.06 * wide, 0.006 * d["value"]))
+    assert row[-1] == "8.82" and "8.82 hours of tow" in report_method.method(s, None)[1]  # in one way everywhere
+    notes = " ".join(line for b in blocks if b["kind"] == "text" for line in b["lines"])
+    assert [mark in notes for mark in report_ensemble.FOOTNOTES] == [mark in row[1] for mark in
+                                                                     report_ensemble.FOOTNOTES]
+    head = next(b for b in blocks if b["kind"] == "table")["head"]
+    assert len(head) == len(row) and "in the start" not in head
+    s["conditions"][0]["design"]["tow"]["start_up"] = {"largest": 1.01 * d["value"], "time_s": 30.0}
+    with_start = next(b for b in report_ensemble.answer(e, s, None) if b["kind"] == "table")
+    started = dict(zip(with_start["head"], with_start["rows"][0]))
+    assert newtons(started["in the start"]) == pytest.approx(1.01 * d["value"], rel=0.006)
+    assert [started[name] for name in head] == row
     figure = next(b for b in blocks if b["kind"] == "figure")
     assert "design tow force, 95 %" in figure["svg"] and "largest simulated" in figure["svg"]
+
+
+@pytest.mark.parametrize("mode", ["speed", "line"])
+def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode):
+    """In title, method and answer; the direction varied between conditions stands in degrees."""
+    monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS | {"resamples": 1})
+    monkeypatch.setitem(made_up.UNITS, "tow.direction", "rad")
+    rng, line = np.random.default_rng(8), {"units": "N", "description": "first branch", "label": "line tension",
+                                           "role": "load", "order": 3}
+    def one(c):
+        x = made_up.ar1(0.6, 4000, rng, 137.0, 10.0)
+        return member(x, {"tow.direction": c * np.pi / 4}, c, case=f"tow:\n  mode: {mode}\n  direction: 0 rad\n",
+                      more={"tow_force": x} | ({"line_tension_1": x + 1} if mode == "line" else {}),
+                      attributes={"tow_force": line | {"role": "balance"}, "line_tension_1": line})
+    folder = made_up.write(tmp_path / "out", [one(c) for c in (0, 1) for _ in range(4)])
+    report.main([str(folder), "-o", str(tmp_path / "page.html")])
+    text, there = (tmp_path / "page.html").read_text(), mode == "line"
+    assert ("Design tow force and line tension in broken ice" in text) == there == ("Line tensions are" in text)
+    assert ("Design tow force in broken ice" in text) != there and "statistics.json" not in text
+    assert ("the tow force above, which holds no dynamics of a line" in text) != there
+    assert "varied, 0 to 45 deg" in text
 
 
 def test_every_member_stands_there_with_its_doubts(page, study):
