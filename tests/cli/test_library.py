@@ -98,7 +98,9 @@ def test_the_page_shows_the_example():
 def test_the_library_exports_what_public_headers_name(prefix):
     out = subprocess.run(["nm", "-D", "--defined-only", prefix / "lib/libbergtow.so"], capture_output=True, text=True,
                          check=True).stdout
-    exported = {name.split("@")[0] for *_, kind, name in map(str.split, out.splitlines()) if kind != "A"}
+    names = [name.partition("@@") for *_, kind, name in map(str.split, out.splitlines()) if kind != "A"]
+    assert {version for _, _, version in names} == {"BERGTOW_0"}
+    exported = {name for name, _, _ in names}
     headers = " ".join(h.read_text() for h in (prefix / "include/bergtow").glob("*.h"))
     assert exported and all(re.search(rf"\b{name}\b", headers) for name in exported)
     declared = set(re.findall(r"\b(bt_\w+)\(", (prefix / "include/bergtow/simulation.h").read_text()))
