@@ -252,6 +252,7 @@ deps-demo: ## install what make demo needs: neither MPI nor scipy
 
 DEMO := out/demo
 demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
+	@echo "now the program is built, the iceberg towed and its report written: about a minute"
 	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)
