@@ -7,6 +7,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import h5py
@@ -26,6 +27,7 @@ def make(*arguments):
     result = subprocess.run(["make", "--no-print-directory", *arguments], cwd=ROOT, capture_output=True, text=True,
                             timeout=600, env=own)
     assert result.returncode == DONE, result.stdout + result.stderr
+    return result.stdout
 
 
 def everything(folder):
@@ -284,6 +286,28 @@ def test_uninstall_leaves_what_is_not_ours(tmp_path):
     assert {"bin/bergtow", "lib/libbergtow.so.0", "share/man/man1/bergtow.1"} <= everything(tmp_path) - before
     make("uninstall", f"PREFIX={tmp_path}")
     assert everything(tmp_path) == before
+
+
+def library_of(pythonpath):
+    """The library that a Python loads which finds the package by that."""
+    env = {k: v for k, v in os.environ.items() if k != "BERGTOW_LIB"} | {"PYTHONPATH": str(pythonpath)}
+    done = subprocess.run([sys.executable, "-c", "import bergtow; print(bergtow._library.library_path())"],
+                          capture_output=True, text=True, cwd="/", env=env)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_python_finds_the_package_as_make_install_says(tmp_path):
+    said = make("install", f"PREFIX={tmp_path}")
+    assert library_of(re.search(r"export PYTHONPATH=(\S+)", said)[1]) == f"{tmp_path}/lib/libbergtow.so.0"
+
+
+def test_the_link_of_the_debian_package_is_to_the_python_package(tmp_path):
+    assert "PYTHONPATH" not in make("install", "PREFIX=/usr", f"DESTDIR={tmp_path}")
+    place, link = (tmp_path / p for p in (ROOT / "install/debian/python3-bergtow.links").read_text().split())
+    link.parent.mkdir(parents=True)
+    link.symlink_to(place)
+    assert library_of(link.parent) == f"{tmp_path}/usr/lib/libbergtow.so.0"
 
 
 def test_destdir_is_no_part_of_what_is_installed(tmp_path):
