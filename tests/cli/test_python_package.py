@@ -269,8 +269,8 @@ def test_everything_public_has_types_and_a_text():
 def test_pip_installs_the_package_as_the_page_says(tmp_path):
     there = installed_by_pip(tmp_path)
     code = "import bergtow as b; print(b.__file__, b.Case({'run': {'dt': 0.1, 'duration': 1}})['run.dt'])"
-    said = subprocess.run([there / "python", "-c", code], capture_output=True, text=True, cwd=tmp_path,
-                          env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"BERGTOW_LIB": str(LIBRARY)})
+    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"BERGTOW_LIB": str(LIBRARY)}
+    said = subprocess.run([there / "python", "-c", code], capture_output=True, text=True, cwd=tmp_path, env=env)
     assert said.returncode == 0, said.stderr
     file, dt = said.stdout.split()
     assert file.startswith(str(there.parent)) and dt == "0.1"
