@@ -214,8 +214,8 @@ DEPS_DOCS := python3-sphinx python3-myst-parser furo chromium
 # (animations), chromium (reports as PDF), xarray (open_result of the Python package), gdal, pyproj and shapely (maps).
 DEPS_TEST := build-essential git libopenmpi-dev libcmocka-dev python3-pytest python3-pytest-xdist python3-selenium \
              chromium chromium-driver ffmpeg poppler-utils python3-hypothesis python3-xarray python3-h5netcdf \
-             python3-netcdf4 python3-pip python3-setuptools python3-wheel python3-gdal gdal-bin python3-pyproj \
-             python3-shapely python3-distributed zsh $(DEPS_DOCS)
+             python3-netcdf4 python3-pip python3-venv python3-setuptools python3-wheel python3-gdal gdal-bin \
+             python3-pyproj python3-shapely python3-distributed zsh $(DEPS_DOCS)
 
 # SIZE: what apt says of the packages, before it fetches any. Where there is no dpkg the compiler tells what is missing.
 SIZE := sed -n 's/^Need to get \(.*\) of archives.*/to fetch: \1/p; s/^After this operation, /on the disk: /p'
@@ -252,6 +252,7 @@ deps-demo: ## install what make demo needs: neither MPI nor scipy
 
 DEMO := out/demo
 demo: deps-demo ## tow the berg of cases/basin/basin-80.yml; result, two pictures and the report: a minute
+	@echo "now the program is built, the iceberg towed and its report written: about a minute"
 	@$(AGAIN) $(if $(DEPS_MPI),MPI=no) all
 	build/release/bergtow run cases/basin/basin-80.yml -o $(DEMO) --force
 	$(PYTHON) postproc/plot_force.py $(DEMO)

@@ -94,3 +94,5 @@ rm -f "$made.scripts"
 folder "$prefix/share/bergtow"
 echo "file $prefix/share/bergtow/installed" >>"$made"
 install -m 644 "$made" "$list"
+# not for a package, which has its own way
+[ -n "$dest" ] || echo "import bergtow in Python: export PYTHONPATH=$prefix/share/bergtow/postproc (docs/install.md)"

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the Python package share: cases, and runs by the library."""
 import os
+import re
+import shutil
 import subprocess
 import sys
 
@@ -32,6 +34,19 @@ def stepped(case, n=7, **more):
 def datasets_of(path):
     with h5py.File(path) as f:
         return {name: values[()] for name, values in f["series"].items()}
+
+
+def installed_by_pip(folder):
+    """The bin folder of an environment with the package, made by the words of docs/library.md on a copy of the sources
+    that is gone again; only the network is left out."""
+    shutil.copytree(ROOT / "postproc", folder / "postproc", ignore=shutil.ignore_patterns("__pycache__"))
+    words = re.search(r"```sh\n(python3 -m venv .*?)```", (ROOT / "docs/library.md").read_text(), re.DOTALL)[1]
+    env = os.environ | {"HOME": str(folder), "PIP_NO_BUILD_ISOLATION": "0", "PIP_NO_INDEX": "1", "PIP_QUIET": "1",
+                        "PATH": f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}"}
+    done = subprocess.run(["sh", "-ec", words], cwd=folder, env=env, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shutil.rmtree(folder / "postproc")
+    return folder / "bergtow-python/bin"
 
 
 def python(code, *, path=ROOT / "postproc", **env):

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "base/h5axes.h"
 #include "base/h5read.h"
 #include "base/h5util.h"
 #include "base/checksum.h"
@@ -39,6 +40,7 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_mean
     bt_h5 h;
     bt_status status = bt_h5_create_with_room(&h, path, err);
     if (status != BT_OK) return status;
+    bt_h5_describe_file(&h, NULL);
     char name[160];
     for (int k = 0; k < s->n; k++) {
         const bt_item *i = &s->item[k];

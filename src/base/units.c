@@ -49,7 +49,8 @@ enum { N_UNITS = sizeof units / sizeof *units };
 static const struct {
     const char *word, *symbol;
 } words[] = {{"foot", "ft"},   {"feet", "ft"},  {"knot", "kn"},    {"knots", "kn"}, {"second", "s"}, {"seconds", "s"},
-             {"minute", "min"}, {"minutes", "min"}, {"hour", "h"}, {"hours", "h"},  {"day", "d"},    {"days", "d"}};
+             {"minute", "min"}, {"minutes", "min"}, {"hour", "h"}, {"hours", "h"},  {"day", "d"},    {"days", "d"},
+             {"tonne-force", "tf"}, {"tonnes-force", "tf"}};
 
 // froude: g and the densities are kept, so time ~ L^1/2 and mass ~ L^3, and a kind of the dimensions mass^a length^b
 // time^c has the exponent 3 a + b + c/2.

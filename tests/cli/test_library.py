@@ -7,6 +7,7 @@ import select
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import h5py
@@ -26,6 +27,7 @@ def make(*arguments):
     result = subprocess.run(["make", "--no-print-directory", *arguments], cwd=ROOT, capture_output=True, text=True,
                             timeout=600, env=own)
     assert result.returncode == DONE, result.stdout + result.stderr
+    return result.stdout
 
 
 def everything(folder):
@@ -98,7 +100,9 @@ def test_the_page_shows_the_example():
 def test_the_library_exports_what_public_headers_name(prefix):
     out = subprocess.run(["nm", "-D", "--defined-only", prefix / "lib/libbergtow.so"], capture_output=True, text=True,
                          check=True).stdout
-    exported = {name.split("@")[0] for *_, kind, name in map(str.split, out.splitlines()) if kind != "A"}
+    names = [name.partition("@@") for *_, kind, name in map(str.split, out.splitlines()) if kind != "A"]
+    assert {version for _, _, version in names} == {"BERGTOW_0"}
+    exported = {name for name, _, _ in names}
     headers = " ".join(h.read_text() for h in (prefix / "include/bergtow").glob("*.h"))
     assert exported and all(re.search(rf"\b{name}\b", headers) for name in exported)
     declared = set(re.findall(r"\b(bt_\w+)\(", (prefix / "include/bergtow/simulation.h").read_text()))
@@ -221,6 +225,22 @@ def test_man_page_and_completions_know_every_option(prefix):
     subprocess.run(["bash", "-n", prefix / "share/bash-completion/completions/bergtow"], check=True)
 
 
+@pytest.mark.parametrize("script", ["converge", "budget", "capability", "design", "outlines"])
+def test_a_debian_build_has_what_the_man_page_is_made_of(script):
+    """A script that lacks a module has no --help, and the page would be without its options."""
+    needed = {"numpy": "numpy", "scipy": "scipy", "h5py": "h5py", "yaml": "yaml", "matplotlib": "matplotlib",
+              "jinja2": "jinja2", "osgeo": "gdal", "pyproj": "pyproj", "shapely": "shapely"}
+    code = ("import runpy, sys\nscript = sys.argv[1]\ntry: runpy.run_path(script, run_name='__main__')\n"
+            "except SystemExit: print('\\nloaded:', *sys.modules)")
+    said = subprocess.run([sys.executable, "-c", code, ROOT / f"postproc/{script}.py", "--help"], capture_output=True,
+                          text=True, check=True, env=os.environ | {"PYTHONPATH": str(ROOT / "postproc")}).stdout
+    loaded = said.rpartition("\nloaded:")[2].split()
+    control = (ROOT / "install/debian/control").read_text()
+    wanted = re.split(r",\s*", re.search(r"Build-Depends: (.*?)\n(?! )", control, re.DOTALL)[1])
+    assert "numpy" in loaded
+    assert {f"python3-{name}" for module, name in needed.items() if module in loaded} <= set(wanted)
+
+
 def test_completion_offers_commands_and_options(prefix):
     def offered(*words):
         script = (f"source {prefix}/share/bash-completion/completions/bergtow; COMP_WORDS=({' '.join(words)}); "
@@ -282,6 +302,28 @@ def test_uninstall_leaves_what_is_not_ours(tmp_path):
     assert {"bin/bergtow", "lib/libbergtow.so.0", "share/man/man1/bergtow.1"} <= everything(tmp_path) - before
     make("uninstall", f"PREFIX={tmp_path}")
     assert everything(tmp_path) == before
+
+
+def library_of(pythonpath):
+    """The library that a Python loads which finds the package by that."""
+    env = {k: v for k, v in os.environ.items() if k != "BERGTOW_LIB"} | {"PYTHONPATH": str(pythonpath)}
+    done = subprocess.run([sys.executable, "-c", "import bergtow; print(bergtow._library.library_path())"],
+                          capture_output=True, text=True, cwd="/", env=env)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+def test_python_finds_the_package_as_make_install_says(tmp_path):
+    said = make("install", f"PREFIX={tmp_path}")
+    assert library_of(re.search(r"export PYTHONPATH=(\S+)", said)[1]) == f"{tmp_path}/lib/libbergtow.so.0"
+
+
+def test_the_link_of_the_debian_package_is_to_the_python_package(tmp_path):
+    assert "PYTHONPATH" not in make("install", "PREFIX=/usr", f"DESTDIR={tmp_path}")
+    place, link = (tmp_path / p for p in (ROOT / "install/debian/python3-bergtow.links").read_text().split())
+    link.parent.mkdir(parents=True)
+    link.symlink_to(place)
+    assert library_of(link.parent) == f"{tmp_path}/usr/lib/libbergtow.so.0"
 
 
 def test_destdir_is_no_part_of_what_is_installed(tmp_path):

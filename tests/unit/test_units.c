@@ -47,6 +47,8 @@ static void reads_units_of_each_kind(void **state)
         {"1 day", BT_UNIT_TIME, 86400},
         {"2 days", BT_UNIT_TIME, 172800},
         {"80 tf", BT_UNIT_FORCE, 784532},
+        {"1 tonne-force", BT_UNIT_FORCE, 9806.65},
+        {"80 tonnes-force", BT_UNIT_FORCE, 784532},
         {"180 deg", BT_UNIT_ANGLE, BT_PI},
         {"180", BT_UNIT_ANGLE, BT_PI},
         {"3 rad", BT_UNIT_ANGLE, 3},
