@@ -27,8 +27,8 @@ def _amount(s):
     n = sum(c["members"]["used"] for c in s["conditions"])
     said = f"{n} tows in {len(s['conditions'])} conditions, each through an ice field of its own"
     if tows:
-        said += (f"; {_span([d['fields'] for d in tows])} fields and {_span([d['hours'] for d in tows], number)} hours of tow "
-                 "a condition, the start-up left out")
+        fields, hours = _span([d["fields"] for d in tows]), _span([d["hours"] for d in tows], number)
+        said += f"; {fields} fields and {hours} hours of tow a condition, the start-up left out"
     return said + "."
 
 
@@ -55,7 +55,8 @@ def method(s, case):
         f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are asked for; otherwise there "
         "is no value.")
     if any(c["design"]["tension"] for c in s["conditions"]):
-        out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is stated.")
+        out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is "
+                   "stated.")
     return out
 
 
