@@ -1,11 +1,13 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: MIT
-"""Man page and completions of bergtow, made from what the program says of itself.
+"""Man pages and completions of bergtow and bergtow-report, made from what these say of themselves.
 
     install/from_help.py BERGTOW FOLDER
 
-writes FOLDER/bergtow.1, bergtow.bash and _bergtow (zsh). Rejected: texts kept by hand, which fall behind the options.
+writes FOLDER/bergtow.1, bergtow.bash, _bergtow (zsh), and the same of bergtow-report. Rejected: texts kept by hand,
+which fall behind the options.
 """
+import os
 import re
 import subprocess
 import sys
@@ -13,15 +15,17 @@ from pathlib import Path
 
 OPTION = re.compile(r"^ {2,8}(?=-)(?:-(?P<short>[\w?])(?:[ =](?P<short_arg>[^\s,]+))?,? *)?"
                     r"(?:--(?P<long>[\w-]+)(?:[ =](?P<arg>\S+))?)?(?: {2,}(?P<text>\S.*))?$")
+HERE = Path(__file__).resolve().parent
 WORDS = {"DIR": "folder", "FILE": "file", "CASE.yml": "file", "STUDY.yml": "file"}
 
 
 def said(program, *arguments):
     """Standard output of the program; '' and a line on stderr where it cannot say it."""
-    result = subprocess.run([program, *arguments], capture_output=True, text=True)
+    result = subprocess.run([program, *arguments], capture_output=True, text=True,
+                            env=os.environ | {"BERGTOW_HOME": str(HERE.parent)})
     if result.returncode == 0:
         return result.stdout
-    print(f"from_help.py: bergtow {' '.join(arguments)}: {result.stderr.strip()}", file=sys.stderr)
+    print(f"from_help.py: {Path(program).name} {' '.join(arguments)}: {result.stderr.strip()}", file=sys.stderr)
     return ""
 
 
@@ -36,14 +40,14 @@ class Option:
 
 
 class Command:
-    """What `bergtow NAME --help` says: usage, a paragraph, options."""
+    """What `bergtow NAME --help` says, or a program without commands: usage, a paragraph, options."""
 
-    def __init__(self, program, name, summary):
+    def __init__(self, program, name="", summary=""):
         self.name, self.summary, self.options, about = name, summary, [], []
-        text = said(program, name, "--help")
+        text = said(program, *([name] if name else []), "--help")
         usage, _, rest = text.partition("\n" if text.startswith("Usage") else "\n\n")
         usage = re.sub(r"\s+", " ", usage)
-        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|MAP|A)\b\S*(?: \[B\])?)$", usage)
+        self.operands = re.findall(r"(?:^| )(?!\[)((?:CASE|STUDY|DIR|MAP|RUN|A)\b\S*(?: \[B\])?)$", usage)
         self.operands = self.operands[0] if self.operands else ""
         for line in rest.splitlines():
             match = OPTION.match(line)
@@ -70,6 +74,14 @@ def roff(text):
     return "\\&" + text if text.startswith((".", "'")) else text
 
 
+def options_of(command):
+    out = []
+    for o in command.options:
+        arg = f"=\\fI{roff(o.arg)}\\fR" if o.arg else ""
+        out += [".TP", ", ".join(f"\\fB{roff(f)}\\fR" for f in o.flags) + arg, roff(o.text)]
+    return out
+
+
 def man_page(found, own, codes, version):
     out = [f'.TH BERGTOW 1 "" "bergtow {version}" "User Commands"', ".SH NAME",
            "bergtow \\- simulate a body that is towed through broken sea ice", ".SH SYNOPSIS"]
@@ -81,9 +93,7 @@ def man_page(found, own, codes, version):
     out += [".SH COMMANDS"]
     for c in found:
         out += [f".SS bergtow {c.name} [\\fIOPTION\\fR...] \\fI{roff(c.operands)}\\fR", roff(c.about)]
-        for o in c.options:
-            arg = f"=\\fI{roff(o.arg)}\\fR" if o.arg else ""
-            out += [".TP", ", ".join(f"\\fB{roff(f)}\\fR" for f in o.flags) + arg, roff(o.text)]
+        out += options_of(c)
     out += [".SH EXIT STATUS", roff(codes.removeprefix("Exit codes: ")), ".SH ENVIRONMENT"]
     for name, text in (("OMP_NUM_THREADS", "threads of a rank where neither option nor case says"),
                        ("BERGTOW_HOME", "folder that holds postproc/, where the scripts of commands are"),
@@ -92,18 +102,52 @@ def man_page(found, own, codes, version):
     return "\n".join(['.\\" made by install/from_help.py', *out]) + "\n"
 
 
-def bash(found, own):
-    cases = [f"    {c.name}) options='{' '.join(f for o in c.options for f in o.flags)}' ;;" for c in found]
+def man_page_of_report(report, version):
+    return "\n".join([
+        '.\\" made by install/from_help.py', f'.TH BERGTOW\\-REPORT 1 "" "bergtow {version}" "User Commands"',
+        ".SH NAME", "bergtow\\-report \\- write the report of a run or of an ensemble", ".SH SYNOPSIS",
+        f".B bergtow\\-report\n[\\fIOPTION\\fR...] \\fI{roff(report.operands)}\\fR", ".SH DESCRIPTION",
+        roff(report.about), ".SH OPTIONS", *options_of(report), ".SH SEE ALSO", ".BR bergtow (1)", ""])
+
+
+def with_values(found):
+    """The options that take a file, and those that take something else, as patterns of bash."""
     takes_file = sorted({f for c in found for o in c.options if o.arg and WORDS.get(o.arg) for f in o.flags})
     takes_word = sorted({f for c in found for o in c.options if o.arg and not WORDS.get(o.arg) for f in o.flags}
                         - set(takes_file))
+    return "|".join(takes_file) or "''", "|".join(takes_word) or "''"  # none, where Python lacks what --help needs
+
+
+def bash_of_report(report):
+    takes_file, takes_word = with_values([report])
+    return f"""# bash completion of bergtow-report, made by install/from_help.py
+_bergtow_report()
+{{
+    local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD - 1]}}
+    COMPREPLY=()
+    case $before in
+    {takes_word}) return ;;
+    {takes_file}) COMPREPLY=($(compgen -f -- "$word")); return ;;
+    esac
+    case $word in
+    -*) COMPREPLY=($(compgen -W '{' '.join(f for o in report.options for f in o.flags)}' -- "$word")) ;;
+    *) COMPREPLY=($(compgen -f -- "$word")) ;;
+    esac
+}}
+complete -o filenames -F _bergtow_report bergtow-report
+"""
+
+
+def bash(found, own):
+    cases = [f"    {c.name}) options='{' '.join(f for o in c.options for f in o.flags)}' ;;" for c in found]
+    takes_file, takes_word = with_values(found)
     return "\n".join([
         "# bash completion of bergtow, made by install/from_help.py", "_bergtow()", "{",
         "    local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} options=", "    COMPREPLY=()",
         "    if [ \"$COMP_CWORD\" -eq 1 ]; then",
         f"        COMPREPLY=($(compgen -W '{' '.join([c.name for c in found] + [f for f, _ in own])}' -- \"$word\"))",
-        "        return", "    fi", "    case $before in", f"    {'|'.join(takes_word)}) return ;;",
-        f"    {'|'.join(takes_file)}) COMPREPLY=($(compgen -f -- \"$word\")); return ;;", "    esac",
+        "        return", "    fi", "    case $before in", f"    {takes_word}) return ;;",
+        f"    {takes_file}) COMPREPLY=($(compgen -f -- \"$word\")); return ;;", "    esac",
         "    case ${COMP_WORDS[1]} in", *cases, "    esac", "    case $word in",
         "    -*) COMPREPLY=($(compgen -W \"$options\" -- \"$word\")) ;;",
         "    *) COMPREPLY=($(compgen -f -- \"$word\")) ;;", "    esac", "}",
@@ -115,6 +159,21 @@ def quoted(text):
     return re.sub(r"([\[\]:\\])", r"\\\1", text).replace("'", "'\\''")
 
 
+def zsh_options(command):
+    out = []
+    for o in command.options:
+        value = f":{quoted(o.arg)}:{'_files' if WORDS.get(o.arg) else ' '}" if o.arg else ""
+        equals = "=" if o.arg else ""
+        for flag in o.flags:
+            out.append(f"    '{flag}{equals if flag.startswith('--') else ''}[{quoted(o.text)}]{value}' \\")
+    return out + ["    '*:file:_files'"]
+
+
+def zsh_of_report(report):
+    return "\n".join(["#compdef bergtow-report", "# made by install/from_help.py", "_arguments -s \\",
+                      *zsh_options(report), ""])
+
+
 def zsh(found, own):
     out = ["#compdef bergtow", "# made by install/from_help.py", "local -a commands options", "commands=("]
     out += [f"  '{c.name}:{quoted(c.summary)}'" for c in found] + [")"]
@@ -122,13 +181,8 @@ def zsh(found, own):
             "  options=(" + " ".join(f"'{flag}:{quoted(text)}'" for flag, text in own) + ")",
             "  _describe option options", "  return", "fi", "shift words; (( CURRENT-- ))", "case $words[1] in"]
     for c in found:
-        out.append(f"  {c.name}) _arguments -s \\")
-        for o in c.options:
-            value = f":{quoted(o.arg)}:{'_files' if WORDS.get(o.arg) else ' '}" if o.arg else ""
-            equals = "=" if o.arg else ""
-            for flag in o.flags:
-                out.append(f"    '{flag}{equals if flag.startswith('--') else ''}[{quoted(o.text)}]{value}' \\")
-        out += ["    '*:file:_files' ;;"]
+        out += [f"  {c.name}) _arguments -s \\", *zsh_options(c)]
+        out[-1] += " ;;"
     return "\n".join(out + ["esac", ""])
 
 
@@ -140,6 +194,10 @@ def main():
     (folder / "bergtow.1").write_text(man_page(found, own, codes, version))
     (folder / "bergtow.bash").write_text(bash(found, own))
     (folder / "_bergtow").write_text(zsh(found, own))
+    report = Command(HERE / "bergtow-report")
+    (folder / "bergtow-report.1").write_text(man_page_of_report(report, version))
+    (folder / "bergtow-report.bash").write_text(bash_of_report(report))
+    (folder / "_bergtow-report").write_text(zsh_of_report(report))
 
 
 if __name__ == "__main__":

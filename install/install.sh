@@ -83,9 +83,11 @@ pc=$(mktemp)
 sed "s|@PREFIX@|$prefix|" "$build/share/bergtow.pc" >"$pc"
 put_file 644 "$pc" "$prefix/lib/pkgconfig/bergtow.pc"
 rm -f "$pc"
-put_file 644 "$build/share/bergtow.1" "$prefix/share/man/man1/bergtow.1"
-put_file 644 "$build/share/bergtow.bash" "$prefix/share/bash-completion/completions/bergtow"
-put_file 644 "$build/share/_bergtow" "$prefix/share/zsh/site-functions/_bergtow"
+for program in bergtow bergtow-report; do
+    put_file 644 "$build/share/$program.1" "$prefix/share/man/man1/$program.1"
+    put_file 644 "$build/share/$program.bash" "$prefix/share/bash-completion/completions/$program"
+    put_file 644 "$build/share/_$program" "$prefix/share/zsh/site-functions/_$program"
+done
 find postproc -type f ! -name '*.pyc' ! -path '*/build/*' ! -path '*.egg-info/*' | sort >"$made.scripts"
 while read -r script; do
     put_file 644 "$script" "$prefix/share/bergtow/$script"

@@ -225,7 +225,21 @@ def test_man_page_and_completions_know_every_option(prefix):
     subprocess.run(["bash", "-n", prefix / "share/bash-completion/completions/bergtow"], check=True)
 
 
-@pytest.mark.parametrize("script", ["converge", "budget", "capability", "design", "outlines"])
+def test_bergtow_report_has_a_page_and_completions(prefix):
+    said = subprocess.run([prefix / "bin/bergtow-report", "--help"], capture_output=True, text=True, check=True).stdout
+    options = set(re.findall(r"(?m)^  (?:-\w(?: \S+)?, )?(--[a-z-]+)", said))
+    assert {"--help", "--output", "--client", "--also"} <= options
+    page = (prefix / "share/man/man1/bergtow-report.1").read_text().replace("\\-", "-")
+    zsh = (prefix / "share/zsh/site-functions/_bergtow-report").read_text()
+    bash = prefix / "share/bash-completion/completions/bergtow-report"
+    script = f"source {bash}; COMP_WORDS=(bergtow-report --); COMP_CWORD=1; _bergtow_report; echo ${{COMPREPLY[@]}}"
+    offered = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert set(offered) == options
+    for option in options:
+        assert f"\\fB{option}\\fR" in page and re.search(rf"'{option}[=\[]", zsh), option
+
+
+@pytest.mark.parametrize("script", ["converge", "budget", "capability", "design", "outlines", "report"])
 def test_a_debian_build_has_what_the_man_page_is_made_of(script):
     """A script that lacks a module has no --help, and the page would be without its options."""
     needed = {"numpy": "numpy", "scipy": "scipy", "h5py": "h5py", "yaml": "yaml", "matplotlib": "matplotlib",
