@@ -17,6 +17,7 @@
 #include "bergtow/run.h"
 #include "case/case_derived.h"
 #include "case/cost.h"
+#include "run/ensemble_journal.h"
 #include "run/ensemble_member.h"
 #include "run/ensemble_record.h"
 #include "base/fileio.h"
@@ -65,56 +66,26 @@ static void on_signal(int number) { stop_signal = number; }
 static const int caught[] = {SIGINT, SIGTERM, SIGUSR2};
 enum { N_CAUGHT = sizeof caught / sizeof *caught };
 
-/// One line of the journal, in one write: lines of several processes do not mix. wall: NAN = not known.
 static void journal(const ensemble *e, const char *event, const bt_member *m, double wall, int code)
 {
-    struct timespec now;
-    clock_gettime(CLOCK_REALTIME, &now);
-    char line[256], took[32] = "null";
-    if (isfinite(wall)) snprintf(took, sizeof took, "%.3f", wall);
-    const int n = snprintf(line, sizeof line,
-                           "{\"time\": %.3f, \"event\": \"%s\", \"member\": \"%s\", \"pid\": %ld, \"wall_time_s\": "
-                           "%s, \"exit_code\": %d}\n",
-                           (double)now.tv_sec + 1e-9 * (double)now.tv_nsec, event, m->name, (long)getpid(), took, code);
-    const int fd = bt_member_open(e->o->dir, "journal.jsonl", O_WRONLY | O_CREAT | O_APPEND);
-    if (fd < 0) return;
-    if (write(fd, line, (size_t)n) == n) fsync(fd);
-    close(fd);
+    bt_journal_add(e->o->dir, event, m->name, wall, code);
 }
 
 /// A process that is killed between the end of a member and the line for it leaves that line out: here it is added. By
 /// one process at a time, with the lock of the folder.
-static void complete_journal(ensemble *e)
+static void complete_journal(const ensemble *e)
 {
     // Whoever works on a member holds its lock until the line is written, so the locks are looked at first.
-    enum { OTHER, ENDED, SAID };
-    char *state = bt_alloc((size_t)e->n, 1);
+    bool *lacking = bt_alloc((size_t)e->n, sizeof *lacking);
     for (int64_t i = 0; i < e->n; i++) {
         const entry *x = &e->list[i];
-        const bool ended = bt_ensemble_state(x->folder, NULL, NULL) == BT_MEMBER_FINISHED;
-        state[x->index] = ended && !bt_member_held(x->folder) ? ENDED : OTHER;
+        lacking[x->index] =
+            bt_ensemble_state(x->folder, NULL, NULL) == BT_MEMBER_FINISHED && !bt_member_held(x->folder);
     }
-    char *path = bt_file_join(e->o->dir, "journal.jsonl"), *text = NULL;
-    size_t size;
-    bt_errors unheard = {0};
-    if (access(path, F_OK) == 0 && bt_file_read(path, "a journal", &text, &size, &unheard) == BT_OK) {
-        for (char *line = text, *end; (end = strchr(line, '\n')); line = end + 1) {
-            *end = 0;
-            int64_t condition, repeat;
-            const char *name = strstr(line, "\"member\": \"c");
-            if (!name || sscanf(name, "\"member\": \"c%" SCNd64 "-r%" SCNd64, &condition, &repeat) != 2) continue;
-            const int64_t i = (condition - 1) * e->s->repeats + repeat - 1;
-            // with fewer repeats than before, lines of members that are no longer asked for
-            if (i < 0 || i >= e->n || repeat > e->s->repeats || state[i] == OTHER) continue;
-            state[i] = strstr(line, "\"event\": \"finished\"") ? SAID : ENDED;
-        }
-        for (int64_t i = 0; i < e->n; i++)
-            if (state[e->list[i].index] == ENDED) journal(e, "finished", &e->list[i].m, NAN, 0);
-    }
-    bt_errors_free(&unheard);
-    free(text);
-    free(path);
-    free(state);
+    bt_journal_strike_ended(e->o->dir, e->s->repeats, e->n, lacking);
+    for (int64_t i = 0; i < e->n; i++)
+        if (lacking[e->list[i].index]) journal(e, "finished", &e->list[i].m, NAN, 0);
+    free(lacking);
 }
 
 /// The wall time that is left, s; infinite where none was given.
