@@ -97,8 +97,8 @@ def title_of(case, name, values):
     title = run.get("title") if isinstance(run, dict) else None
     if values:  # that of the case alone is not that of the study
         title = re.sub(r"\b\d+(\.\d+)?\s*% (?=(\w+ ){0,2}ice\b)", "", str(title or ""))
-    words = f"ice of {100 * min(values):g} to {100 * max(values):g} %" if len(values) > 1 else \
-        f"ice of {100 * values[0]:g} %" if values else ""
+    words = f"ice concentration {100 * min(values):g} to {100 * max(values):g} %" if len(values) > 1 else \
+        f"ice concentration {100 * values[0]:g} %" if values else ""
     return ": ".join(part for part in (str(title or name), words) if part)
 
 

@@ -32,7 +32,7 @@ def means(s, markdown):
     factor, unit = unit_of(s)
     head = [
         "condition", "fields", f"mean, {unit}", "95 % (t)", "95 % (bootstrap)", "median", "trimmed", "sd of fields",
-        "standard error in a run", "largest", f"fields for {100 * s['wanted_error']:g} %", "doubts"
+        "standard error in a run", "largest field's share", f"fields for {100 * s['wanted_error']:g} %", "doubts"
     ]
     rows = []
     for c in s["conditions"]:
@@ -90,19 +90,20 @@ def estimates(s, markdown):
         if s["conditions"][0]["estimates"][name]["on_top"]
     ]
     note = ("In brackets: simulated / estimate, where that is meant for the conditions and knows the concentration. "
-            "* outside the range the estimate is meant for.")
+            "* outside the range the estimate is meant for. –: no value there. The estimates were not made for each "
+            "other's conditions and can differ tenfold; none has been checked against a measured tow here.")
     return table(head, rows, markdown) + "\n\n" + " ".join([note, *on_top])
 
 
 def fits(s, markdown):
-    head = [
-        "condition", "means: best fit", "p", "second", "p", "samples: best fit", "p", "second", "p", "samples",
-        "at or below 0"
-    ]
+    # of few fields no means are fitted
+    of_means = any("refused" not in f for c in s["conditions"] for f in c["fits_of_means"][:2])
+    head = ["condition", *["means: best fit", "p", "second", "p"] * of_means, "samples: best fit", "p", "second", "p",
+            "samples", "at or below 0"]
     rows = []
     for c in s["conditions"]:
         cells = [c["label"]]
-        for fitted in (c["fits_of_means"], c["samples"]["fits"]):
+        for fitted in [c["fits_of_means"]] * of_means + [c["samples"]["fits"]]:
             for f in fitted[:2]:
                 cells += ["–", "–"] if "refused" in f else [f["name"], number(f["p_value"], 2)]
         share = c["samples"]["not_above_zero"]
@@ -169,6 +170,8 @@ def sensitivity(s, markdown):
     x = s["sensitivity"]
     if "refused" in x:
         return f"No sensitivity: {x['refused']}."
+    if len(set(x["ranks"]).union(x["sobol"].get("indices", ()))) == 1:
+        return "One parameter was varied: there is nothing to share out."
     kinds = (("mean", x["sobol"]), ("logarithm", x["sobol_of_logarithm"]))
     given = [(of, k["indices"]) for of, k in kinds if "refused" not in k]
     names = set(x["ranks"]).union(*(i for _, i in given))
@@ -274,7 +277,7 @@ def report(s, markdown=False):
         lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
     for title, part in (("Loads", loads_text.signals), ("Quantiles of loads", loads_text.quantiles),
                         ("Return levels of loads", loads_text.returns),
-                        ("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
+                        ("Mean ice resistance", means), ("Comparison with published estimates", estimates), ("Distributions", fits),
                         ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
         lines += ["", heading(title), "", part(s, markdown)]
     return "\n".join(lines)

@@ -133,6 +133,8 @@ def statistics(e, rows, options):
         gap, total = stat_load.gap_of(fields), sum(f["hours"] for f in fields)
         start_up = max((f["start_up"] for f in fields if f["start_up"]), key=lambda found: found["largest"],
                        default=None)
+        if start_up and name == ALWAYS[0]:
+            start_up = start_up | {"inertia": _inertia(e, rows, start_up["time_s"], fields[0]["scale"])}
         found = stat_load.extremes(fields, gap, [*options.hours, design_hours], options.resamples)
         out[name] = {
             "label": load.label, "units": load.units, "description": load.description, "conversion": load.conversion,
@@ -147,16 +149,33 @@ def statistics(e, rows, options):
     return out
 
 
+def _inertia(e, rows, end, scale):
+    """Mean of the inertia of the body over the time scale before `end`, N, the largest of the members; NaN where no
+    member's folder is there."""
+    found = []
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                some = (run["time"] > end - scale + 1e-9) & (run["time"] <= end + 1e-9)
+                if "inertia_force" in run and some.any():
+                    found.append(run["inertia_force"][some].mean())
+        except RunError:
+            continue
+    return float(max(found, default=np.nan))
+
+
 def panels(e, rows):
     """Means over the window and largest step means of every panel of the hull, over fields: {"mean", "mean_95",
-    "largest", "largest_95" [P], "units"}; None where members have none, or unlike numbers of them."""
-    mean, largest, units = [], [], ""
+    "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their middles from the body's x axis towards
+    y, "units", "fields"}; None where members have none, or unlike numbers of them."""
+    mean, largest, units, middle = [], [], "", None
     for m in rows:
         try:
             with Run(e.folder(m)) as run:
                 found, units = run.panels, run.panel_series["units"]
         except RunError:
             continue
+        middle = found["middle"] if middle is None else middle
         mean.append(found["mean_load"])
         largest.append(found["max_load"])
     if not mean or len({len(x) for x in mean}) > 1 or not np.isfinite(mean).all():
@@ -166,5 +185,6 @@ def panels(e, rows):
     return {
         "units": units, "fields": len(mean), "mean": np.mean(mean, axis=0), "mean_95": over(mean),
         "largest": np.max(largest, axis=0), "mean_of_largest": np.mean(largest, axis=0),
-        "mean_of_largest_95": over(largest)
+        "mean_of_largest_95": over(largest),
+        "bearing_deg": np.degrees(np.arctan2(middle[:, 1], middle[:, 0])) % 360
     }

@@ -79,11 +79,16 @@ def warnings(s):
         details = {detail for _, detail in where}
         if len(where) == every and len(details) == 1:
             detail = details.pop()
-            out.append(f"WARNING: {what}{f' ({detail})' if detail else ''}.")
+            out.append(f"WARNING: {sentence(what)}{f' ({detail})' if detail else ''}.")
         else:
             some = [label + (f" ({detail})" if detail else "") for label, detail in where]
-            out.append(f"WARNING: {what}: {several(some)}.")
+            out.append(f"WARNING: {sentence(what)}: {several(some)}.")
     return out
+
+
+def sentence(text):
+    """With a capital letter."""
+    return text[:1].upper() + text[1:]
 
 
 def several(some):
@@ -122,9 +127,9 @@ def signals(s, markdown):
         rows += _rows_of(s, name, cells)
     if not rows:
         return "No loads: no member has a window with a towed body."
-    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. In "
-            "the start: the largest before the window, which is in no other number. "
-            "95 %: interval over fields.")
+    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so that "
+            "means differ a little from those of the whole window. In the start: the largest before the window, which "
+            "is in no other number. 95 %: interval over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
 
 
@@ -163,10 +168,11 @@ def panel_lines(s):
             continue
         k, most = int(np.argmax(p["mean"])), int(np.argmax(p["largest"]))
         factor, unit = scale([p["largest"][most]], p["units"])
-        out.append(f"Hull panels, {c['label']}: panel {k} has the largest mean, {number(p['mean'][k] / factor)} "
-                   f"{unit} "
+        def at(j, p=p):
+            return f"panel {j} (at {p['bearing_deg'][j]:.0f}° from the body's x axis)"
+        out.append(f"Hull panels, {c['label']}: {at(k)} has the largest mean, {number(p['mean'][k] / factor)} {unit} "
                    f"({pair(p['mean_95'][k], factor)}); the largest mean of a step is "
-                   f"{number(p['largest'][most] / factor)} {unit}, on panel {most}.")
+                   f"{number(p['largest'][most] / factor)} {unit}, on {at(most)}.")
     return out
 
 
@@ -197,11 +203,14 @@ def returns(s, markdown):
                              number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
     note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
-            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. Brackets: 95 %, profile "
-            "likelihood. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
+            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): below "
+            "0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, "
+            "profile likelihood, widened by the scatter between fields. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
             f"than the largest value seen. No bound: the upper end is more than {text_table.FAR:g} times the level.")
-    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *(f"No fit for {load}, {tail}, {several(some)}."
-                                                                  for (load, tail), some in refused.items())])
+    # what to do about it is for a terminal
+    said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
+            for (load, tail), some in refused.items())
+    return table(head, rows, markdown) + "\n\n" + "\n".join([note, *said])
 
 
 def level(found, factor):

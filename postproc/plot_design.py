@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The design tow force of each condition with its interval, beside the mean and the largest that was simulated; and the
 line tension where there is a line."""
+import statement
 import style
 
 import matplotlib.pyplot as plt
@@ -49,23 +50,27 @@ def draw(conditions, numeric, axis_label, times):
     largest = max(d.get("value", d["largest"]) for d in tows if d)
     factor, unit = style.scale([largest], next(d for d in tows if d)["units"])
     figure, axes = plt.subplots(figsize=(8.4, 3.9))
-    figure.subplots_adjust(left=0.1, right=0.98, top=0.86, bottom=0.15 if key else 0.3)
+    figure.subplots_adjust(left=0.1, right=0.98, top=0.83, bottom=0.15 if key else 0.3)
     lines = any(t and "value" in t for t in tensions)
     top = LIMIT * largest
-    _draw(axes, x - lines * aside, tows, factor, top, style.TOW, "design tow force, 95 %")
+    _draw(axes, x - lines * aside, tows, factor, top, style.TOW, "design tow force, 95 % interval")
     if lines:
-        _draw(axes, x + aside, tensions, factor, top, style.INERTIA, "design line tension, 95 %")
+        _draw(axes, x + aside, tensions, factor, top, style.INERTIA, "design line tension, 95 % interval")
     there = [k for k, d in enumerate(tows) if d]
-    axes.plot(x[there], [tows[k]["largest"] / factor for k in there], "_", color=style.INK, markersize=16,
+    axes.plot(x[there], [tows[k]["largest"] / factor for k in there], "_", color=style.INK, markersize=22,
               markeredgewidth=2, zorder=3, label="largest simulated")
     axes.plot(x[there], [tows[k]["mean"] / factor for k in there], "o", color=style.ICE, markersize=5, zorder=3,
               label="mean tow force")
-    ends = [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ()) if np.isfinite(v)]
+    starts = [(k, tows[k]["start_up"]["largest"]) for k in there if statement.start_exceeds(tows[k])]
+    if starts:
+        axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,
+                  markerfacecolor="none", zorder=3, label="in the start, in no other number")
+    ends = [v for _, v in starts] + [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ()) if np.isfinite(v)]
     axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
     axes.set_ylabel(f"force ({unit})")
     axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"] for c in conditions],
                     **({} if key else {"rotation": 20, "ha": "right"}))
     axes.set_xlabel(axis_label(key) if key else "")
     axes.grid(True, axis="y")
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=4, borderaxespad=0.2, handletextpad=0.4)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=3, fontsize=9, borderaxespad=0.2, handletextpad=0.4)
     return figure

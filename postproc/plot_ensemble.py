@@ -450,7 +450,9 @@ def draw_returns(e, conditions, name):
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.8 * floor, 4 * max(values) / factor)
     else:
-        axes.set_ylim(min(0.0, floor), 2.5 * max(values) / factor)
+        ends = [v / factor for c in shown for v in c["loads"][name]["design"]["interval_95"] if np.isfinite(v)]
+        top = min(2.5 * max(values) / factor, 1.05 * max([*ends, max(values) / factor]))
+        axes.set_ylim(floor - 0.1 * (top - floor), top)
     axes.set_xlabel("return time (hours of tow)")
     what = f"collisions as {first['conversion']}" if first["conversion"] else f"mean over {first['time_scale_s']:.3g} s"
     axes.set_ylabel(f"{first['label']} ({unit}), {what}")
@@ -464,7 +466,7 @@ def draw_returns(e, conditions, name):
     if step > 1:
         notes.append(f"one in {step} of {len(some)} conditions is shown")
     if len(some) < len(conditions):
-        notes.append(f"{len(conditions) - len(some)} without such a tail left out")
+        notes += [f"{c['label']}: no such tail," for c in conditions if c not in some][:2] + ["not drawn"]
     figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
     headline(figure, e, f"return levels of {first['label']}")
     return figure

@@ -7,6 +7,7 @@ same.
 """
 import argparse
 import os
+import re
 import sys
 from dataclasses import replace
 from itertools import groupby
@@ -27,12 +28,16 @@ import style
 import text_table
 from bergtow_read import Run, RunError
 from report_case import scrubbed
-from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble, reading
+from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble, reading, short_key
 
 import numpy as np
 
 #: keys that no result follows from
+TONNE_FORCE = 9806.65  # N
 PERSONAL = ("run.title", "run.threads", "report.", "output.", "guard.", "reference.")
+#: keys that decide the force, and stand among the assumptions wherever their values are from
+DECIDE = ("ice.size", "tow.speed", "body.drag.water_form", "water.current_x", "water.current_y", "air.wind_x",
+          "air.wind_y")
 STATUS = {FINISHED: "finished", FAILED: "failed"}
 WARNED = "WARNING: "
 #: as ensemble.py has them
@@ -91,21 +96,18 @@ def worth(value, low, high):
     return f"{some[0]} {unit}", f"{some[1]} to {some[2]} {unit}"
 
 
+MARGIN = 1.05  # times the largest value simulated: what is less has little room for what was not seen
 #: marks behind a design value, and their footnotes
 FOOTNOTES = {
     "*": "beyond the hours simulated: extrapolated by the tail of the distribution.",
     "†": "from block maxima (GEV), since clusters over a threshold (GPD), the usual way, are too few.",
-    "‡": "within rounding no more than the largest simulated."
+    "‡": "less than 5 % above the largest simulated: little margin for so long a return time."
 }
 
 
 def marks(d):
     """Those of FOOTNOTES that a design value carries."""
-    low, high = d["interval_95"]
-    factor = style.scale([d["value"]], "N")[0]
-    place = text_table.last_place(d["value"] / factor, low / factor, high / factor)
-    step = 10.0 ** place * factor if place is not None else 0.0
-    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] - d["largest"] <= step}
+    carried = {"*": d["beyond_data"], "†": d["model"] == "GEV", "‡": d["value"] < MARGIN * d["largest"]}
     return "".join(mark for mark, there in carried.items() if there)
 
 
@@ -134,7 +136,8 @@ def answer(e, s, case, results):
     if all(row[3] == "–" for row in rows):  # no line
         head, rows = head[:3] + head[5:], [row[:3] + row[5:] for row in rows]
     if any(c["design"]["tow"] and statement.start_exceeds(c["design"]["tow"]) for c in s["conditions"]):
-        notes.append("In the start: the largest before the window, which is in no other number.")
+        notes.append("In the start: of the same moving mean, the largest before the window, which is in no other "
+                     "number.")
     else:
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
@@ -142,6 +145,7 @@ def answer(e, s, case, results):
         s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
         lambda key: reading(key, e.units[key])[0]))
     out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
+    out += [lines(governing(s))] if len(s["conditions"]) > 1 else []
     carried = "".join(cell for row in rows for cell in row[1:])
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
@@ -150,6 +154,23 @@ def answer(e, s, case, results):
     out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
              "rows": report_method.holds(case, s) + beyond}] if case else []
     return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
+
+
+def governing(s):
+    """The condition with the largest design value in a sentence, with its tonnes-force, in which vessels are rated."""
+    some = [c for c in s["conditions"] if c["design"]["tow"] and "value" in c["design"]["tow"]]
+    if not some:
+        return "No condition has a design tow force."
+    c = max(some, key=lambda c: c["design"]["tow"]["value"])
+    d = c["design"]["tow"]
+    def both(x):
+        return f"{report_run.force(x)} ({text_table.number(x / TONNE_FORCE)} tonne-force)" if np.isfinite(x) else \
+            "without bound"
+    value = worth(d["value"], *d["interval_95"])[0]
+    said = (f"Largest of these: {unbroken(c['label'])}, {value} ({text_table.number(d['value'] / TONNE_FORCE, 2)} "
+            f"tonne-force); upper end of its interval {both(d['interval_95'][1])}")
+    return said + (f"; its start, which is in no design value, {both(d['start_up']['largest'])}."
+                   if statement.start_exceeds(d) else ".")
 
 
 def lines(*some, faint=False):
@@ -185,6 +206,16 @@ def members(e, s):
     return out
 
 
+def kinds_of_warnings(some):
+    """Warnings of members that differ in numbers alone as one, in the words of the first with the number of members:
+    rows of members()."""
+    found = {}
+    for row in some:
+        for text in row["reported"] if row["status"] == STATUS[FINISHED] else ():
+            found.setdefault(re.sub(r"[\d.]+", "#", text), [text, 0])[1] += 1
+    return [f"{text} ({n} member{'s' if n > 1 else ''})" for text, n in found.values()]
+
+
 def study_text(e):
     """The study as it was given, or as the file has it."""
     try:
@@ -195,25 +226,31 @@ def study_text(e):
 
 def provenance(e):
     """(rows of the first member, sentence on members of other builds or None)."""
-    rows, builds = [], set()
+    rows, builds = [], {}
     for m in np.flatnonzero(e.status == FINISHED):
         try:
             with Run(e.folder(m)) as run:
-                builds.add(tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags")))
+                build = tuple(run.attributes.get(k) for k in ("version", "revision", "compiler", "flags"))
+                builds[build] = builds.get(build, 0) + 1
                 rows = rows or [(name, value)
                                 for name, value in report_run.provenance(run)
                                 if name not in ("state hash", "wall time", "folder", "started", "host")]
         except RunError:
             continue
-    return rows, (
-        f"The members come from {len(builds)} builds of the program, which need not give the same bits."
-        if len(builds) > 1 else None)
+    said = []
+    if len(builds) > 1:
+        of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
+        said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits ({of}).")
+    if any(str(build[1]).endswith("-dirty") for build in builds):
+        said.append("The program was built from sources with changes that no revision holds: its results cannot be made "
+                    "again from the revision alone.")
+    return rows, " ".join(said) or None
 
 
 def caption(name):
     """Words for a picture of plot_ensemble.py by its name, "sweep-ice-concentration"."""
     if name.startswith("sweep-"):
-        return "Mean ice resistance against " + name[6:].replace("-", ".", 1)
+        return "Mean ice resistance against " + short_key(name[6:].replace("-", ".", 1))
     if name.startswith("above-"):
         return f"How much of the time the {name[6:].replace('-', ' ')} is above a level"
     if name.startswith("returns-"):
@@ -234,7 +271,7 @@ def pictures(e, options, s):
 CHAPTERS = (("Loads", (("Loads", ()), ("Quantiles of loads", ("above", )), ("Return levels of loads", ("returns", )),
                        ("Peaks of collisions", ("exceedance", )))),
             ("Mean ice resistance",
-             (("Mean ice resistance", ("sweep", "map", "variants")), ("Beside the estimates", ()),
+             (("Mean ice resistance", ("sweep", "map", "variants")), ("Comparison with published estimates", ()),
               ("Distributions", ()), ("Sensitivity of the mean ice resistance", ("sensitivity", )))))
 
 
@@ -261,11 +298,10 @@ def of_part(name, part):
 
 #: what stands in place of a chapter that has not been made
 NOT_STUDIED = {
-    "converge": "Not studied: no converge.json stands beside this ensemble. bergtow converge CASE.yml says what of the "
-                "computation (width, length, time step, tolerance, start) the result depends on.",
-    "budget": "Not studied: no budget.json stands beside this ensemble. bergtow budget STUDY.yml says how much of the "
-              "scatter is of the fields, and how much of each value that is assumed; no interval of this report holds "
-              "the latter.",
+    "converge": "Not studied: whether the result depends on width and length of the domain, time step, tolerance and "
+                "start is not known. bergtow converge CASE.yml examines it.",
+    "budget": "Not studied: how much the values that are assumed change the result is not known, and no interval of "
+              "this report covers it. bergtow budget STUDY.yml examines it.",
 }
 
 
@@ -338,7 +374,7 @@ def context(folder, place=None, given=None, also=()):
     if s["holes"]:
         print(f"report.py: warning: {s['holes']}", file=sys.stderr)
     intro, found = sections(ensemble_text.report(s, markdown=True))
-    rows, other_builds = provenance(e)
+    (rows, other_builds), rows_of = provenance(e), members(e, s)
     values, texts, attributes = first_run(e)
     values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
               for v in varied(e, values)]
@@ -353,11 +389,11 @@ def context(folder, place=None, given=None, also=()):
         "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
         "method": report_method.method(s, case), "limits": report_method.limits(s, case),
-        "assumed": [v for v in values if v.kind not in ("source", "default", "unused", "field")
+        "assumed": [v for v in values if (v.kind not in ("source", "default", "unused", "field") or v.key in DECIDE)
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
         "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
-        "members": members(e, s), "counts": counts, "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
+        "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts, "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
     }

@@ -40,7 +40,8 @@ def method(s, case):
         "push each other by non-negative impulses with Coulomb friction, solved together in every time step (planar "
         "non-smooth discrete element method, after Yulmetov & Løset 2017, Cold Reg. Sci. Technol. 138). Drag of water "
         "and air, added mass and the Coriolis force act on floes and body. The force of the ice on the body is the "
-        "sum of these impulses over the time step.",
+        "sum of these impulses over the time step. The tow force is the force along the tow: ice resistance, drag of "
+        "water and air, Coriolis force, slope of the sea and inertia. A force across the tow is not in it.",
         _amount(s)
     ]
     tows = [c["design"]["tow"] for c in s["conditions"] if c["design"]["tow"]]
@@ -48,12 +49,15 @@ def method(s, case):
         return out
     out.append(
         f"{loads_text.asked(s)}. This is the level of the return time −T / ln(1 − p), "
-        f"{_span([d['return_hours'] for d in tows])} h. The load is first averaged by a moving mean over that time "
-        "scale, so that pushes and collisions count by their impulse; what stands out above a threshold is gathered "
-        "into clusters, to whose maxima a generalised Pareto distribution is fitted (block maxima and a generalised "
-        "extreme value distribution where there are too few clusters). Intervals hold 95 % and come from the profile "
-        f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on. At least "
-        f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are asked for; otherwise there "
+        f"{_span([d['return_hours'] for d in tows])} h: the level that is exceeded once in so long on average, all of "
+        "it towed in that condition. The load is first averaged by a moving mean over "
+        f"{_span([d['time_scale_s'] for d in tows])} s, so that pushes and collisions count by their impulse. "
+        "Excursions above a threshold are gathered into clusters, to whose maxima a generalised Pareto distribution "
+        "is fitted (block maxima and a generalised extreme value distribution where there are too few clusters). The "
+        "95 % intervals come from the profile "
+        f"likelihood, widened by the scatter between fields from {stat_profile.LEAST_FIELDS} fields on; each condition "
+        "is fitted by itself, so their ends need not rise with the concentration. At least "
+        f"{stat_extreme.LEAST_EXCESSES} clusters or {stat_extreme.LEAST_BLOCKS} blocks are required; otherwise there "
         "is no value.")
     if any(c["design"]["tension"] for c in s["conditions"]):
         out.append("Line tensions are treated in the same way, branch by branch; the largest of the branches is "
@@ -63,7 +67,7 @@ def method(s, case):
 
 def limits(s, case):
     """Sentences on what the model leaves out, the gravest first."""
-    out = ["No force of this model has been held against a measured tow: behaviour seen in basins was reproduced, "
+    out = ["No force of this model has been compared with a measured tow: behaviour seen in basins was reproduced, "
            "forces were not validated."]
     if case is None:
         return out
@@ -73,13 +77,20 @@ def limits(s, case):
         out.append("Floes are rigid: they neither break, bend, crush nor raft, so nothing limits the force of a jam"
                    + (f", and from {100 * RIGID:.0f} % of ice on floes jam." if dense else "."))
     else:
-        ways = [word for word in (_one(texts, "ice.rafting.kappa", "they raft, κ =")
-                                  if texts.get("ice.rafting.kappa", "0") != "0" else "",
-                                  _one(texts, "ice.crushing.pressure", "their edges crush at")
-                                  if not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ") else "") if word]
-        out.append(f"Floes are otherwise rigid, {' and '.join(ways)}; they neither break nor bend.")
+        rafts = texts.get("ice.rafting.kappa", "0") != "0"
+        crushes = not texts.get("ice.crushing.pressure", "0 Pa").startswith("0 ")
+        ways = [word for word in (
+            _one(texts, "ice.rafting.kappa", "they slide over each other (raft) above a load that grows with the "
+                 "square of their thickness, κ =") if rafts else "",
+            _one(texts, "ice.crushing.pressure", "their edges crush at") if crushes else "") if word]
+        never = ["break", "bend", *["crush"] * (not crushes), *["raft"] * (not rafts)]
+        out.append(f"Floes are rigid except that {' and '.join(ways)}. They do not {', '.join(never[:-1])} or "
+                   f"{never[-1]}.")
     out.append("The motion is planar: the body neither heaves, rolls nor pitches, ice does not pass below it, and "
                "there are no waves.")
+    if texts.get("domain.ends") == "open" and texts.get("domain.sides") != "walls":
+        out.append("The ice is not confined along the tow: pressure in the pack by wind, current or a shore is not in "
+                   "the force.")
     out.append({
         "speed": "The tow holds its speed whatever it takes: there is no line and no vessel that would slow down, so "
                  "the tow force holds no dynamics of the line.",
@@ -92,8 +103,8 @@ def limits(s, case):
         out.append("No vessel is judged: the case names no bollard pull.")
     out.append("Loads of collisions come from impulses by the conversion that the case names; mean forces and the "
                "design tow force do not depend on it.")
-    out.append("The intervals hold the scatter of the fields and the error of the fit. They hold neither the values "
-               "that are assumed nor the choice of the model.")
+    out.append("The intervals cover the scatter of the fields and the error of the fit. They cover neither the values "
+               "that are assumed nor the choice of the model, and there is no safety factor in any number.")
     return out
 
 
@@ -109,11 +120,12 @@ def holds(case, s):
             f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})"
             if np.isfinite(v["interval_95"]).all() else "") for label, v in made)))
     rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
-                 if np.isfinite(case.breaking_load) else "none in the case: the line must bear the tension above"
-                 if case.mode != "speed" else "no line in the case: it must bear the tow force above, "
-                 "which holds no dynamics of a line"))
+                 if np.isfinite(case.breaking_load) else "none in the case; the tension above is without a safety factor"
+                 if case.mode != "speed" else "no line in the case: the tow force above is without dynamics of a line "
+                 "and without a safety factor"))
     rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
-                 if np.isfinite(case.bollard_pull) else "no vessel in the case: it must hold the tow force above"))
+                 if np.isfinite(case.bollard_pull) else "no vessel in the case: its net pull at the speed of the tow, "
+                 "after its own resistance in ice, must exceed the tow force"))
     return rows
 
 
@@ -142,7 +154,8 @@ def _convergence(found):
 def beyond(results):
     """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py."""
     budget, converge = results.get("budget"), results.get("converge")
-    rows = [("values that are assumed, standard deviation", "not studied" if budget is None else "; ".join(
+    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and draft "
+             "were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None

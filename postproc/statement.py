@@ -7,6 +7,7 @@ Warnings are facts about the model or the sample that an interval does not hold:
 domain that is too narrow, windows that are not steady, a tail that is extrapolated far, a start-up, which no number
 holds, that takes more than the value.
 """
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,14 +25,18 @@ SHORT_FIELDS = stat_profile.LEAST_FIELDS
 #: doubts about members (ensemble_read.DOUBTS) that concern the value
 DOUBTFUL = {
     "unconverged": "members with steps that did not converge", "jammed": "members in which the body stood still",
-    "unsteady": "members that are not steady", "short": "members with a short window",
-    "stopped": "members that stopped early"
+    "unsteady": "members whose loads still change within the window",
+    "short": "members with fewer than 20 independent samples", "stopped": "members that stopped early"
 }
 TENSIONS = ("line_tension_1", "line_tension_2")
 #: what stands in the line of what the values hold for: case key, words in front and behind
-HOLDS_FOR = (("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
-             ("body.length", "body of", ""), ("tow.mode", "tow mode", ""), ("tow.speed", "", ""),
-             ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
+HOLDS_FOR = (("body.length", "body of", ""), ("body.draft", "draft", ""), ("body.drag.water_form", "form drag", ""),
+             ("ice.size", "floes of", ""), ("ice.thickness", "", "thick"), ("ice.friction", "friction", ""),
+             ("tow.speed", "", ""), ("domain.width", "domain", "wide"), ("run.dt", "time step", ""))
+TOWED = {"speed": " prescribed", "line": " of the towing end of the line", "thrust": " asked of the vessel"}
+#: what moves water and air: words where all keys are at zero
+STILL = {"no current": ("water.current_x", "water.current_y", "water.tide.major", "water.current_table"),
+         "no wind": ("air.wind_x", "air.wind_y", "air.wind_table")}
 
 
 @dataclass(frozen=True)
@@ -87,11 +92,17 @@ def _of_the_case(e, rows, case, tow):
                     "the value has no upper bound; set ice.crushing.pressure or ice.rafting.kappa",
                     f"{100 * dense:.0f} %"))
     if case is not None and case.mode == "speed":
-        out.append(("the tow holds its speed whatever it takes: no vessel slows down, no line stretches", ""))
-    narrow = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows)
+        out.append(("the speed is prescribed: neither vessel nor line yields", ""))
+    narrow = [text for m in rows for text in e.texts(m) if text.startswith("domain.width:")]
     if narrow:
-        out.append(("the domain is narrow for this ice: the value belongs to its width",
-                    f"{narrow} of {len(rows)} members"))
+        widths = re.findall(r"([\d.]+) body widths", narrow[0])
+        out.append(("the domain is narrow for this ice, and floes can arch to walls or to the periodic image: the value "
+                    "can be too large", f"{widths[0]} body widths; {widths[1]} are asked for" if len(widths) == 2 else
+                    f"{len(narrow)} of {len(rows)} members"))
+    left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
+    if np.nanmax(left, initial=0.0) > 0:
+        out.append(("floes left through the open ends of the domain and resist no more: the value can be too small",
+                    f"{np.sum(left > 0)} of {len(rows)} members, up to {np.nanmax(left):.0f} floes"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
                     quantity(case.bollard_pull, "N")))
@@ -117,9 +128,10 @@ def _of_the_sample(e, rows, c, load):
     if d["times_the_hours_simulated"] > FAR:
         more = int(np.ceil(load["fields"] * d["times_the_hours_simulated"] / FAR))
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
-                    f"{short(d['times_the_hours_simulated'], 2)} times; {more} fields would leave {FAR:g}"))
+                    f"{short(d['times_the_hours_simulated'], 2)} times; with {more} fields {FAR:g} times"))
     if d["irregular"]:
-        out.append(("the fitted tail ends at little more than the largest value simulated", ""))
+        out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, and "
+                    "the value can be too small", f"shape {d['shape']:.2g}"))
     if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
         out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
     return out + _of_the_models(load)
@@ -140,8 +152,10 @@ def _of_the_start(case, load):
     words, force = f"as the largest mean over {load['time_scale_s']:.3g} s", quantity(found["largest"], load["units"])
     ramp = case.ramp if case else 0.0
     if 0 < ramp and found["time_s"] <= ramp + load["time_scale_s"]:
+        inertia = f", of which inertia {quantity(found['inertia'], load['units'])}" if np.isfinite(
+            found.get("inertia", np.nan)) else ""
         return [(f"the start, which is left out, takes more than {than}, {words}, while the ramp of {ramp:.3g} s "
-                 "accelerates the body; a longer ramp takes less", force)]
+                 "accelerates the body; a longer ramp takes less", force + inertia)]
     return [(f"the start, which is left out, takes more than {than}, {words}", f"{force} at {found['time_s']:.3g} s")]
 
 
@@ -190,6 +204,9 @@ def _holds_for(e, case):
     """"floes of 30 m, 1 m thick, ...": of the keys that the study does not vary, values as the case has them."""
     if case is None:
         return ""
-    said = [(case.texts[key], before, behind) for key, before, behind in HOLDS_FOR
-            if key in case.texts and key not in e.parameters]
-    return ", ".join(" ".join(part for part in (before, value, behind) if part) for value, before, behind in said)
+    said = [(case.texts[key], before, behind + (TOWED.get(case.mode, "") if key == "tow.speed" else ""))
+            for key, before, behind in HOLDS_FOR if key in case.texts and key not in e.parameters]
+    still = [words for words, keys in STILL.items() if not any(key in e.parameters for key in keys)
+             and all(case.texts.get(key, "none").split(" ")[0] in ("0", "none") for key in keys)]
+    return ", ".join([" ".join(part for part in (before, value, behind.strip()) if part)
+                      for value, before, behind in said] + still)

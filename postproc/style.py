@@ -162,10 +162,17 @@ def logarithmic(*axis):
         one.set_minor_formatter(NullFormatter())
 
 
+def level_of(axes):
+    """The transform of a level across the picture (axhline), whose y alone is data."""
+    return axes.get_yaxis_transform(which="grid")
+
+
 def in_sight(axes, line):
-    """Is any part of a line, whose numbers are data of the axes, within their limits?"""
+    """Is any part of a line, whose numbers are data of the axes, within their limits? A level is one by its y."""
     x, y = (np.asarray(v, dtype=float) for v in line.get_data())
     (left, right), (low, high) = sorted(axes.get_xlim()), sorted(axes.get_ylim())
+    if line.get_transform() == level_of(axes):
+        left, right = 0.0, 1.0
     known = np.isfinite(x) & np.isfinite(y) & ((y > 0) | (axes.get_yscale() != "log"))
     x, y = np.where(known, x, np.nan), np.where(known, y, np.nan)
     inside = (x >= left) & (x <= right) & (y >= low) & (y <= high)
@@ -182,7 +189,7 @@ def legend_of(axes):
     shown, all_labels = {}, {}
     for handle, label in zip(*axes.get_legend_handles_labels()):
         all_labels[label] = None
-        of_data = isinstance(handle, Line2D) and handle.get_transform() == axes.transData
+        of_data = isinstance(handle, Line2D) and handle.get_transform() in (axes.transData, level_of(axes))
         if label not in shown and (not of_data or in_sight(axes, handle)):
             shown[label] = handle
     return list(shown.values()), list(shown), [label for label in all_labels if label not in shown]

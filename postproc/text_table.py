@@ -2,7 +2,7 @@
 """Tables of text or Markdown, and how numbers stand in them."""
 import numpy as np
 
-FAR = 100.0  # times a level
+FAR = 10.0  # times a level: an end beyond bounds nothing
 
 
 def table(head, rows, markdown):

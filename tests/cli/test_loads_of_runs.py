@@ -83,6 +83,16 @@ def test_a_load_is_that_of_the_series(towed, name):
     assert all(np.isfinite(level["level"]) and level["hours"] > 0 for level in levels)
 
 
+def test_what_inertia_takes_of_the_start(towed):
+    e, s = towed
+    start, found = s["conditions"][0]["loads"]["tow_force"]["start_up"], []
+    for m in range(N):
+        with h5py.File(e.folder(m) / "result.h5") as f:
+            t, x = f["series/time"][:], f["series/inertia_force"][:]
+        found.append(x[(t > start["time_s"] - SCALE + 1e-9) & (t <= start["time_s"] + 1e-9)].mean())
+    assert start["inertia"] == pytest.approx(max(found), rel=1e-9) and start["time_s"] < 12
+
+
 def test_the_branch_that_bears_more_is_designed_for(towed):
     e, s = towed
     c = s["conditions"][0]
@@ -100,7 +110,12 @@ def test_tables_pictures_and_answer_have_them(towed):
     labels = {x["label"] for x in s["conditions"][0]["loads"].values()}
     for table in loads_text.signals(s, False), loads_text.quantiles(s, False):
         assert all(label in table for label in labels)
-    assert "Hull panels, the case: panel" in loads_text.signals(s, False)
+    with h5py.File(e.folder(0) / "result.h5") as f:
+        x, y = f["panels/middle"][:].T
+    p = s["conditions"][0]["panels"]
+    most = int(np.argmax(p["mean"]))
+    bearing = np.degrees(np.arctan2(y[most], x[most])) % 360
+    assert f"Hull panels, the case: panel {most} (at {bearing:.0f}° from" in loads_text.signals(s, False)
     drawn = dict(plot_ensemble.pictures(e, argparse.Namespace(**report_ensemble.OPTIONS), s["conditions"]))
     assert {"above-tow-force", "above-vessel-thrust", "above-line-tension-1", "above-line-tension-2"} <= set(drawn)
     x = s["conditions"][0]["loads"]["vessel_thrust"]

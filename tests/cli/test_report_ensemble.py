@@ -94,7 +94,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
         assert float(row[2]) * factor == pytest.approx(c["resistance"]["mean"], rel=0.006)
         assert [float(v) * factor for v in row[3].split(" to ")] == pytest.approx(c["resistance"]["t_95"], rel=0.006)
     assert rows[1][-1] == "1 J" and rows[0][-1] == "none"
-    estimates = dict(zip(*found["Beside the estimates"][:2]))
+    estimates = dict(zip(*found["Comparison with published estimates"][:2]))
     assert estimates["Lichey-Hellmer"].startswith("80") and "*" in estimates["compaction"]
     assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
     answer = found["Answer"]
@@ -111,7 +111,7 @@ def test_the_answer_is_the_design_statement(tmp_path):
     row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
     wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
     assert abs(newtons(row[1]) - d["value"]) <= max(0.06 * wide, 0.006 * d["value"])
-    assert row[1].endswith("*") == d["beyond_data"] and newtons(row[3]) == pytest.approx(d["mean"], rel=0.006)
+    assert ("*" in row[1]) == d["beyond_data"] and newtons(row[3]) == pytest.approx(d["mean"], rel=0.006)
     ends = row[2].removesuffix(" N").split(" to ")
     assert [float(v) for v in ends if v != "no bound"] == pytest.approx(
         [v for v in d["interval_95"] if np.isfinite(v)], abs=max(0.06 * wide, 0.006 * d["value"]))
@@ -147,7 +147,7 @@ def test_the_tension_is_named_where_there_is_a_line(tmp_path, monkeypatch, mode)
     text, there = (tmp_path / "page.html").read_text(), mode == "line"
     assert ("Design tow force and line tension in broken ice" in text) == there == ("Line tensions are" in text)
     assert ("Design tow force in broken ice" in text) != there and "statistics.json" not in text
-    assert ("the tow force above, which holds no dynamics of a line" in text) != there
+    assert ("the tow force above is without dynamics of a line" in text) != there
     assert "varied, 0 to 45 deg" in text
 
 

@@ -324,10 +324,10 @@ def test_the_sweep_shows_fields_means_and_jams(plain):
 
 
 def test_every_picture_of_a_grid(plain, tmp_path):
-    names = ("sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
+    names = ("above-tow-force", "sweep-ice-concentration", "sweep-tow-speed", "map", "sensitivity", "exceedance")
     result = script("plot_ensemble.py", plain[0], "-o", tmp_path)
     done(result, *(tmp_path / f"{name}.png" for name in names))
-    assert len({pixels(tmp_path / f"{name}.png").tobytes() for name in names}) == 5
+    assert len({pixels(tmp_path / f"{name}.png").tobytes() for name in names}) == 6
 
 
 def test_a_latin_hypercube_is_drawn_by_member(tmp_path):
