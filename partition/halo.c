@@ -88,8 +88,9 @@ static void list_bodies(bt_world *w)
     }
 }
 
-/// Does rank r hold a cell beside (x, y)? It then owns one from (x − 2, y − 2) to (x + 1, y + 1), whose bounds depend on
-/// the speed there, or bodies that the large ones move; and what it sweeps depends on how far (x, y) has converged.
+/// Does rank r hold a cell beside (x, y)? It then owns one from (x − 2, y − 2) to (x + 1, y + 1), whose bounds depend
+/// on the speed there, or has floes there that a large body may move; and what it sweeps depends on how far (x, y) has
+/// converged.
 static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
 {
     const bt_cells *t = w->cells;

@@ -122,7 +122,8 @@ MUTANTS = {
         ("- u->w12 * u->ln[1 - i];", ";", "impulse of the other point stays in the velocity"),
     ]),
     "src/solve/restitution.c": (["unit/test_restitution", "physics/test_impacts",
-                                 "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution", "parallel/test_ranks.py"], [
+                                 "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
+                                 "parallel/test_ranks.py"], [
         ("any = b->restitution[ts->cell[k].contacts[i].b] > 0;", "any = 0;", "no rebound is ever lowered"),
         ("if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;", "", "a wall makes one island of all"),
         ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
