@@ -64,8 +64,8 @@ int bt_cmd_script(int argc, char **argv)
     int code = -1;
     if (bt_comm_world()->size > 1) {
         bt_errors_add(&err,
-                      "%s: is no program of ranks; call it without mpirun or srun: what runs it needs it starts itself, "
-                      "as many at a time as --jobs says",
+                      "%s: is no program of ranks; call it without mpirun or srun: what runs it needs it starts "
+                      "itself, as many at a time as --jobs says",
                       argv[0]);
         return bt_cmd_end(&bt_comm_alone, BT_ERR_USAGE, &err);
     }

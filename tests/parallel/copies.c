@@ -16,8 +16,8 @@
 
 enum { ALONG = 24, ACROSS = 12, STEPS = 300 };
 
-/// Ice at rest, so loose that a floe meets one other at a time; some fly, and a heavy body goes through it towards low x
-/// and y, where others hold the floes that it meets.
+/// Ice at rest, so loose that a floe meets one other at a time; some fly, and a heavy body goes through it towards low
+/// x and y, where others hold the floes that it meets.
 static bt_world *make_world(void)
 {
     const bt_params p = {.dt = 0.1,
