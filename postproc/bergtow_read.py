@@ -283,6 +283,22 @@ class Run:
         return window if np.isfinite(window).all() else None
 
     @property
+    def speed_made_good(self):
+        """Mean speed of the body over the window, m/s: along the chord of a straight tow, which is not faster for a
+        sway on its line, and along the track of one through way-points. NaN without a window of two samples or a
+        body."""
+        if self.window is None or "body_x" not in self:
+            return np.nan
+        t, (start, end) = self["time"], self.window
+        inside = (t >= start) & (t <= end)
+        x, y, t = self["body_x"][inside], self["body_y"][inside], t[inside]
+        if len(t) < 2:
+            return np.nan
+        straight = self.case.get("tow.waypoints", "none") in ("none", "[]")
+        way = np.hypot(x[-1] - x[0], y[-1] - y[0]) if straight else np.hypot(np.diff(x), np.diff(y)).sum()
+        return float(way / (t[-1] - t[0]))
+
+    @property
     def verdict(self):
         """("steady", "not steady" or "too short", the reason); "not judged" of a result that names no verdict: an older
         one, or without a towed body."""

@@ -10,13 +10,16 @@ converge` on the base case (`--converge FILE`, or converge.json in DIR).
 """
 import argparse
 import os
+import re
 import subprocess
 import time
 from pathlib import Path
 
 import command  # first: it has words for packages that are missing
 import findings
+import loads
 import stat_budget
+import stat_load
 from bergtow_read import RunError
 from case_runs import STOPPED, program
 from ensemble_read import Ensemble
@@ -25,7 +28,7 @@ import h5py
 import numpy as np
 
 BUDGET = 15.0  # min
-OF = "mean_ice_resistance_n"
+OF = "mean_ice_resistance_n", "tow_force:99"
 
 
 def run(binary, study, folder, sets, jobs, minutes):
@@ -61,23 +64,72 @@ def assumed(e):
     return out
 
 
-def of_ensemble(e, key=OF, converge=None):
-    """The budget of an ensemble; budget.json. Errors: RunError."""
+def quantile(e, rows, name, share):
+    """({"units", "description"}, values [rows]) of a quantile of a load in the window, as the moving mean over the time
+    scale of loads.py; NaN where a member has no window that is long enough."""
+    scale, out, known = loads.TIME_SCALE / loads.scaling(e, rows), np.full(len(rows), np.nan), None
+    for k, m in enumerate(rows):
+        start, end = e.number("window_start_s", m), e.number("window_end_s", m)
+        some, time = loads.of_member(e, m)
+        for load, x in some:
+            field = stat_load.field_of(time, x, start, end, scale) if load.name == name and np.isfinite(
+                [start, end]).all() else None
+            if field is not None:
+                known, out[k] = load, np.percentile(field["peak"], share)
+    return known and {"units": known.units, "description": f"{known.label} that {100 - share:g} % of the time exceeds, "
+                      f"as the moving mean over {scale:.3g} s"}, out
+
+
+def numbers(e, of):
+    """(its units and description, rows, values) of a number of the summary, or of LOAD:SHARE. Errors: RunError."""
+    if load := re.fullmatch(r"(\w+):(\d+(?:\.\d+)?)", of):
+        share = float(load[2])
+        if not 0 < share < 100:
+            raise RunError(of, "a quantile lies above 0 and below 100 %", "write it as tow_force:99")
+        meaning, values = quantile(e, e.used, load[1], share)
+        if meaning is None:
+            raise RunError(e.file, f"has no load {load[1]} with a window of {stat_load.LEAST_SCALES} time scales",
+                           "name another with --of, or run longer")
+    elif of in e.summary:
+        meaning, values = e.meaning.get(of, {}), e.summary[of][e.used]
+    else:
+        raise RunError(e.file, f"has no number {of}", "see bergtow --list-quantities; a quantile is LOAD:SHARE")
+    there = np.isfinite(values)
+    return meaning, e.used[there], values[there]
+
+
+def those_there(e):
+    """The numbers of OF that an ensemble has; of a quantile that is left out the reason is printed."""
+    out = [OF[0]]
+    for of in OF[1:]:
+        try:
+            numbers(e, of)
+            out.append(of)
+        except RunError as error:
+            print(f"budget.py: left out: {of}: {error.reason}")
+    return out
+
+
+def of_ensemble(e, of=OF[0], converge=None):
+    """The budget of a number of an ensemble; what the computation adds is known of means alone. Errors: RunError."""
     if "sampling: latin-hypercube" not in e.study:
         raise RunError(e.file, "is no Latin hypercube", "set sampling: latin-hypercube and samples in the study")
     if "fields: common" in e.study:
         raise RunError(e.file, "has common fields, whose scatter is in all conditions alike", "set fields: own")
-    if key not in e.summary:
-        raise RunError(e.file, f"has no number {key}", "see bergtow --list-quantities")
-    rows = e.used[np.isfinite(e.summary[key][e.used])]
-    meaning = e.meaning.get(key, {})
-    found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], e.summary[key][rows],
-                               (converge or {}).get("rows", ()))
+    meaning, rows, values = numbers(e, of)
+    found = stat_budget.budget({k: v[rows] for k, v in e.parameters.items()}, e.condition[rows], values,
+                               (converge or {}).get("rows", ()) if ":" not in of else ())
     if "refused" in found:
         raise RunError(e.file, f"has too few members for a budget: {found['refused']}", "run the study further")
-    units = meaning.get("units") or ("N" if key.endswith("_n") else "")
-    return found | {"title": e.title, "of": key, "units": str(units),
-                    "meaning": str(meaning.get("description") or key), "assumed": assumed(e), "wanted": e.n}
+    units = meaning.get("units") or ("N" if of.endswith("_n") else "")
+    return found | {"title": e.title, "of": of, "units": str(units),
+                    "meaning": str(meaning.get("description") or of), "assumed": assumed(e), "wanted": e.n}
+
+
+def of_all(e, some, converge):
+    """The budget of the first number, with those of the others as "more"; budget.json."""
+    first, *more = (of_ensemble(e, of, converge) for of in some)
+    return first | {"more": more}
 
 
 def read_converge(path, folder):
@@ -94,7 +146,8 @@ def main(argv=None):
                                 "fields, of each parameter, and of the computation.")
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
-    p.add_argument("--of", default=OF, metavar="NUMBER", help=f"number of the summary (default {OF})")
+    p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a quantile "
+                   f"of a load in %%, as the moving mean over its time scale; may be repeated (default: {', '.join(OF)})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
                    "computation adds")
     findings.add_options(p, BUDGET)
@@ -102,7 +155,8 @@ def main(argv=None):
     folder = a.output or Path("out") / a.study.stem
     findings.begin("budget", a.study, "study", folder, a.force)
     run(program(), a.study, folder, a.set, a.jobs, a.budget)
-    findings.keep("budget", of_ensemble(Ensemble(folder), a.of, read_converge(a.converge, folder)), folder, a.force)
+    e = Ensemble(folder)
+    findings.keep("budget", of_all(e, a.of or those_there(e), read_converge(a.converge, folder)), folder, a.force)
 
 
 if __name__ == "__main__":

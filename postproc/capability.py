@@ -53,15 +53,10 @@ def trial(run, number):
     """Of a run that is there. Errors: RunError."""
     if run.window is None:
         raise RunError(run.path, "the run has no window", "make run.duration longer")
-    t, (start, end) = run["time"], run.window
-    inside = (t >= start) & (t <= end)
-    x, y, t = run["body_x"][inside], run["body_y"][inside], t[inside]
-    if len(t) < 2:
+    speed = run.speed_made_good
+    if not np.isfinite(speed):
         raise RunError(run.path, "the window holds one sample", "make it longer, or output.sample_every less")
-    # a straight tow that sways on its line is not faster for it
-    straight = run.case.get("tow.waypoints", "none") in ("none", "[]")
-    way = np.hypot(x[-1] - x[0], y[-1] - y[0]) if straight else np.hypot(np.diff(x), np.diff(y)).sum()
-    return Trial(number, way / (t[-1] - t[0]),
+    return Trial(number, speed,
                  any(e["kind"] == "line_broken" for e in run.summary.get("events") or []),
                  run.number("mean_tow_force_n"), run.number("peak_line_tension_n"))
 

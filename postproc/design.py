@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import command
+import findings
 import pdf
 import report
 from bergtow_read import Run, RunError
@@ -86,6 +87,11 @@ def reads_ice(case):
     return isinstance(ice, dict) and any(str(ice.get(k, "none")) != "none" for k in ("outlines", "field"))
 
 
+def says(case, section, key):
+    """What a case says of a key, None where it says nothing."""
+    return case[section].get(key) if isinstance(case.get(section), dict) else None
+
+
 def title_of(case, name, values):
     run = case.get("run")
     title = run.get("title") if isinstance(run, dict) else None
@@ -105,6 +111,8 @@ def write_study(a, case, repeats):
     }
     if values:
         study["parameters"] = {"ice.concentration": values}
+    if says(case, "output", "panels") is None and says(case, "tow", "mode") != "none":
+        study["set"] = {"output.panels": True}
     path = a.output / "design.yml"
     text = yaml.safe_dump(study, sort_keys=False, allow_unicode=True)
     command.write_text(f"# {command.MARK}\n{text}", path, a.force)
@@ -126,6 +134,15 @@ def seconds_a_field(e):
     return sum(np.mean(some) for some in took.values())
 
 
+def seconds_of_the_longest(e):
+    """Wall time of the member that took longest: a replay takes no more."""
+    out = 0.0
+    for m in np.flatnonzero(e.status == FINISHED):
+        with Run(e.folder(m)) as run:
+            out = max(out, run.number("wall_time_s"))
+    return out
+
+
 def run_case(work, a, case):
     """Fields of a case as the budget allows. Errors: RunError."""
     n = min(FIRST, a.fields)
@@ -134,6 +151,8 @@ def run_case(work, a, case):
         raise RunError(a.file, f"{a.budget:g} min do not reach for one field of each condition",
                        "raise --budget; what was begun is kept, and the same call goes on")
     rate = seconds_a_field(Ensemble(a.output)) / work.jobs
+    if not a.no_replay:
+        work.end -= seconds_of_the_longest(Ensemble(a.output))
     print(f"a field of all conditions takes {rate * work.jobs:.0f} s of a core")
     while whole_round and n < a.fields:
         more = min(int(MARGIN * work.left() / rate), a.fields - n)
@@ -219,6 +238,9 @@ def arguments(argv):
                    help="runs at a time (default: the cores)")
     p.add_argument("--no-pdf", action="store_true", help="the page alone")
     p.add_argument("--no-replay", action="store_true", help="no replay of a tow")
+    p.add_argument("--also", metavar="DIR", action="append", type=Path, default=[],
+                   help="take results of converge, budget and capability from this folder into the report; may be "
+                   "repeated")
     p.add_argument("--quiet", action="store_true", help="no line for each member")
     for name in TITLE_BLOCK:
         p.add_argument(f"--{name}", metavar="TEXT", help=f"{name} in the title block")
@@ -236,6 +258,10 @@ def main(argv=None):
     if not a.no_pdf:
         pdf.browser()
     made = ["report.html"] + ["report.pdf"] * (not a.no_pdf)
+    for folder in a.also:
+        if not any((folder / f"{name}.json").is_file() for name in findings.KINDS):
+            raise RunError(folder, f"holds none of {', '.join(f'{name}.json' for name in findings.KINDS)}",
+                           "name the folder of bergtow converge, budget or capability with --also")
     for name in made + ["replay.html"] * (not a.no_replay) + ["design.yml"] * (not study):
         command.may_write(a.output / name, a.force)
     a.output.mkdir(parents=True, exist_ok=True)
@@ -246,7 +272,7 @@ def main(argv=None):
         work.ensemble(a.file)
     else:
         layers = files(a.file)
-        run_case(work, a, {name: section(layers, name) for name in ("run", "ice")})
+        run_case(work, a, {name: section(layers, name) for name in ("run", "ice", "tow", "output")})
     if not a.no_replay:
         make_replay(work, a, began + 60 * a.budget - time.monotonic() if a.budget else np.inf)
     report.write_all(a.output, [a.output / name for name in made], a)

@@ -52,12 +52,24 @@ class Condition:
 
     @property
     def label(self):
-        words = []
-        for key, value in self.values.items():
-            unit = self.units[key]
-            words.append(f"{short_key(key)} " + (value if isinstance(value, str) else f"{value:.4g}" +
-                                                 (f" {unit}" if unit not in ("", "1") else "")))
-        return ", ".join(words) or "the case"
+        return ", ".join(worded(key, value, self.units[key]) for key, value in self.values.items()) or "the case"
+
+
+def reading(key, unit):
+    """(factor, unit) in which a key reads: a concentration in %, an angle in degrees; unit "" for a plain number."""
+    if key == "ice.concentration":
+        return 100.0, "%"
+    if unit in ("rad", "rad/s"):
+        return 180.0 / np.pi, unit.replace("rad", "deg")
+    return 1.0, "" if unit == "1" else unit
+
+
+def worded(key, value, unit, digits=4):
+    """"concentration 60 %", "ice size 30 m": a value that was varied; unit: that of the value, "1" or "" for none."""
+    if isinstance(value, str):
+        return f"{short_key(key)} {value}"
+    factor, unit = reading(key, unit)
+    return f"{short_key(key)} {factor * value:.{digits}g} {unit}".rstrip()
 
 
 def short_key(key):

@@ -255,7 +255,8 @@ def report(s, markdown=False):
                      ", ".join(f"{name} ({', '.join(kinds)})" for name, kinds in s["excluded"].items()) + ".")
     doubtful = sum(c["members"]["doubtful"] for c in s["conditions"])
     if doubtful:
-        lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers; --exclude leaves them out.")
+        lines.append(f"{doubtful} of {n} members carry warnings and are in the numbers" +
+                     ("." if markdown else "; --exclude leaves them out."))
     if s["members_without_folder"]:
         lines.append(
             f"{counted(len(s['members_without_folder']))} {'has' if len(s['members_without_folder']) == 1 else 'have'} "
@@ -271,7 +272,8 @@ def report(s, markdown=False):
         lines.append(f"More than half of the mean comes from one field: {'; '.join(heavy)}. Read the median there.")
     if s["convergence"]:
         lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
-    for title, part in (("Loads", loads_text.signals), ("Return levels of loads", loads_text.returns),
+    for title, part in (("Loads", loads_text.signals), ("Quantiles of loads", loads_text.quantiles),
+                        ("Return levels of loads", loads_text.returns),
                         ("Mean ice resistance", means), ("Beside the estimates", estimates), ("Distributions", fits),
                         ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
         lines += ["", heading(title), "", part(s, markdown)]

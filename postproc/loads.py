@@ -28,6 +28,7 @@ TOW_HOURS = 24.0      # h, full scale
 PROBABILITY = 0.05
 ALWAYS = ("tow_force", "ice_resistance")
 ROLE = "load"
+LOCAL = ("floe_force", "panel_load")  # on a part of the hull
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import text_table
 from text_table import number, pair, scale, table
 
 NAMES = {"over_threshold": "GPD", "block_maxima": "GEV"}
+SHOWN = 5, 50, 95, 99  # quantiles in a table, %
 MOST_NAMED = 5  # conditions of a warning
 
 
@@ -108,16 +109,14 @@ def _unit(s, name):
 
 
 def signals(s, markdown):
-    """Mean, standard deviation and quantiles of every load."""
-    head = ["condition", "load", "mean", "interval", "sd", "5 %", "50 %", "95 %", "99 %", "largest", "in the start",
-            "unit", "over", "hours"]
+    """Mean, standard deviation and largest value of every load."""
+    head = ["condition", "load", "mean", "95 %", "sd", "95 %", "largest", "in the start", "unit", "over", "hours"]
     rows = []
     for name in names(s):
         factor, unit, first = _unit(s, name)
         def cells(x, factor=factor, unit=unit, first=first):
-            q, start = {k: number(v["value"] / factor) for k, v in x["quantiles"].items()}, x["start_up"]
-            return [first["label"], number(x["mean"]["value"] / factor), pair(x["mean"]["interval_95"], factor),
-                    number(x["sd"]["value"] / factor), q["5"], q["50"], q["95"], q["99"],
+            start = x["start_up"]
+            return [first["label"], *estimate(x["mean"], factor), *estimate(x["sd"], factor),
                     number(x["largest"] / factor), number(start and start["largest"] / factor), unit,
                     f"{x['time_scale_s']:.3g} s", number(x["hours"])]
         rows += _rows_of(s, name, cells)
@@ -125,8 +124,27 @@ def signals(s, markdown):
         return "No loads: no member has a window with a towed body."
     note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given. In "
             "the start: the largest before the window, which is in no other number. "
-            "Interval: 95 %, of the mean over fields.")
+            "95 %: interval over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
+
+
+def estimate(found, factor):
+    """Cells of a number and its interval."""
+    return number(found["value"] / factor), pair(found["interval_95"], factor)
+
+
+def quantiles(s, markdown):
+    """Quantiles of every load with their intervals."""
+    rows = []
+    for name in names(s):
+        factor, unit, first = _unit(s, name)
+        def cells(x, factor=factor, unit=unit, first=first):
+            return [first["label"], *("{} ({})".format(*estimate(x["quantiles"][str(q)], factor)) for q in SHOWN), unit]
+        rows += _rows_of(s, name, cells)
+    if not rows:
+        return "No loads: no member has a window with a towed body."
+    return table(["condition", "load", *(f"{q} % of the time below" for q in SHOWN), "unit"], rows, markdown) + \
+        "\n\nOf the same moving mean. Brackets: 95 %, over fields."
 
 
 def conversions(s):

@@ -37,8 +37,9 @@ def _draw(axes, x, some, factor, top, colour, label):
         axes.plot(x[at][beyond], np.full(beyond.sum(), top) / factor, "^", color=colour, markersize=7, zorder=5)
 
 
-def draw(conditions, numeric, axis_label):
-    """The figure; None where nothing is towed. numeric: keys whose values are numbers; axis_label: key -> words."""
+def draw(conditions, numeric, axis_label, times):
+    """The figure; None where nothing is towed. numeric: keys whose values are numbers; axis_label: key -> words; times:
+    key -> factor of the numbers on the axis."""
     tows = [c["design"]["tow"] for c in conditions]
     if not any(tows):
         return None
@@ -62,7 +63,7 @@ def draw(conditions, numeric, axis_label):
     ends = [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ()) if np.isfinite(v)]
     axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
     axes.set_ylabel(f"force ({unit})")
-    axes.set_xticks(x, [f"{v:.4g}" for v in x] if key else [c["label"] for c in conditions],
+    axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"] for c in conditions],
                     **({} if key else {"rotation": 20, "ha": "right"}))
     axes.set_xlabel(axis_label(key) if key else "")
     axes.grid(True, axis="y")

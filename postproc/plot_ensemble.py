@@ -24,7 +24,7 @@ import stat_mean
 import style
 from bergtow_read import RunError
 from ensemble import add_load_options, extremes, member, nothing_to_count, sensitivity
-from ensemble_read import DOUBTS, Ensemble, short_key
+from ensemble_read import DOUBTS, Ensemble, reading, short_key, worded
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -41,8 +41,8 @@ def numeric(e):
 
 
 def axis_label(e, key):
-    unit = e.units[key]
-    return short_key(key) + (f" ({unit})" if unit not in ("", "1") else "")
+    unit = reading(key, e.units[key])[1]
+    return short_key(key) + (f" ({unit})" if unit else "")
 
 
 def groups(e, key):
@@ -53,8 +53,7 @@ def groups(e, key):
             found.setdefault(tuple((k, v) for k, v in c.values.items() if k != key), []).append(c)
     def words(others):
         varied = [(k, v) for k, v in others if len(set(e.parameters[k].tolist())) > 1]
-        return ", ".join(f"{short_key(k)} {v}" if isinstance(v, str) else f"{short_key(k)} {v:.3g}" +
-                         (f" {e.units[k]}" if e.units[k] not in ("", "1") else "") for k, v in varied)
+        return ", ".join(worded(k, v, e.units[k], 3) for k, v in varied)
     return [(words(others), sorted(some, key=lambda c: c.values[key])) for others, some in found.items()]
 
 
@@ -262,6 +261,7 @@ def draw_sweep(e, key):
             style.logarithmic(axes.yaxis)
     grid.flat[0].set_ylim(low / factor, high / factor)
     if not log_x:
+        style.times(grid.flat[0].xaxis, reading(key, e.units[key])[0])
         margin = 0.06 * (values.max() - values.min())
         grid.flat[0].set_xlim(max(0.0,
                                   values.min() - margin),
@@ -347,6 +347,7 @@ def draw_scatter(e, key):
     if log_y:
         style.logarithmic(axes.yaxis)
         axes.set_ylim(0.5 * y.min() / factor, 2 * y.max() / factor)
+    style.times(axes.xaxis, reading(key, e.units[key])[0])
     axes.set_xlabel(axis_label(e, key))
     axes.set_ylabel(f"mean ice resistance ({unit})")
     axes.grid(True)
@@ -469,6 +470,44 @@ def draw_returns(e, conditions, name):
     return figure
 
 
+def draw_above(e, conditions, name):
+    """Figure of the share of the time that a load is above a level, with its 95 % over fields; None where no condition
+    has the load."""
+    some = [c for c in conditions if name in c["loads"]]
+    if not some:
+        return None
+    step = max(1, -(-len(some) // MOST_LINES))
+    shown, first = some[::step], some[0]["loads"][name]
+    levels = [[row["level"] for row in c["loads"][name]["exceedance"]] for c in shown]
+    factor, unit = style.scale([np.median([row[-1] for row in levels])], first["units"])
+    figure, axes = plt.subplots(figsize=(9.2, 4.6))
+    figure.subplots_adjust(left=0.09, right=0.66, top=0.84, bottom=0.15)
+    least = 1.0
+    for colour, c, level in zip(CYCLE, shown, levels):
+        x, level = c["loads"][name], np.array(level) / factor
+        share = np.array([row["share_of_time"]["value"] for row in x["exceedance"]])
+        low, high = np.array([row["share_of_time"]["interval_95"] for row in x["exceedance"]], dtype=float).T
+        least = min(least, share[share > 0].min(initial=1.0))
+        axes.plot(level, 100 * share, color=colour, linewidth=1.6,
+                  label=f"{c['label']}\n{x['fields']} fields, {x['hours']:.3g} h")
+        axes.fill_between(level, 100 * np.fmax(low, 1e-9), 100 * np.fmax(high, 1e-9), where=np.isfinite(low),
+                          color=colour, alpha=0.15, linewidth=0)
+    style.logarithmic(axes.yaxis)
+    axes.set_ylim(50 * least, 100)
+    axes.set_xlabel(f"{first['label']} ({unit}), " +
+                    (f"collisions as {first['conversion']}" if first["conversion"] else
+                     f"mean over {first['time_scale_s']:.3g} s"))
+    axes.set_ylabel("share of the time above (%)")
+    axes.grid(True)
+    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8.8, labelspacing=0.9)
+    notes = ["from the median of a condition to the", "largest value simulated; band: 95 % over fields"]
+    if step > 1:
+        notes.append(f"one in {step} of {len(some)} conditions is shown")
+    figure.text(0.675, 0.13, "\n".join(notes), fontsize=9, color=style.FAINT, va="bottom")
+    headline(figure, e, f"share of the time above a level of {first['label']}")
+    return figure
+
+
 def draw_map(e, first, second):
     """Figure of two heat maps over two parameters of a grid: mean over the others' conditions, and half the 95 %
     interval over it."""
@@ -503,8 +542,9 @@ def draw_map(e, first, second):
                     va="center",
                     fontsize=9.5,
                     color=style.ON_DARK if shade > 0.5 else style.ON_LIGHT)
-        ax.set_xticks(np.arange(len(xs)) + 0.5, [f"{v:.3g}" for v in xs])
-        ax.set_yticks(np.arange(len(ys)) + 0.5, [f"{v:.3g}" for v in ys])
+        for set_ticks, key, some in ((ax.set_xticks, first, xs), (ax.set_yticks, second, ys)):
+            times = reading(key, e.units[key])[0]
+            set_ticks(np.arange(len(some)) + 0.5, [f"{times * v:.3g}" for v in some])
         ax.tick_params(length=0)
         for side in ax.spines.values():
             side.set_visible(False)
@@ -580,6 +620,9 @@ def pictures(e, options, conditions):
     names = dict.fromkeys(name for c in conditions for name, x in c["loads"].items()
                           if "refused" not in x["over_threshold"])
     out = [(f"returns-{name.replace('_', '-')}", lambda name=name: draw_returns(e, conditions, name)) for name in names]
+    out += [(f"above-{name.replace('_', '-')}", lambda name=name: draw_above(e, conditions, name))
+            for name in dict.fromkeys(name for c in conditions for name in c["loads"])
+            if name != "ice_resistance" and name not in loads.LOCAL]
     out += [(f"sweep-{key.replace('.', '-')}", lambda key=key: (draw_scatter if e.sampled else draw_sweep)(e, key))
            for key in keys]
     if not e.sampled and len(keys) >= 2:

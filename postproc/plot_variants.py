@@ -11,7 +11,7 @@ from scipy import stats
 
 import stat_mean
 import style
-from ensemble_read import short_key
+from ensemble_read import worded
 
 KEY = "variant"
 
@@ -57,7 +57,7 @@ def panels(e):
         changes = [(name, np.mean(list(of[name].values())),
                     *relative_change(of[name], of[first], bool(seeds[name] & seeds[first])))
                    for name in order[1:] if name in of]
-        words = ", ".join(f"{short_key(k)} {v}" if isinstance(v, str) else f"{short_key(k)} {v:.3g}" for k, v in others)
+        words = ", ".join(worded(k, v, e.units[k], 3) for k, v in others)
         out.append((words, first, np.mean(list(of[first].values())), changes))
     return out
 

@@ -117,7 +117,7 @@ def pages(folder, paths, a):
     # the second alone: it has only just begun
     if any((folder / name).exists() for name in ("ensemble.h5", "study.resolved.yml")):
         import report_ensemble  # and with it the statistics, which a run has no need of
-        template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, getattr(a, "also", ()))
+        template, context = "ensemble.html", report_ensemble.context(folder, paths[0], given, a.also)
     else:
         with Run(folder) as run:
             template, context = "run.html", report_run.context(run, 1e6 * a.size, not a.no_compression, given)

@@ -27,7 +27,7 @@ import style
 import text_table
 from bergtow_read import Run, RunError
 from report_case import scrubbed
-from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble
+from ensemble_read import DOUBTS, FAILED, FINISHED, Ensemble, reading
 
 import numpy as np
 
@@ -42,8 +42,13 @@ OPTIONS = {
 }
 
 
+def unbroken(text):
+    """With a percent sign that stays on the line of its number."""
+    return text.replace(" %", "\u00a0%")
+
+
 def cells(line):
-    return [cell.strip() for cell in line.strip().strip("|").split(" | ")]
+    return [unbroken(cell.strip()) for cell in line.strip().strip("|").split(" | ")]
 
 
 def blocks(markdown):
@@ -108,19 +113,20 @@ def design_row(c):
     """Cells of a condition in the answer."""
     tow, tension = c["design"]["tow"], c["design"]["tension"]
     if tow is None:
-        return [c["label"], "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
+        return [unbroken(c["label"]), "–", "no tow force" if c["resistance"]["n"] else "no field finished", *["–"] * 7]
     def cells(d):
         if d is None or "value" not in d:
             return ["–", "no value" if d else "–"]
         value, interval = worth(d["value"], *d["interval_95"])
         return [value + marks(d), interval]
-    return [c["label"], *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
+    return [unbroken(c["label"]), *cells(tow), *cells(tension), worth(tow["mean"], *tow["mean_95"])[0],
             report_run.force(tow["largest"]), report_run.force((tow["start_up"] or {}).get("largest")),
             str(tow["fields"]), text_table.number(tow["hours"])]
 
 
-def answer(e, s, case):
-    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for."""
+def answer(e, s, case, results):
+    """Blocks of the first chapter: the statement, the table, the figure, line and vessel, what it holds for; results:
+    those of other commands, as results_beside() has them."""
     rows = [design_row(c) for c in s["conditions"]]
     head = ["condition", "design tow force", "95 % interval", "design line tension", "95 % interval", "mean tow force",
             "largest simulated", "in the start", "fields", "hours"]
@@ -133,13 +139,16 @@ def answer(e, s, case):
         head, rows = head[:-3] + head[-2:], [row[:-3] + row[-2:] for row in rows]
     asked, held = loads_text.asked(s), sorted({c["design"]["holds_for"] for c in s["conditions"]} - {""})
     figure = report_run.picture("design", "Design tow force of each condition", lambda: plot_design.draw(
-        s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key)))
+        s["conditions"], plot_ensemble.numeric(e), lambda key: plot_ensemble.axis_label(e, key),
+        lambda key: reading(key, e.units[key])[0]))
     out = [lines(asked[0].upper() + asked[1:] + ".")] if asked else []
     carried = "".join(cell for row in rows for cell in row[1:])
     notes = [f"{mark} {words}" for mark, words in FOOTNOTES.items() if mark in carried] + notes
     out += [table(head, rows), lines(" ".join(notes), faint=True)]
     out += [figure] if figure else []
-    out += [{"kind": "pairs", "label": "line and vessel", "rows": report_method.holds(case, s)}] if case else []
+    beyond = report_method.beyond({name: found for name, (_, found) in results.items()})
+    out += [{"kind": "pairs", "label": "line, vessel, and what the intervals do not hold",
+             "rows": report_method.holds(case, s) + beyond}] if case else []
     return out + [lines(f"Holds for: {'; or '.join(held)}.")] * bool(held)
 
 
@@ -168,7 +177,7 @@ def members(e, s):
         row = by_name.get(e.name[m])
         mean, interval = report_run.with_interval(row["mean"], *row["within_95"]) if row else ("–", "–")
         out.append({
-            "name": e.name[m], "condition": labels[e.condition[m]], "seed": int(e.seed[m]),
+            "name": e.name[m], "condition": unbroken(labels[e.condition[m]]), "seed": int(e.seed[m]),
             "status": STATUS.get(int(e.status[m]), "waiting"), "mean": mean, "interval": interval,
             "doubts": ", ".join(sorted(e.doubts(m))),
             "reported": [scrubbed(w) for w in (reported(e, m) if e.status[m] == FINISHED else [e.reason[m]]) if w]
@@ -205,6 +214,8 @@ def caption(name):
     """Words for a picture of plot_ensemble.py by its name, "sweep-ice-concentration"."""
     if name.startswith("sweep-"):
         return "Mean ice resistance against " + name[6:].replace("-", ".", 1)
+    if name.startswith("above-"):
+        return f"How much of the time the {name[6:].replace('-', ' ')} is above a level"
     if name.startswith("returns-"):
         return f"How often the {name[8:].replace('-', ' ')} is exceeded"
     return {
@@ -220,7 +231,7 @@ def pictures(e, options, s):
 
 
 #: chapters of the tables of ensemble_text.py: heading, tables, beginnings of the names of the pictures behind each
-CHAPTERS = (("Loads", (("Loads", ()), ("Return levels of loads", ("returns", )),
+CHAPTERS = (("Loads", (("Loads", ()), ("Quantiles of loads", ("above", )), ("Return levels of loads", ("returns", )),
                        ("Peaks of collisions", ("exceedance", )))),
             ("Mean ice resistance",
              (("Mean ice resistance", ("sweep", "map", "variants")), ("Beside the estimates", ()),
@@ -248,13 +259,37 @@ def of_part(name, part):
     return part["heading"], blocks(scrubbed(part["markdown"])) + ([drawn] if drawn else [])
 
 
-def beside(folders):
-    """Chapters that other scripts left in one of the folders; convergence is named even where nothing was."""
-    parts = {name: next(filter(None, (findings.chapter(name, f) for f in folders)), None) for name in findings.KINDS}
-    found = [of_part(name, part) for name, part in parts.items() if part]
-    return found if parts["converge"] else [("Convergence", [lines(
-        "Not studied: no converge.json stands beside this ensemble. bergtow converge CASE.yml says what of the "
-        "computation (width, length, time step, tolerance, start) the result depends on.")]), *found]
+#: what stands in place of a chapter that has not been made
+NOT_STUDIED = {
+    "converge": "Not studied: no converge.json stands beside this ensemble. bergtow converge CASE.yml says what of the "
+                "computation (width, length, time step, tolerance, start) the result depends on.",
+    "budget": "Not studied: no budget.json stands beside this ensemble. bergtow budget STUDY.yml says how much of the "
+              "scatter is of the fields, and how much of each value that is assumed; no interval of this report holds "
+              "the latter.",
+}
+
+
+def results_beside(folders):
+    """{name: (the folder, what a command of findings.py left there)}, of the first folder that has it."""
+    out = {}
+    for name in findings.KINDS:
+        for folder in folders:
+            found = findings.read(name, folder)
+            if found is not None:
+                out[name] = folder, found
+                break
+    return out
+
+
+def beside(results):
+    """Chapters of the results of other commands; convergence and budget are named even where nothing was studied."""
+    out = []
+    for name, (heading, _) in findings.KINDS.items():
+        if name in results:
+            out.append(of_part(name, findings.chapter(name, results[name][0])))
+        elif name in NOT_STUDIED:
+            out.append((heading, [lines(NOT_STUDIED[name])]))
+    return out
 
 
 def first_run(e):
@@ -273,12 +308,19 @@ def varied(e, values):
     words = {"ice.seed": "varied"}
     for key, some in e.parameters.items():
         if len(set(some.tolist())) > 1:
-            unit = e.units[key] if e.units[key] != "1" else ""
-            if unit in ("rad", "rad/s"):
-                some, unit = np.degrees(some), unit.replace("rad", "deg")
+            factor, unit = reading(key, e.units[key])
             words[key] = "varied" if some.dtype == object else \
-                f"varied, {np.nanmin(some):.4g} to {np.nanmax(some):.4g} {unit}".strip()
+                f"varied, {factor * np.nanmin(some):.4g} to {factor * np.nanmax(some):.4g} {unit}".strip()
     return [replace(v, value=words[v.key]) if v.key in words else v for v in values]
+
+
+def ranges(results):
+    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what the
+    program admits."""
+    out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
+    for key, given in (results["budget"][1]["assumed"] if "budget" in results else {}).items():
+        out[key] = given["distribution"], given["source"] or "assumed"
+    return out
 
 
 def replays(e, place):
@@ -300,20 +342,21 @@ def context(folder, place=None, given=None, also=()):
     values, texts, attributes = first_run(e)
     values = [replace(v, value=scrubbed(report_case.short(v.value)), origin=scrubbed(v.origin))
               for v in varied(e, values)]
-    case = statement.case_of(e, e.used)
+    case, results = statement.case_of(e, e.used), results_beside([e.path, *also])
     counts = {name: int(np.sum(e.status == kind)) for kind, name in STATUS.items()}
     waiting = e.n - sum(counts.values())
     block = report_case.title_block(texts, attributes, given or {})
     warned = [text[len(WARNED):] for text in loads_text.warnings(s)] + intro[1:]
     return {
         "title": scrubbed(report_run.breakable(e.title)), "block": block, "revision": dict(block)["revision"],
-        "answer": answer(e, s, case), "tension": any(c["design"]["tension"] for c in s["conditions"]),
+        "answer": answer(e, s, case, results),
+        "tension": any(c["design"]["tension"] for c in s["conditions"]),
         "warnings": [scrubbed(w) for w in warned + ([other_builds] if other_builds else [])],
         "method": report_method.method(s, case), "limits": report_method.limits(s, case),
         "assumed": [v for v in values if v.kind not in ("source", "default", "unused", "field")
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
-        "ranges": report_case.ranges(), "values": values, "kinds": report_case.KINDS,
-        "beside": beside([e.path, *also]), "chapters": parts(found, pictures(e, options, s)),
+        "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
+        "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
         "members": members(e, s), "counts": counts, "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]

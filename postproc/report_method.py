@@ -3,6 +3,7 @@
 from what was simulated."""
 import numpy as np
 
+import capability_text
 import loads_text
 import stat_extreme
 import stat_profile
@@ -85,7 +86,7 @@ def limits(s, case):
         "line": "The towing end of the line moves as prescribed: the vessel neither slows down nor stops.",
         "thrust": "The vessel is a point with thrust and resistance curves; it does not manoeuvre by itself.",
     }.get(case.mode, "Nothing is towed."))
-    if not np.isfinite(case.breaking_load):
+    if case.mode != "speed" and not np.isfinite(case.breaking_load):
         out.append("No line parts: the case sets no breaking load.")
     if not np.isfinite(case.bollard_pull):
         out.append("No vessel is judged: the case names no bollard pull.")
@@ -102,6 +103,11 @@ def holds(case, s):
         return []
     speeds = sorted({str(c["values"]["tow.speed"]) for c in s["conditions"] if "tow.speed" in c["values"]})
     rows = [("tow speed asked for", f"{', '.join(speeds)} m/s" if speeds else case.texts.get("tow.speed", "–"))]
+    made = [(c["label"], c["design"]["speed"]) for c in s["conditions"] if c["design"]["speed"]]
+    if made and case.mode in ("line", "thrust"):
+        rows.append(("speed made good", "; ".join(f"{label}: {number(v['value'])} m/s" + (
+            f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})"
+            if np.isfinite(v["interval_95"]).all() else "") for label, v in made)))
     rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
                  if np.isfinite(case.breaking_load) else "none in the case: the line must bear the tension above"
                  if case.mode != "speed" else "no line in the case: it must bear the tow force above, "
@@ -109,3 +115,36 @@ def holds(case, s):
     rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
                  if np.isfinite(case.bollard_pull) else "no vessel in the case: it must hold the tow force above"))
     return rows
+
+
+def _capability(found):
+    """(what, value) of a capability.json, a row a condition."""
+    key = found["search"].rpartition(".")[2].replace("_", " ")
+    for c in found["conditions"]:
+        ends = [capability_text.value(found, c[k]) for k in ("makes_it", "does_not") if c[k] is not None]
+        at = f"about {capability_text.value(found, c['estimate'])}" if c["estimate"] is not None else \
+            f"between {' and '.join(ends)}" if len(ends) == 2 else c["why"] or "not found"
+        name = "" if not found["for"] else f", {capability_text.condition(found, c)}"
+        yield (f"{key} at which half of the tows no longer keep {number(found['speed'])} m/s{name}"
+               if found["share"] == 0.5 else
+               f"{key} at which {100 * (1 - found['share']):g} % of the tows no longer keep "
+               f"{number(found['speed'])} m/s{name}", at)
+
+
+def _convergence(found):
+    """What converge.json says in one line: what matters, what does not, what stayed open."""
+    by = {judged: list(dict.fromkeys(r["name"] for r in found["rows"] if r["judged"] == judged and r["name"] != "fields"))
+          for judged in ("matters", "open", "none")}
+    words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"))
+    return "; ".join(f"{said} {', '.join(by[judged])}" for judged, said in words if by[judged]) or "nothing compared"
+
+
+def beyond(results):
+    """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py."""
+    budget, converge = results.get("budget"), results.get("converge")
+    rows = [("values that are assumed, standard deviation", "not studied" if budget is None else "; ".join(
+        f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
+        for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
+    rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None
+                 else _convergence(converge)))
+    return rows + list(_capability(results["capability"]) if "capability" in results else [])

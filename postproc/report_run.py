@@ -272,7 +272,7 @@ def provenance(run):
     rows = [("program",
              f"{a.get('program', 'bergtow')} {a.get('version', '')}, revision {a.get('revision', 'unknown')}"),
             ("compiler", a.get("compiler")), ("flags", a.get("flags")), ("libraries", a.get("libraries")),
-            ("command line", a.get("command_line")),
+            ("command line", re.sub(r"\S*/(?=[^\s/])", "", str(a.get("command_line", "")))),
             ("ranks × threads", f"{a.get('ranks', '?')} × {a.get('threads', '?')}"), ("started", a.get("start_time")),
             ("host", a.get("host")), ("wall time", f"{style.short(run.number('wall_time_s'))} s"),
             ("state hash", run.summary.get("state_hash")), ("folder", run.path.resolve().name)]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import stat_load
+import stat_mean
 import stat_profile
 from bergtow_read import Run, RunError
 from text_table import quantity, short
@@ -60,6 +61,20 @@ def case_of(e, rows):
     return None
 
 
+def speed_made_good(e, rows):
+    """Mean over fields of the speed in the window, m/s, with its interval; None where no member has one."""
+    speeds = []
+    for m in rows:
+        try:
+            with Run(e.folder(m)) as run:
+                speeds.append(run.speed_made_good)
+        except RunError:
+            continue
+    speeds = np.array([v for v in speeds if np.isfinite(v)])
+    return {"value": speeds.mean(), "interval_95": stat_mean.t_interval(speeds) if len(speeds) > 1 else (np.nan, np.nan)
+            } if len(speeds) else None
+
+
 def _of_the_case(e, rows, case, tow):
     """Warnings that follow from what was simulated: pairs of what is the matter, and how much of it."""
     out = []
@@ -75,8 +90,8 @@ def _of_the_case(e, rows, case, tow):
         out.append(("the tow holds its speed whatever it takes: no vessel slows down, no line stretches", ""))
     narrow = sum(any(text.startswith("domain.width:") for text in e.texts(m)) for m in rows)
     if narrow:
-        out.append(("the domain is narrow for this ice: the value belongs to its width, and bergtow converge says "
-                    "how much", f"{narrow} of {len(rows)} members"))
+        out.append(("the domain is narrow for this ice: the value belongs to its width",
+                    f"{narrow} of {len(rows)} members"))
     if case is not None and np.isfinite(case.bollard_pull) and tow and tow.get("value", 0) > case.bollard_pull:
         out.append(("the value is above the bollard pull: the vessel cannot hold it, and the tow stops first",
                     quantity(case.bollard_pull, "N")))
@@ -144,7 +159,7 @@ def _of_the_models(load):
 
 def statement(e, rows, c):
     """What the design statement says of a condition c, a dict of ensemble.py: {"tow", "tension", "warnings",
-    "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
+    "speed", "holds_for", "breaking_load", "bollard_pull"}; "tow" None where there is no tow force."""
     case, loads = case_of(e, rows), c["loads"]
     tow = loads.get("tow_force")
     tensions = [(loads[name]["design"], loads[name]) for name in TENSIONS
@@ -164,6 +179,7 @@ def statement(e, rows, c):
                         "hours": tow["hours"], "units": tow["units"], "mean": tow["mean"]["value"],
                         "mean_95": tow["mean"]["interval_95"],
                         "largest": tow["largest"], "start_up": tow["start_up"]},
+        "speed": speed_made_good(e, rows),
         "tension": worst and {**worst[0], "label": worst[1]["label"], "largest": worst[1]["largest"]},
         "warnings": [{"what": what, "detail": detail} for what, detail in warned], "breaking_load": breaking,
         "bollard_pull": case.bollard_pull if case else np.nan, "holds_for": _holds_for(e, case)

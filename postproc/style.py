@@ -136,6 +136,23 @@ class LogTicks(Locator):
         return ticks[(ticks >= low) & (ticks <= high)]
 
 
+class TimesTicks(MaxNLocator):
+    """Ticks at round numbers of `factor` times the values of an axis."""
+
+    def __init__(self, factor):
+        super().__init__(nbins="auto", steps=[1, 2, 2.5, 5, 10])
+        self.factor = factor
+
+    def tick_values(self, vmin, vmax):
+        return super().tick_values(self.factor * vmin, self.factor * vmax) / self.factor
+
+
+def times(axis, factor):
+    """Label an axis with `factor` times its values: 0.6 as 60 of %."""
+    axis.set_major_locator(TimesTicks(factor))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{factor * value:.6g}"))
+
+
 def logarithmic(*axis):
     """Scale, ticks and labels of a logarithmic axis (axes.xaxis or axes.yaxis)."""
     for one in axis:

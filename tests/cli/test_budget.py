@@ -128,7 +128,8 @@ STUDY = {
         "ice.density": {"from": 850, "to": 920}
     }
 }
-BASE = changed(TOW, run__duration=3, output__window_start=1, domain__length=8, domain__width=5)
+BASE = changed(TOW, run__duration=8, output__window_start=2, domain__length=8, domain__width=5,
+               estimate__length_scale=900)  # a time scale of 1 s
 
 
 @pytest.fixture(scope="module")
@@ -173,6 +174,17 @@ def test_a_study_end_to_end(small):
     assert found["mean"] == pytest.approx(y.mean())
     assert found["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(pairs, axis=1, ddof=1)))
     assert (folder / "out/budget.png").stat().st_size > 15_000
+    tail = found["more"][0]
+    assert tail["of"] == "tow_force:99" and "tow force that 1 % of the time exceeds, as the moving mean over 1 s" in text
+    levels = []
+    for member in sorted((folder / "out/members").iterdir()):
+        with h5py.File(member / "result.h5") as f:
+            t, x = f["series/time"][:], f["series/tow_force"][:]
+        n = round(1 / (t[1] - t[0]))
+        some = x[t >= json.loads((member / "summary.json").read_text())["window"]["start_s"] - 1e-9]
+        levels.append(np.percentile(np.convolve(some, np.full(n, 1 / n), "valid"), 99))
+    assert len(levels) == 24 and tail["mean"] == pytest.approx(np.mean(levels), rel=1e-9)
+    assert tail["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(np.reshape(levels, (12, 2)), axis=1, ddof=1)))
     block = findings.chapter("budget", folder / "out")
     assert block["markdown"].startswith("| part |") and len(block["figure"]().axes) == 2
     (folder / "converge.json").write_text(json.dumps({"rows": [{"name": "dt", "interval_95": [-0.1, 0.2]}]}))
@@ -202,6 +214,8 @@ def test_what_is_refused(small, tmp_path):
                                             cwd=tmp_path, capture_output=True, text=True).stderr
     assert "is no converge.json" in said(STUDY, "--converge", "nothing.json", out=folder / "out")
     assert "has no number mean_colour" in said(STUDY, "--of", "mean_colour", out=folder / "out")
+    assert "has no load colour" in said(STUDY, "--of", "colour:99", out=folder / "out")
+    assert "above 0 and below 100 %" in said(STUDY, "--of", "tow_force:100", out=folder / "out")
     with pytest.raises(RunError, match="is no Latin hypercube"):
         one = made_up.member(np.ones(3), {"ice.friction": 0.1}, 0)
         budget.of_ensemble(Ensemble(made_up.write(tmp_path / "g", [one])))

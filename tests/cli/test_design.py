@@ -70,6 +70,7 @@ def pages_of(path):
 def test_the_study_that_it_makes(made):
     study = yaml.safe_load((made / "design.yml").read_text())
     assert study["parameters"] == {"ice.concentration": [0.2, 0.4]} and study["repeats"] == 5 and study["seed"] == 3
+    assert study["set"] == {"output.panels": True}
     assert study["base"] == "../case.yml" and study["title"] == f"{TITLE}: ice of 20 to 40 %"
     e = Ensemble(made)
     assert e.complete and e.n == 10 and not list(made.glob("replay-*"))
@@ -136,6 +137,9 @@ def test_what_is_refused(made, tmp_path, monkeypatch):
                               env=environment(BERGTOW_HOME=ROOT, **more), timeout=120)
     write_case(tmp_path, CASE)
     assert said("none.yml").returncode == 4 and said("case.yml", "--concentrations", "0.99").returncode == 2
+    other = said("case.yml", "--also", ".", "-o", "none")
+    assert other.returncode == 4 and "holds none of converge.json, budget.json" in other.stderr
+    assert not (tmp_path / "none").exists()
     wrong = said("case.yml", "--set", "ice.sise=1")
     assert wrong.returncode == 4 and "did you mean ice.size" in wrong.stderr and "Traceback" not in wrong.stderr
     # another study than that of the folder: nothing of the old one is taken for it
@@ -179,7 +183,7 @@ def test_the_title_block_of_a_study(tmp_path):
 
 # ---- the page
 
-HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Loads", "Mean ice resistance",
+HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Uncertainty budget", "Loads", "Mean ice resistance",
             "Members", "Replay", "Every key", "Study", "Provenance"]
 
 

@@ -202,7 +202,7 @@ def test_the_statement_comes_first_and_names_what_speaks_against_it(statement):
     assert any("no upper bound" in w for w in warnings) and any("domain is narrow" in w for w in warnings)
     assert not any("no upper bound" in w["what"] or "narrow" in w["what"] for w in first["warnings"])
     assert any("extrapolated to more than 10 times" in w["what"] for w in first["warnings"])
-    assert "WARNING: rigid floes at 75 % and more" in text and "concentration 0.9 (90 %)" in text
+    assert "WARNING: rigid floes at 75 % and more" in text and "concentration 90 % (90 %)" in text
     rows = list(csv.DictReader(open(folder / "statistics.csv")))
     assert float(rows[1]["tow_force_design_n"]) == second["tow"]["value"] and float(
         rows[0]["line_tension_1_mean_n"]) == s["conditions"][0]["loads"]["line_tension_1"]["mean"]["value"]
@@ -220,7 +220,7 @@ def test_a_start_that_takes_more_than_the_design_value_is_named(statement, tmp_p
     assert float(next(csv.DictReader(open(folder / "statistics.csv")))["tow_force_start_up_n"]) == pytest.approx(1e9)
     ramp = CASE.format(pressure=0, load=0).replace("speed:", "ramp: {} s\n  speed:")
     for ramp_s, jerk, words in ((20, 2e6, "while the ramp of 20 s accelerates the body; a longer ramp takes less: "
-                                 "concentration 0.5 (2.00 MN)."), (20, 1e6, None)):
+                                 "concentration 50 % (2.00 MN)."), (20, 1e6, None)):
         some = towed(tmp_path / f"{jerk:g}", fields=5, text=ramp.format(ramp_s), jerk=jerk)
         said = script("ensemble.py", some, "--resamples", 1).stdout
         assert words in said if words else "the start, which is left out" not in said
@@ -258,7 +258,7 @@ def test_model_scale_and_limits_of_line_and_ice(tmp_path):
     x = loads.statistics(e, e.conditions()[0].finished, options())["tow_force"]
     assert x["time_scale_s"] == 6 and x["design"]["tow_hours"] == pytest.approx(24 / 5)
     found = script("ensemble.py", tmp_path / "a", "--resamples", 1).stdout
-    assert "no upper bound" not in found and "above the breaking load of the line: concentration 0.9 (2.00 MN" in found
+    assert "no upper bound" not in found and "above the breaking load of the line: concentration 90 % (2.00 MN" in found
 
 
 def test_too_little_is_reported_and_not_guessed(tmp_path):

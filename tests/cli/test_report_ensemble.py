@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "postproc"))
 
 import ensemble  # noqa: E402
 import report  # noqa: E402
+import report_case  # noqa: E402
 import report_ensemble  # noqa: E402
 import report_method  # noqa: E402
 import stat_budget  # noqa: E402
@@ -87,7 +88,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
     found = tables(page)
     head, *rows = found["Mean ice resistance"]
     factor = 1000.0 if "kN" in head[2] else 1.0
-    assert [row[0] for row in rows] == ["concentration 0.2", "concentration 0.5"
+    assert [row[0] for row in rows] == ["concentration 20\u00a0%", "concentration 50\u00a0%"
                                         ] and [row[1] for row in rows] == ["4 (1 failed)", "4 (1 waiting)"]
     for row, c in zip(rows, s["conditions"]):
         assert float(row[2]) * factor == pytest.approx(c["resistance"]["mean"], rel=0.006)
@@ -97,7 +98,7 @@ def test_numbers_are_those_of_the_statistics(page, study):
     assert estimates["Lichey-Hellmer"].startswith("80") and "*" in estimates["compaction"]
     assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
     answer = found["Answer"]
-    assert [row[0] for row in answer[1:]] == ["concentration 0.2", "concentration 0.5"] and answer[1][-2] == "4"
+    assert [row[0] for row in answer[1:]] == ["concentration 20\u00a0%", "concentration 50\u00a0%"] and answer[1][-2] == "4"
 
 
 def test_the_answer_is_the_design_statement(tmp_path):
@@ -106,7 +107,7 @@ def test_the_answer_is_the_design_statement(tmp_path):
     e = Ensemble(made_up.write(tmp_path / "out", [
         member(made_up.ar1(0.6, 4000, rng, 137.0, 10.0), {"ice.concentration": 0.5}, 0) for _ in range(8)]))
     s = ensemble.statistics(e, argparse.Namespace(**OPTIONS | {"resamples": 1}))
-    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None)
+    d, blocks = s["conditions"][0]["design"]["tow"], report_ensemble.answer(e, s, None, {})
     row = next(b for b in blocks if b["kind"] == "table")["rows"][0]
     wide = max(abs(x - d["value"]) for x in d["interval_95"] if np.isfinite(x))
     assert abs(newtons(row[1]) - d["value"]) <= max(0.06 * wide, 0.006 * d["value"])
@@ -121,7 +122,7 @@ def test_the_answer_is_the_design_statement(tmp_path):
     head = next(b for b in blocks if b["kind"] == "table")["head"]
     assert len(head) == len(row) and "in the start" not in head
     s["conditions"][0]["design"]["tow"]["start_up"] = {"largest": 1.01 * d["value"], "time_s": 30.0}
-    with_start = next(b for b in report_ensemble.answer(e, s, None) if b["kind"] == "table")
+    with_start = next(b for b in report_ensemble.answer(e, s, None, {}) if b["kind"] == "table")
     started = dict(zip(with_start["head"], with_start["rows"][0]))
     assert newtons(started["in the start"]) == pytest.approx(1.01 * d["value"], rel=0.006)
     assert [started[name] for name in head] == row
@@ -221,10 +222,19 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     monkeypatch.setattr(report_ensemble, "OPTIONS", OPTIONS)
     report.main([str(folder), "-o", str(tmp_path / "page.html")])
     text = (tmp_path / "page.html").read_text()
-    at = [text.index(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
+    at = [text.rindex(words) for words in ("take 20 m, or wider", "uniform from 0 to 1; a book",
                                           "every value of the range makes it")]
     assert at == sorted(at) and text.index("Assumptions") < at[0]
-    assert text.count("<svg") >= 3 and str(tmp_path) not in text
+    assert text.count("<svg") >= 3 and str(tmp_path) not in text and "Not studied" not in text
+    answered = text[:text.index("<h2>Method")]
+    sd = f"{100 * budget['parameters']['sd'] / budget['mean']:.0f} % of the mean"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0", "run.title": ""})
+        assert report_ensemble.ranges({"budget": (folder, found["budget"])}) == {
+            "ice.friction": ("uniform from 0 to 1", "a book"), "ice.size": ("above 0", "admitted")}
+    for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on width",
+                  sd):
+        assert words in answered, words
 
 
 def test_a_half_finished_ensemble(tmp_path, monkeypatch):

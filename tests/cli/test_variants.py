@@ -57,7 +57,7 @@ def test_variants_of_a_study_are_drawn(tmp_path, fields):
     assert result.returncode == 0, result.stderr
     e = Ensemble(tmp_path / "out")
     some = plot_variants.panels(e)
-    assert [words for words, *_ in some] == ["concentration 0.3", "concentration 0.5"]
+    assert [words for words, *_ in some] == ["concentration 30 %", "concentration 50 %"]
     for k, (_, first, mean, changes) in enumerate(some):
         rows = {name: [m for m in e.used if e.parameters["variant"][m] == name and
                        e.parameters["ice.concentration"][m] == (0.3, 0.5)[k]] for name in ("first", "smooth", "thick")}

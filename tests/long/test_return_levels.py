@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Do 95 % intervals of return levels hold the levels of signals whose extremes are known? The table of
 postproc/README.md (make test-long; a quarter of an hour on one core)."""
+import numpy as np
 import pytest
 
 from signals_known import AR1, EAR1, POISSON, coverage
@@ -16,5 +17,5 @@ def test_intervals_hold_the_levels(process, fields, n):
     for kind, (inside, ratio) in found.items():
         print(f"| {process.name}, {fields} fields of {n} | {kind} | " +
               " | ".join(f"{100 * k / TRIALS:.0f} % ({r:.2f})" for k, r in zip(inside, ratio)) + " |")
-        # 95 % of 200, less three standard errors of the 92 % that short samples leave; more would be idle width
-        assert 0.87 <= min(inside) / TRIALS and max(inside) / TRIALS <= 1.0, (kind, inside)
+        # More than 98 % is idle width, and no harm: few fields, and little of the tail that is asked for
+        assert 0.9 <= min(inside) / TRIALS and np.median(inside) / TRIALS <= 0.99, (kind, inside)

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: MIT
+"""Statistics of every load that something is designed for, of tows by a vessel on a line of two branches with panel
+loads, against the series of the members by plain NumPy."""
+import argparse
+import json
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from scipy import stats
+
+from harness import ROOT, TOW, call, changed, write_case
+
+sys.path.insert(0, str(ROOT / "postproc"))
+
+import ensemble  # noqa: E402
+import loads_text  # noqa: E402
+import plot_ensemble  # noqa: E402
+import report_ensemble  # noqa: E402
+import report_method  # noqa: E402
+import statement  # noqa: E402
+from ensemble_read import Ensemble  # noqa: E402
+
+N = 4
+VESSEL = changed(TOW, run={"dt": 0.05, "duration": 40}, domain={"length": 30, "width": 10},
+                 ice={"concentration": 0.6, "size": 1, "x_max": 25, "restitution": 0.2},
+                 body={"x": 27, "length": 2, "y": 0.3},
+                 tow={"mode": "thrust", "speed": 0.3, "ramp": 5, "direction": 180, "line_length": 3,
+                      "line_stiffness": 2000, "line": {"branches": 2}, "vessel": {
+                          "mass": 800, "bollard_pull": 600, "free_speed": 3}},
+                 output={"panels": True, "window_start": 12}, estimate__length_scale=225)
+SCALE = 2.0  # s: 30 s at full scale by Froude's law
+
+
+@pytest.fixture(scope="module")
+def towed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("vessel")
+    write_case(folder, VESSEL, "base.yml")
+    (folder / "study.yml").write_text(json.dumps({"base": "base.yml", "repeats": N}))
+    done = call("ensemble", "study.yml", "-o", "out", "--quiet", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    e = Ensemble(folder / "out")
+    options = report_ensemble.OPTIONS | {"resamples": 1, "hours": [0.005, 0.02]}
+    return e, ensemble.statistics(e, argparse.Namespace(**options))
+
+
+def window_of(folder, name):
+    """[samples (, panels)] of a series of result.h5 from the window's first time scale on, as moving means."""
+    with h5py.File(folder / "result.h5") as f:
+        t, x = f["series/time"][:], f[name][:]
+    x = x.reshape(len(t), -1)
+    start, end = (json.loads((folder / "summary.json").read_text())["window"][k] for k in ("start_s", "end_s"))
+    n = round(SCALE / (t[1] - t[0]))
+    some = [np.convolve(column[(t >= start - 1e-9) & (t <= end + 1e-9)], np.full(n, 1 / n), "valid") for column in x.T]
+    return np.max(some, axis=0)
+
+
+SERIES = {"tow_force": "series/tow_force", "line_tension_1": "series/line_tension_1",
+          "line_tension_2": "series/line_tension_2", "vessel_thrust": "series/vessel_thrust",
+          "ice_resistance": "series/ice_resistance", "panel_load": "panels/load"}
+
+
+@pytest.mark.parametrize("name", SERIES)
+def test_a_load_is_that_of_the_series(towed, name):
+    e, s = towed
+    x = s["conditions"][0]["loads"][name]
+    fields = [window_of(e.folder(m), SERIES[name]) for m in range(N)]
+    assert x["fields"] == N and x["units"] == "N" and x["time_scale_s"] == pytest.approx(SCALE)
+    means, together = np.array([f.mean() for f in fields]), np.concatenate(fields)
+    assert x["mean"]["value"] == pytest.approx(means.mean(), rel=1e-9)
+    assert x["mean"]["interval_95"] == pytest.approx(
+        means.mean() + np.array([-1, 1]) * stats.t.ppf(0.975, N - 1) * means.std(ddof=1) / np.sqrt(N), rel=1e-6)
+    assert x["sd"]["value"] == pytest.approx(together.std(ddof=1), rel=1e-9)
+    assert x["largest"] == pytest.approx(together.max(), rel=1e-9)
+    for q in ("5", "50", "95", "99"):
+        assert x["quantiles"][q]["value"] == pytest.approx(np.percentile(together, int(q)), rel=1e-9)
+        low, high = x["quantiles"][q]["interval_95"]
+        assert low < x["quantiles"][q]["value"] < high
+    for row in x["exceedance"][::5]:
+        assert row["share_of_time"]["value"] == pytest.approx(np.mean(together > row["level"]), rel=1e-9)
+    levels = [level for kind in ("over_threshold", "block_maxima") for level in x[kind].get("levels", [])]
+    assert all(np.isfinite(level["level"]) and level["hours"] > 0 for level in levels)
+
+
+def test_the_branch_that_bears_more_is_designed_for(towed):
+    e, s = towed
+    c = s["conditions"][0]
+    tension = c["design"]["tension"]
+    if tension is None:
+        assert all("refused" in c["loads"][name]["design"] for name in statement.TENSIONS)
+    else:
+        values = {c["loads"][name]["label"]: c["loads"][name]["design"].get("value", -np.inf)
+                  for name in statement.TENSIONS}
+        assert tension["label"] == max(values, key=values.get) and tension["value"] == max(values.values())
+
+
+def test_tables_pictures_and_answer_have_them(towed):
+    e, s = towed
+    labels = {x["label"] for x in s["conditions"][0]["loads"].values()}
+    for table in loads_text.signals(s, False), loads_text.quantiles(s, False):
+        assert all(label in table for label in labels)
+    assert "Hull panels, the case: panel" in loads_text.signals(s, False)
+    drawn = dict(plot_ensemble.pictures(e, argparse.Namespace(**report_ensemble.OPTIONS), s["conditions"]))
+    assert {"above-tow-force", "above-vessel-thrust", "above-line-tension-1", "above-line-tension-2"} <= set(drawn)
+    x = s["conditions"][0]["loads"]["vessel_thrust"]
+    axes = drawn["above-vessel-thrust"]().axes[0]
+    line = next(line for line in axes.lines if line.get_label().startswith("the case"))
+    assert line.get_ydata()[0] == pytest.approx(100 * x["exceedance"][0]["share_of_time"]["value"])
+    speeds = []
+    for m in range(N):
+        with h5py.File(e.folder(m) / "result.h5") as f:
+            t, px, py = (f[f"series/{n}"][:] for n in ("time", "body_x", "body_y"))
+        some = t >= 12
+        speeds.append(np.hypot(px[some][-1] - px[some][0], py[some][-1] - py[some][0]) / (t[some][-1] - t[some][0]))
+    made = s["conditions"][0]["design"]["speed"]
+    assert made["value"] == pytest.approx(np.mean(speeds), rel=1e-9) and made["interval_95"][0] < made["value"]
+    rows = dict(report_method.holds(statement.case_of(e, e.used), s))
+    assert rows["speed made good"].startswith(f"the case: {np.mean(speeds):.3f} m/s (")
