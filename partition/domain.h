@@ -65,7 +65,7 @@ void bt_domain_connect(bt_world *w);
 
 /// What is to be done with the value, above 0, of a cell of another rank.
 typedef void bt_take_cell(bt_cells *t, int32_t x, int32_t y, double value);
-/// Send a value [n cells] of the cells of this rank to the ranks that have cells within two of them, and take theirs.
+/// Send a value [n cells] of the cells of this rank to the ranks that hold cells beside them, and take theirs.
 /// Collective.
 void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take);
 /// After the detection: which bodies the contacts of this step touch. Collective.

@@ -88,14 +88,15 @@ static void list_bodies(bt_world *w)
     }
 }
 
-/// Does rank r hold a cell within two of (x, y)? Its bounds depend on the speed there, and what it sweeps on how far
-/// that has converged.
+/// Does rank r hold a cell beside (x, y)? It then owns one from (x − 2, y − 2) to (x + 1, y + 1), whose bounds depend
+/// on the speed there, or has floes there that a large body may move; and what it sweeps depends on how far (x, y) has
+/// converged.
 static void near_ranks(const bt_world *w, int32_t x, int32_t y, uint8_t *near)
 {
     const bt_cells *t = w->cells;
     memset(near, 0, (size_t)w->domain->comm->size);
-    for (int32_t dy = -2; dy <= 2; dy++)
-        for (int32_t dx = -2; dx <= 2; dx++) {
+    for (int32_t dy = -1; dy <= 1; dy++)
+        for (int32_t dx = -1; dx <= 1; dx++) {
             if ((t->wrap_x == 1 && dx) || (t->wrap_y == 1 && dy)) continue;
             int sharer[BT_MAX_SHARERS];
             const int n = bt_division_sharers(w, x + dx, y + dy, sharer);

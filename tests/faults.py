@@ -50,6 +50,7 @@ FAULTS = {
     # before the handlers of a run are set SIGTERM ends the program as a kill does; SIGUSR1 never does
     "SIGTERM": ({"BT_CALLS_SIGNAL": signal.SIGTERM.value}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
     "SIGUSR1": ({"BT_CALLS_SIGNAL": signal.SIGUSR1.value}, WRITES + SYNCS + NAMES + ("ftruncate", "close")),
+    "EAGAIN": ({"BT_CALLS_WITH": errno.EAGAIN}, ("posix_spawn", )),
 }
 
 Call = collections.namedtuple("Call", "name path second result")
@@ -138,6 +139,7 @@ def says_what_to_do(result, folder):
 class Scenario:
     """prepare leaves the folder as the command finds it, once; `whole` is the state it must end with."""
     codes, stopped = (IO, ), False
+    outlives = False  # others do what a process that is killed leaves
 
     def __init__(self, base):
         self.base = pathlib.Path(base) / self.name.replace(" ", "-")
@@ -149,7 +151,8 @@ class Scenario:
     def fresh(self):
         shutil.rmtree(self.folder, ignore_errors=True)
         shutil.copytree(self.start, self.folder)
-        (self.base / "log").unlink(missing_ok=True)
+        for name in "log", "log.other":
+            (self.base / name).unlink(missing_ok=True)
 
     def launch(self, env):
         return started([BERGTOW, *self.command()], env)
@@ -169,10 +172,11 @@ class Scenario:
         result = self.launch(shim(self.folder, BT_CALLS_LOG=self.base / "log", BT_CALLS=",".join(calls), BT_CALLS_AT=n,
                                   **what))
         number, self.stopped = what.get("BT_CALLS_SIGNAL", 0), result.returncode == SIGNAL
-        if result.returncode == DONE and fault != "kill":
+        if result.returncode == DONE and (fault != "kill" or self.outlives):
             self.check_done()
+            self.check_words(fault, result)
             return "done"
-        assert fault not in ("EINTR", "short", "SIGUSR1"), f"{fault} is not made good: {result.stderr}"
+        assert fault not in ("EINTR", "short", "SIGUSR1", "EAGAIN"), f"{fault} is not made good: {result.stderr}"
         if result.returncode == SIGNAL and fault == "SIGTERM":
             assert re.search(r"stopped by .* goes on", result.stderr), result.stderr
         elif fault in ("kill", "SIGTERM"):
@@ -183,12 +187,14 @@ class Scenario:
         self.check_kept(logged(self.base / "log"))
         return self.recover()
 
+    def check_words(self, fault, result):
+        """What is said of a fault that is made good."""
 
     def requests(self):
         """How often the undisturbed command asks for memory."""
         self.fresh()
         log = self.base / "memory"
-        env = environment(OMP_NUM_THREADS=1, BERGTOW_STARTED=1, LD_PRELOAD=MEMORY, BT_MEMORY_LOG=log, **ROOT)
+        env = shim(self.folder, BT_MEMORY_LOG=log) | {"LD_PRELOAD": f"{CALLS} {MEMORY}"}
         assert self.launch(env).returncode == DONE
         return int(log.read_text())
 
@@ -355,24 +361,24 @@ class Contacts(FreshRun):
 
 
 class Ensemble(Scenario):
-    name = "ensemble"
+    name, members, dt = "ensemble", 3, 0.1
 
     def prepare(self, start):
-        write_case(self.base, changed(CASE, output__checkpoint_steps=20, output__panels=False), "base.yml")
+        case = changed(CASE, run__dt=self.dt, output__checkpoint_steps=20, output__panels=False)
+        write_case(self.base, case, "base.yml")
         self.study = self.base / "study.yml"
-        self.study.write_text(json.dumps({"base": "base.yml", "repeats": 3}))
+        self.study.write_text(json.dumps({"base": "base.yml", "repeats": self.members}))
         result = plain("ensemble", self.study, "-o", self.base / "whole", "--threads", 1)
         assert result.returncode == DONE, result.stderr
         self.whole = self.hashes(self.base / "whole")
-        assert len(set(self.whole)) == 3
+        assert len(set(self.whole)) == self.members
 
     def command(self):
         return "ensemble", self.study, "-o", self.folder / "out", "--threads", 1, "--quiet"
 
-    @staticmethod
-    def hashes(folder):
+    def hashes(self, folder):
         with h5py.File(folder / "ensemble.h5") as f:
-            assert f.attrs["complete"] == 1 and f.attrs["n_finished"] == 3
+            assert f.attrs["complete"] == 1 and f.attrs["n_finished"] == self.members
             return [h.decode() for h in f["members/state_hash"][:]]
 
     def check_done(self):
@@ -389,6 +395,40 @@ class Ensemble(Scenario):
         assert result.returncode == DONE, result.stderr
         self.check_done()
         return "again"
+
+
+class Jobs(Ensemble):
+    """Two processes share the members, long enough that each has some; the one that was called meets the fault. What
+    the other does then is over, too, when the pipes that both write to are closed."""
+    name, members, dt, struck, outlives = "ensemble, 2 jobs", 4, 0.02, "first", True
+
+    def command(self):
+        return *super().command(), "--jobs", 2
+
+    def launch(self, env):
+        return super().launch(env | {"BT_CALLS_IN": self.struck})
+
+    def calls_of(self):
+        made = super().calls_of()
+        for log in made, logged(self.base / "log.other"):
+            assert any(c.name.startswith("rename") and c.second.endswith("/finished") for c in log)
+        return made
+
+    def check_kept(self, log):
+        super().check_kept(log + logged(self.base / "log.other"))
+
+    def check_words(self, fault, result):
+        if fault == "EAGAIN":
+            assert re.search("warning: job 2 of 2 could not be started: [^;]*; .*--jobs", result.stderr), result.stderr
+
+
+class OtherJob(Jobs):
+    """The process that it has started meets it: the call itself does all that one leaves, and says so."""
+    name, struck = "ensemble, 2 jobs, the second", "job"
+
+    def check_words(self, fault, result):
+        if any(c.name == "killed" for c in logged(self.base / "log")):
+            assert re.search(r"warning: job 2 of 2 was ended by signal 9[^;]*; .*members", result.stderr), result.stderr
 
 
 class Ranks(FreshRun):
@@ -412,8 +452,8 @@ class ForceOnRanks(Ranks, Force):
     name = "run --force, 2 ranks"
 
 
-SCENARIOS = {s.name: s for s in (FreshRun, Resume, Force, Field, FieldText, Contacts, Ensemble, Ranks, OtherRank,
-                                 ForceOnRanks)}
+SCENARIOS = {s.name: s for s in (FreshRun, Resume, Force, Field, FieldText, Contacts, Ensemble, Jobs, OtherJob, Ranks,
+                                 OtherRank, ForceOnRanks)}
 
 
 def numbers(n, most):

@@ -13,6 +13,7 @@ DRAG = ["physics/test_drag", "physics/test_force_law", "scenes:drag_and_mass,fre
 SOLVE = ["unit/test_batch", "unit/test_limit", "physics/test_contact_law", "scenes:speed_dense,restitution,rafting"]
 PROJECT = ["physics/test_contact_law", "scenes:speed_dense,walls_closing"]
 RANKS = ["scenes:speed_direction", "ranks:walls_closing,line,window,thrust,tide", "parallel/test_ranks.py"]
+COPIES = "parallel/test_copies.py::test_ranks_hold_what_they_need"
 SYNC = ["cli/test_faults.py::test_bytes_before_names_and_names_before_removals", "cli/test_faults.py"]
 FILES = ["cli/test_faults.py", "cli/test_replace.py"]
 ENDS = ["cli/test_faults.py::test_what_is_made_stands_in_this_order",
@@ -87,7 +88,8 @@ MUTANTS = {
         ("w->drift_y += p->dt * p->water_v;", "w->drift_y += p->dt * p->water_u;", "drift across"),
         ("(i + 0.5) / SAMPLES", "(double)i / SAMPLES", "mean by left ends"),
     ]),
-    "src/force/drift.c": (["physics/test_environment", "physics/test_drag", "scenes:free_drift_start"], [
+    "src/force/drift.c": (["physics/test_environment", "physics/test_drag", "physics/test_force_law",
+                           "scenes:free_drift_start"], [
         ("a->f[r] += g * v[r];", "a->f[r] -= g * v[r];", "drag drives"),
         ("form * across", "form", "form drag without the width"),
         ("if (hold[k]) {", "if (0 && hold[k]) {", "walls do not hold the drift"),
@@ -119,8 +121,9 @@ MUTANTS = {
         ("b[i] + u->w12 * l[1 - i]", "b[i]", "points are not coupled"),
         ("- u->w12 * u->ln[1 - i];", ";", "impulse of the other point stays in the velocity"),
     ]),
-    "src/solve/restitution.c": (["physics/test_impacts", "scenes:rebounds,restitution,solver_settings",
-                                 "ranks:rebounds,restitution", "parallel/test_ranks.py"], [
+    "src/solve/restitution.c": (["unit/test_restitution", "physics/test_impacts",
+                                 "scenes:rebounds,restitution,solver_settings", "ranks:rebounds,restitution",
+                                 "parallel/test_ranks.py"], [
         ("any = b->restitution[ts->cell[k].contacts[i].b] > 0;", "any = 0;", "no rebound is ever lowered"),
         ("if (b->inv[u->a].m == 0 || b->inv[u->b].m == 0) continue;", "", "a wall makes one island of all"),
         ("s->share[i] > 0.2 ? 0.5 * s->share[i] : 0", "s->share[i] > 0.2 ? 0.9 * s->share[i] : 0", "lowered by less"),
@@ -167,7 +170,7 @@ MUTANTS = {
         (".cap = 0.9,\n        .length = 50", ".cap = 0.9,\n        .length = 10", "rounds of another length"),
         ("if (most <= ENOUGH * o->problem->tolerance) break;", "", "inner sweeps for nothing"),
     ]),
-    "src/solve/rounds.c": (SOLVE + ["scenes:few_sweeps,periodic_dense"], [
+    "src/solve/rounds.c": (SOLVE + ["unit/test_rounds", COPIES, "scenes:few_sweeps,periodic_dense"], [
         ("if (!(m->against <= 0)) {", "if (m->against > 1e300) {", "momentum never restarts"),
         ("0.5 * (1 + sqrt(1 + 4 * m->theta * m->theta))", "m->theta + 1", "another momentum"),
         ("now = now + beta * (now - last);", "now = now + beta * beta * (now - last);", "bodies have less momentum"),
@@ -212,7 +215,7 @@ MUTANTS = {
         ("if (colour < MAX_COLOURS && j >= 0)", "if (colour < MAX_COLOURS && i < 0 && j >= 0)", "colours share a body"),
         ("0.25 * (x - y) * (x - y) + xy * xy", "0.25 * (x - y) * (x - y)", "step length of sheets"),
     ]),
-    "src/contact/detect.c": (["unit/test_contacts", "physics/test_parts", "unit/test_cells",
+    "src/contact/detect.c": (["unit/test_contacts", "physics/test_parts", "unit/test_cells", COPIES,
                               "scenes:speed_dense,periodic_dense,window"], [
         ("if (paths + t->margin < p->reach) {", "if (paths < p->reach) {", "the margin is not kept"),
         ("p->reach = gap + paths;", "p->reach = gap + 2 * paths;", "the reach is too long"),
@@ -311,7 +314,7 @@ MUTANTS = {
          "speed = bt_tow_speed(t, t->time);\n    t->way += dt * speed;", "way of the old speed"),
         ("if (t->branch[k].broken) h = mix(h, k + 1);", ";", "a broken line is not of the state"),
     ]),
-    "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment",
+    "src/step/step.c": (["unit/test_cells", "physics/test_motion", "physics/test_environment", COPIES,
                          "scenes:speed_dense,periodic_dense,free_drift,cold_start"], [
         ("dx += d.x, dy += d.y, turn += d.w;", "dx += d.x, dy += d.y;", "projection does not turn"),
         ("b->disturbed[i] = d.x != 0 || d.y != 0 || d.w != 0;", "", "shifted floes are taken for quiet"),
@@ -332,7 +335,7 @@ MUTANTS = {
         ("    bt_impacts_take(w); // of the towed body, at X1\n    advance(w);",
          "    advance(w);\n    bt_impacts_take(w);\n    ", "collisions at X2"),
     ]),
-    "src/step/window.c": (["unit/test_window", "physics/test_window", "parallel/test_window.py",
+    "src/step/window.c": (["unit/test_window", "physics/test_window", "physics/test_drag", "parallel/test_window.py",
                            "parallel/test_window.py::test_the_same_bits[speed-1]",
                            "scenes:window,window_backwards", "ranks:window,window_backwards"], [
         ("v->share /= v->mass;", "v->share /= n;", "share of the added mass"),
@@ -401,11 +404,11 @@ MUTANTS = {
         ("bt_domain_largest(w, force);", "", "contact force of ghosts"),
         ("b->motion[i] != BT_DYNAMIC || i == towed", "i == towed", "fixed floes move the budget"),
     ]),
-    "partition/halo.c": (RANKS + ["parallel/test_ranks.py::test_floes_at_a_free_body_that_other_ranks_hold",
+    "partition/halo.c": (RANKS + [COPIES, "parallel/test_ranks.py::test_floes_at_a_free_body_that_other_ranks_hold",
                                   "parallel/test_ranks.py"], [
         ("solver = is_under(d, cell) ? d->large_owner : -1;", "solver = -1;",
          "floes beside the body keep old velocities"),
-        ("for (int32_t dy = -2; dy <= 2; dy++)", "for (int32_t dy = -1; dy <= 1; dy++)", "speeds of cells at two"),
+        ("for (int32_t dy = -1; dy <= 1; dy++)", "for (int32_t dy = -1; dy <= 0; dy++)", "speeds of cells below"),
         ("sharer) > 1) cell->border = true;", "sharer) > 100) cell->border = true;", "border cells come late"),
         ("cell->border = k == t->n - 1;", "cell->border = false;", "the last cell's floes are not sent"),
         ("d->touched[cell->contacts[j].b] |= (uint8_t)(1 << cell->phase);", "", "second bodies are not sent"),
@@ -417,7 +420,7 @@ MUTANTS = {
         ("const bool own = k < t->n - 1 ? cell->own : d->comm->rank == 0;", "const bool own = cell->own;",
          "large bodies"),
     ]),
-    "partition/migrate.c": (RANKS + ["parallel/test_ranks.py::test_the_same_bits[crush-3-1]",
+    "partition/migrate.c": (RANKS + [COPIES, "parallel/test_ranks.py::test_the_same_bits[crush-3-1]",
                                        "parallel/test_window.py"], [
         ("if (rank[k] == me) keep[i] = 1;", "if (keep[i] = 1, rank[k] == me) {}", "floes stay where they were, too"),
         ("if (d->distributed && !d->owned[i]) continue;", "if (!d->owned) continue;", "ghosts are sent, too"),

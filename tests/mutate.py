@@ -192,6 +192,8 @@ def fails(tree, test):
         return None if code == 0 else test
     if "ranks" in test or "same_bits" in test or "broken" in test:
         make(tree, "build/release/tests/parallel/broken_division")
+    if "copies" in test:
+        make(tree, "build/release/tests/parallel/copies")
     code, out = run(["/usr/bin/python3", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", f"tests/{test}"], tree,
                     PATIENCE["pytest"])
     return None if code == 0 else test

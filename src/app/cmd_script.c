@@ -3,6 +3,7 @@
 // judges them with the statistics of the ensembles. Those are Python's; a second copy in C would be one too many.
 #include "app/cmd.h"
 #include "base/fileio.h"
+#include "base/launcher.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -62,7 +63,10 @@ int bt_cmd_script(int argc, char **argv)
     char *path = NULL;
     int code = -1;
     if (bt_comm_world()->size > 1) {
-        bt_errors_add(&err, "%s: starts runs of its own; call it without mpirun, and say --jobs", argv[0]);
+        bt_errors_add(&err,
+                      "%s: is no program of ranks; call it without mpirun or srun: what runs it needs it starts "
+                      "itself, as many at a time as --jobs says",
+                      argv[0]);
         return bt_cmd_end(&bt_comm_alone, BT_ERR_USAGE, &err);
     }
     if (readlink("/proc/self/exe", program, sizeof program - 1) > 0) path = find_script(program, argv[0]);
@@ -72,6 +76,7 @@ int bt_cmd_script(int argc, char **argv)
         for (int i = 1; i < argc; i++) arguments[i + 1] = argv[i];
         arguments[argc + 1] = NULL;
         setenv("BERGTOW", program, 1);
+        bt_launcher_forget(); // of one rank
         code = start(python, arguments);
         free(arguments);
         if (code < 0) bt_errors_add(&err, "%s: cannot be started; name a Python with numpy in PYTHON", python);

@@ -51,9 +51,12 @@ void bt_jobs_start(void *of, int n, int threads)
     for (int i = 0; i < n && i < BT_MAX_JOBS; i++) {
         pid_t pid;
         const int error = posix_spawn(&pid, "/proc/self/exe", NULL, NULL, words, environ);
-        if (error == 0) j->pid[j->n++] = pid;
-        else
-            fprintf(stderr, "bergtow: warning: job %d of %d could not be started: %s\n", i + 2, n + 1, strerror(error));
+        j->pid[j->n++] = error == 0 ? pid : 0;
+        if (error != 0)
+            fprintf(stderr,
+                    "bergtow: warning: job %d of %d could not be started: %s; the others take its members; to have as "
+                    "many, raise the limit on processes (ulimit -u), or ask for fewer with --jobs\n",
+                    i + 2, n + 1, strerror(error));
     }
     unsetenv(mark);
     if (bind) setenv("OMP_PROC_BIND", bind, 1);
@@ -64,8 +67,17 @@ void bt_jobs_start(void *of, int n, int threads)
 void bt_jobs_end(void *of, bool stop)
 {
     bt_jobs *j = of;
-    for (int i = 0; i < j->n && stop; i++) kill((pid_t)j->pid[i], SIGTERM);
-    for (int i = 0; i < j->n; i++)
-        while (waitpid((pid_t)j->pid[i], NULL, 0) < 0 && errno == EINTR) continue;
+    for (int i = 0; i < j->n && stop; i++)
+        if (j->pid[i] > 0) kill((pid_t)j->pid[i], SIGTERM);
+    for (int i = 0; i < j->n; i++) {
+        int how = 0;
+        while (j->pid[i] > 0 && waitpid((pid_t)j->pid[i], &how, 0) < 0 && errno == EINTR) continue;
+        // all else it has said itself
+        if (!stop && WIFSIGNALED(how))
+            fprintf(stderr,
+                    "bergtow: warning: job %d of %d was ended by signal %d (%s); the others took its members over; "
+                    "where memory is short, ask for fewer jobs with --jobs\n",
+                    i + 2, j->n + 1, WTERMSIG(how), strsignal(WTERMSIG(how)));
+    }
     j->n = 0;
 }

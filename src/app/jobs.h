@@ -10,14 +10,15 @@ typedef struct bt_jobs {
     int argc;
     char **argv;
     int n;
-    long pid[BT_MAX_JOBS];
+    long pid[BT_MAX_JOBS]; ///< [n] 0: could not be started
     char threads[16];
 } bt_jobs;
 
 /// Is this process one of them? Then it also ends, with checkpoints, when the one that started it has ended.
 bool bt_jobs_is_one(void);
 
-/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started is reported and done without.
+/// `start` and `end` of bt_ensemble_helpers; of: a bt_jobs. One that cannot be started, or is killed, is reported and
+/// done without.
 void bt_jobs_start(void *of, int n, int threads);
 void bt_jobs_end(void *of, bool stop);
 

@@ -52,3 +52,11 @@ bt_launcher bt_launcher_find(void)
     }
     return by;
 }
+
+void bt_launcher_forget(void)
+{
+    for (int i = 0; i < N_KINDS; i++) {
+        unsetenv(kinds[i].rank);
+        if (kinds[i].size) unsetenv(kinds[i].size);
+    }
+}

@@ -13,4 +13,7 @@ typedef struct bt_launcher {
 
 bt_launcher bt_launcher_find(void);
 
+/// What this process starts from here on has not been started by a launcher: it would take itself for this rank.
+void bt_launcher_forget(void);
+
 #endif

@@ -10,7 +10,8 @@ from faults import SCENARIOS, chosen, not_durable
 
 # runs of each scenario; with ranks, and with three members, each takes seconds
 MOST = {"run": 24, "resume": 16, "run --force": 24, "field": 12, "field to GeoJSON": 8, "run --dump-contacts": 8,
-        "ensemble": 6, "2 ranks": 3, "2 ranks, the second": 3, "run --force, 2 ranks": 3}
+        "ensemble": 6, "ensemble, 2 jobs": 5, "ensemble, 2 jobs, the second": 5, "2 ranks": 3,
+        "2 ranks, the second": 3, "run --force, 2 ranks": 3}
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +67,16 @@ def test_an_attempt_is_on_the_disk_before_it_begins(scenarios):
     for k in noted:
         after = next(c for c in calls[k + 1:] if c.path.startswith(os.path.dirname(calls[k].path)))
         assert after.name in faults.SYNCS and after.path == calls[k].path and after.result == 0
+
+
+def test_a_job_that_cannot_be_started_is_done_without(scenarios):
+    assert scenarios("ensemble, 2 jobs")[0].strike("EAGAIN", ("posix_spawn", ), 1) == "done"
+
+
+def test_a_job_that_is_killed_is_reported_and_its_member_done(scenarios):
+    scenario, _ = scenarios("ensemble, 2 jobs, the second")
+    assert scenario.strike("kill", ("fsync", ), 5) == "done"
+    assert any(c.name == "killed" for c in faults.logged(scenario.base / "log"))
 
 
 def test_a_signal_brings_one_checkpoint(scenarios):

@@ -8,18 +8,26 @@
 //     BT_CALLS_ON=1           and so does every later one, as on a disk that stays full
 //     BT_CALLS_WITH=FAULT     an errno as a number, or "short": half of the bytes are written
 //     BT_CALLS_SIGNAL=NUMBER  the process gets this signal before that call, which is then made
+//     BT_CALLS_IN=first|job   of a call of `ensemble` only the process that was started, or only those it starts; what
+//                             the others call is logged in FILE.other
 //
 // Calls of the system, not functions of the C library: stdio calls write within the library, where a preloaded function
 // of that name is not seen. A filter of seccomp turns each into SIGSYS, and the handler makes the call itself from
 // bt_raw, which the filter lets through by its address. Rejected: strace, whose injection cannot write short, is not
 // on every machine, and costs ten times as much; functions alone, for the reason above.
+//
+// A filter outlives exec and its handler does not, so that what a filtered process starts would die while it is loaded.
+// So posix_spawn asks a process that was forked before the filter was set, and that makes the new one a child of the
+// first (CLONE_PARENT). It counts as a call, "posix_spawn", whatever the path.
 #include <dlfcn.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
+#include <sched.h>
 #include <signal.h>
+#include <spawn.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -27,6 +35,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/prctl.h>
+#include <sys/socket.h>
 #include <sys/syscall.h>
 #include <ucontext.h>
 #include <unistd.h>
@@ -90,9 +99,10 @@ static struct {
     size_t n_under;
     int log, error, writes_short, on, signal;
     long at;
-    char counted[N_CALLS];
+    char counted[N_CALLS], spawns;
 } how = {.log = -1};
 static atomic_long count;
+static int spawner = -1; // socket of the process that starts others
 
 /// The path of an argument, "" where there is none.
 static void path_of(int kind, const long *a, char out[MOST])
@@ -129,21 +139,33 @@ static long fail(int k, const long *a)
     return -how.error;
 }
 
+/// Does the next call meet the fault? counted: it is one of those that are asked for.
+static int meets(int counted)
+{
+    const long n = counted ? atomic_fetch_add(&count, 1) + 1 : 0;
+    return how.at > 0 && (n == how.at || (how.on && n > how.at));
+}
+
+static void note(const char *name, const char *path, const char *second, long result, int met)
+{
+    char line[2 * MOST + 80];
+    if (how.log < 0) return;
+    const int size = snprintf(line, sizeof line, "%s\t%s\t%s\t%ld%s\n", name, path, second, result,
+                              met ? "\tfault" : "");
+    bt_raw(SYS_write, how.log, (long)line, size, 0, 0, 0);
+}
+
 static long take(int k, const long *a)
 {
-    char path[MOST], second[MOST], line[2 * MOST + 80];
+    char path[MOST], second[MOST];
     path_of(calls[k].kind, a, path);
     *second = 0;
     if (calls[k].pairs) path_of(calls[k].kind, a + 1 + (calls[k].kind == AT), second);
     if (strncmp(*second ? second : path, how.under, how.n_under)) return make(calls[k].number, a);
-    const long n = how.counted[k] ? atomic_fetch_add(&count, 1) + 1 : 0;
-    const int met = how.at > 0 && (n == how.at || (how.on && n > how.at));
+    const int met = meets(how.counted[k]);
+    if (met && how.signal == SIGKILL) note("killed", path, second, 0, met);
     const long result = met ? fail(k, a) : make(calls[k].number, a);
-    if (how.log >= 0) {
-        const int size = snprintf(line, sizeof line, "%s\t%s\t%s\t%ld%s\n", calls[k].name, path, second, result,
-                                  met ? "\tfault" : "");
-        bt_raw(SYS_write, how.log, (long)line, size, 0, 0, 0);
-    }
+    note(calls[k].name, path, second, result, met);
     return result;
 }
 
@@ -192,6 +214,77 @@ static const char *given(const char *name)
     return value ? value : "";
 }
 
+// --- processes that are started --------------------------------------------------------------------------------------
+
+enum { ROOM = 1 << 16, WORDS = 2000 };
+
+/// Words, and an empty one, which is none of a command nor of an environment.
+static char *packed(char *at, const char *end, char *const *words)
+{
+    for (; *words && at + strlen(*words) + 2 < end; words++) at = stpcpy(at, *words) + 1;
+    *at++ = 0;
+    return at;
+}
+
+static char *unpacked(char *at, char **words)
+{
+    int n = 0;
+    for (; *at && n < WORDS; at += strlen(at) + 1) words[n++] = at;
+    words[n] = NULL;
+    return at + 1;
+}
+
+/// A message holds words and environment; the answer is the pid.
+static _Noreturn void start_others(int s)
+{
+    static char message[ROOM + 1];
+    static char *words[WORDS + 1], *env[WORDS + 1];
+    while (recv(s, message, ROOM, 0) > 0) {
+        unpacked(unpacked(message, words), env);
+        const int pid = (int)syscall(SYS_clone, CLONE_PARENT | SIGCHLD, 0, 0, 0, 0);
+        if (pid == 0) {
+            execve("/proc/self/exe", words, env);
+            _exit(127);
+        }
+        if (send(s, &pid, sizeof pid, 0) < 0) break;
+    }
+    _exit(0);
+}
+
+static void fork_spawner(void)
+{
+    int ends[2];
+    if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) _exit(99);
+    if (fork() == 0) {
+        close(ends[0]);
+        start_others(ends[1]);
+    }
+    close(ends[1]);
+    spawner = ends[0];
+}
+
+int posix_spawn(pid_t *pid, const char *path, const posix_spawn_file_actions_t *actions, const posix_spawnattr_t *attr,
+                char *const argv[], char *const envp[])
+{
+    static char message[ROOM];
+    if (spawner < 0) {
+        int (*real)(pid_t *, const char *, const posix_spawn_file_actions_t *, const posix_spawnattr_t *, char *const *,
+                    char *const *);
+        *(void **)&real = dlsym(RTLD_NEXT, "posix_spawn");
+        return real(pid, path, actions, attr, argv, envp);
+    }
+    const int met = meets(how.spawns);
+    int started = -1;
+    if (!met) {
+        const char *last = message + ROOM, *end = packed(packed(message, last, argv), last, envp);
+        if (send(spawner, message, (size_t)(end - message), 0) < 0 || recv(spawner, &started, sizeof started, 0) < 0)
+            return EIO;
+        *pid = started;
+    }
+    note("posix_spawn", path, "", met ? -how.error : started, met);
+    return met ? how.error : started < 0 ? EAGAIN : 0;
+}
+
 __attribute__((constructor)) static void begin(void)
 {
     // the filter outlives a second start of the program, and its handler does not
@@ -205,12 +298,20 @@ __attribute__((constructor)) static void begin(void)
             how.counted[k] |= (at == names || at[-1] == ',') && (at[n] == ',' || !at[n]);
         how.counted[k] |= !strcmp(names, "all");
     }
-    how.at = atol(given("BT_CALLS_AT"));
+    how.spawns = strstr(names, "posix_spawn") != NULL;
+    const char *in = given("BT_CALLS_IN");
+    const int job = *given("BERGTOW_JOB") != 0, struck = !*in || job == !strcmp(in, "job");
+    how.at = struck ? atol(given("BT_CALLS_AT")) : 0;
     how.on = *given("BT_CALLS_ON") != 0;
     how.signal = atoi(given("BT_CALLS_SIGNAL"));
     how.writes_short = !strcmp(given("BT_CALLS_WITH"), "short");
     how.error = atoi(given("BT_CALLS_WITH"));
-    if (*given("BT_CALLS_LOG")) how.log = open(given("BT_CALLS_LOG"), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    if (*given("BT_CALLS_LOG")) {
+        char path[MOST];
+        snprintf(path, sizeof path, "%s%s", given("BT_CALLS_LOG"), struck ? "" : ".other");
+        how.log = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+    }
+    if (*in && !job) fork_spawner();
     struct sigaction act = {.sa_sigaction = on_call, .sa_flags = SA_SIGINFO | SA_NODEFER};
     sigaction(SIGSYS, &act, NULL);
     filter();

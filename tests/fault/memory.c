@@ -3,6 +3,7 @@
 //
 //     BT_MEMORY_AT=N      the N-th request, from 1, is refused
 //     BT_MEMORY_LOG=FILE  how many there were, at the end
+//     BT_CALLS_IN         as in calls.c: which process is meant
 //
 // Counted are requests from the program's own code, seen by the address they return to. Those of the libraries are
 // theirs: what MPI does without memory is nothing that the program could mend.
@@ -15,6 +16,7 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 void *__libc_malloc(size_t size);
@@ -78,8 +80,9 @@ static int take_program(struct dl_phdr_info *info, size_t size, void *data)
 
 __attribute__((constructor)) static void begin(void)
 {
-    const char *at = getenv("BT_MEMORY_AT");
+    const char *at = getenv("BT_MEMORY_AT"), *in = getenv("BT_CALLS_IN");
     if (!getenv("BERGTOW_STARTED")) return;
+    if (in && (getenv("BERGTOW_JOB") != NULL) != !strcmp(in, "job")) return;
     refused = at ? atol(at) : 0;
     dl_iterate_phdr(take_program, NULL);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Reads, writes and closes that fail once, at every place of a small file in turn: each is reported in the system's own
-// words, none is taken for damage, and none passes because the next call succeeds. Files cut off early are known as
-// ours.
+// Reads, writes, syncs and closes that fail once, at every place of a small file in turn: each is reported in the
+// system's own words, none is taken for damage, and none passes because the next call succeeds. Files cut off early are
+// known as ours.
 #include <errno.h>
 #include <hdf5.h>
 #include <setjmp.h>
@@ -20,10 +20,11 @@
 #include "base/h5read.h"
 #include "base/h5util.h"
 
-enum { WRITE, READ, CLOSE };
-static const int reason_of[] = {[WRITE] = ENOSPC, [READ] = EIO, [CLOSE] = EDQUOT};
+enum { WRITE, READ, CLOSE, SYNC };
+static int reason_of[] = {[WRITE] = ENOSPC, [READ] = EIO, [CLOSE] = EDQUOT, [SYNC] = EIO};
 static int failing = -1;  // a call of this kind, once
 static long calls_before; // so many that succeed come first
+static int syncs, closes; // calls so far
 
 static bool fails(int kind)
 {
@@ -47,7 +48,14 @@ ssize_t pread(int fd, void *to, size_t n, off_t at)
 int close(int fd)
 {
     const int status = (int)syscall(SYS_close, fd);
+    closes++;
     return fails(CLOSE) ? -1 : status;
+}
+
+int fsync(int fd)
+{
+    syncs++;
+    return fails(SYNC) ? -1 : (int)syscall(SYS_fsync, fd);
 }
 
 static bt_status make(const char *path, bt_errors *err)
@@ -103,11 +111,35 @@ static void each_failed_call_is_reported(void **state)
     assert_in_range(every(WRITE, 0, path, make), 10, 200);
     failing = CLOSE, calls_before = 100;
     assert_int_equal(make(path, &err), BT_OK);
-    const int closes = 100 - (int)calls_before; // of which the last is that of the file that was written
-    assert_int_equal(every(CLOSE, closes - 1, path, make), closes);
+    const int n_closes = 100 - (int)calls_before; // of which the last is that of the file that was written
+    assert_int_equal(every(CLOSE, n_closes - 1, path, make), n_closes);
     assert_int_equal(bt_checksum_write(path, BT_CHECKSUM_FIELD, &err), BT_OK);
     assert_in_range(every(READ, 0, path, take), 5, 100);
     unlink(path);
+}
+
+/// A signal in the middle of a sync is no failure, nor proof that bytes are on the disk: it is made again. After one at
+/// a close the descriptor is gone all the same, and may be another file's by then: it is not closed again. What is no
+/// signal is a failure.
+static void a_signal_at_a_sync_and_at_a_close(void **state)
+{
+    (void)state;
+    char path[] = "/tmp/bergtow-signal-XXXXXX";
+    for (int signal = 0; signal < 2; signal++) {
+        const int sync_reason = reason_of[SYNC], close_reason = reason_of[CLOSE];
+        if (signal) reason_of[SYNC] = reason_of[CLOSE] = EINTR;
+        int fd = mkstemp(path);
+        syncs = closes = 0;
+        failing = SYNC, calls_before = 0;
+        assert_int_equal(bt_file_sync(fd), signal ? 0 : sync_reason);
+        assert_int_equal(syncs, 1 + signal);
+        failing = CLOSE, calls_before = 0;
+        assert_int_equal(bt_file_close(fd), signal ? 0 : close_reason);
+        assert_int_equal(closes, 1);
+        reason_of[SYNC] = sync_reason, reason_of[CLOSE] = close_reason;
+        unlink(path);
+        memcpy(strrchr(path, '-'), "-XXXXXX", 8);
+    }
 }
 
 /// A text of which the system gives a part and then an error: here nothing at all, and the error at once.
@@ -164,6 +196,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_failed_call_is_reported),
+        cmocka_unit_test(a_signal_at_a_sync_and_at_a_close),
         cmocka_unit_test(a_text_that_cannot_be_read),
         cmocka_unit_test(a_file_with_fewer_bytes_than_its_size),
         cmocka_unit_test(what_was_cut_off_early_is_ours),

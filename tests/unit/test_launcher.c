@@ -57,6 +57,24 @@ static void nobody_has_launched_it(void **state)
     expect(IN("PMI_RANK=x"), false, false, 0);
 }
 
+/// What a rank starts is told of no launcher, and of all else.
+static void none_is_known_once_it_is_forgotten(void **state)
+{
+    (void)state;
+    char *variables[] = {"OMPI_COMM_WORLD_RANK=0", "OMPI_COMM_WORLD_SIZE=1", "PMI_RANK=0", "PMI_SIZE=1", "PMI_ID=0",
+                         "MV2_COMM_WORLD_RANK=0", "MV2_COMM_WORLD_SIZE=1", "JSM_NAMESPACE_RANK=0",
+                         "JSM_NAMESPACE_SIZE=1", "HOME=/root", "FLUX_TASK_RANK=0", "FLUX_JOB_SIZE=1", "PALS_RANKID=0",
+                         "ALPS_APP_PE=0", "PMIX_RANK=0", "SLURM_PROCID=0", "SLURM_STEP_NUM_TASKS=2", NULL};
+    char **kept = environ;
+    environ = variables;
+    bt_launcher_forget();
+    const bt_launcher by = bt_launcher_find();
+    environ = kept;
+    assert_false(by.found);
+    assert_string_equal(variables[0], "HOME=/root");
+    assert_null(variables[1]);
+}
+
 // mpirun of a job has started its servers, one a node, with srun.
 static void the_innermost_launcher_counts(void **state)
 {
@@ -90,6 +108,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_launcher_is_known),
         cmocka_unit_test(nobody_has_launched_it),
+        cmocka_unit_test(none_is_known_once_it_is_forgotten),
         cmocka_unit_test(the_innermost_launcher_counts),
         cmocka_unit_test(cores_are_those_that_were_given),
     };

@@ -4,6 +4,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 
+#include "space/exchange.h"
 #include "space/phases.h"
 #include "all_pairs.h"
 
@@ -11,13 +12,16 @@
 typedef struct {
     atomic_int *holder; ///< [n bodies] 1 + cell that works on it, 0 = none
     int *stamp;         ///< [n bodies] the latest phase that it met
-    atomic_int *visits; ///< [n cells]
+    atomic_int *visits; ///< [n cells] begun
+    atomic_int *done;   ///< [n cells]
     atomic_int shared, early;
 } log_of_pass;
 
 typedef struct {
     log_of_pass *log;
-    int held_up; ///< this thread takes long over each cell; −1 = none, −2 = any over some cells
+    /// this thread takes long over each cell; −1 = none, −2 = any over some cells, −3 = another than the first at the
+    /// border
+    int held_up;
 } visitor;
 
 static void take_long(double seconds)
@@ -28,6 +32,25 @@ static void take_long(double seconds)
 
 static bool movable(const bt_world *w, bt_idx i) { return w->bodies.inv[i].m > 0; }
 
+/// What other ranks would see of the pass. Nothing is asserted there: it is called in the middle of a team of threads.
+static struct {
+    const log_of_pass *log;
+    atomic_int sent;
+    int received, wrong;
+    atomic_int at_work[BT_PHASES]; ///< another thread than the first has begun a border cell
+} elsewhere;
+
+/// The first thread does not begin the border before another one has; that one then waits whether it is sent without
+/// it. Either gives up after some time.
+static void hold_up_border(int phase)
+{
+    const double until = bt_clock() + 0.03;
+    const bool first = omp_get_thread_num() == 0;
+    if (!first && atomic_exchange(&elsewhere.at_work[phase], 1) != 0) return;
+    while (bt_clock() < until && !(first ? elsewhere.at_work[phase] : elsewhere.sent > phase)) {}
+    if (first) elsewhere.at_work[phase] = 1;
+}
+
 static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
 {
     const visitor *v = context;
@@ -36,6 +59,7 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     const int now = cell->phase;
     atomic_fetch_add(&log->visits[k], 1);
     if (v->held_up == omp_get_thread_num()) take_long(20e-6);
+    if (v->held_up == -3 && cell->border) hold_up_border(now);
     if (v->held_up == -2 && k * 7 % 101 == 0) take_long(200e-6);
     for (bt_idx j = 0; j < cell->n_contacts; j++) {
         const bt_idx ends[2] = {cell->contacts[j].a, cell->contacts[j].b};
@@ -53,6 +77,31 @@ static void visit(bt_world *w, bt_idx k, const void *context, bt_totals *t)
     }
     bt_sum_add(&t->sum[0], cell->n_contacts);
     t->most = bt_max(t->most, 1);
+    atomic_fetch_add(&log->done[k], 1);
+}
+
+/// Cells of later phases that have been visited.
+static int later(const bt_world *w, int phase)
+{
+    int n = 0;
+    for (bt_idx i = w->cells->start[phase + 1]; i < w->cells->n_order; i++)
+        n += elsewhere.log->visits[w->cells->order[i]] != 0;
+    return n;
+}
+
+/// All border cells of the phase are done, and are sent once, phase by phase.
+static void send_phase(bt_world *w, int phase, bt_vel *v)
+{
+    (void)v;
+    elsewhere.wrong += elsewhere.sent++ != phase || later(w, phase) > 0;
+    for (bt_idx i = w->cells->start[phase]; i < w->cells->start[phase] + w->cells->n_border[phase]; i++)
+        elsewhere.wrong += elsewhere.log->done[w->cells->order[i]] != 1;
+}
+
+static void receive_phase(bt_world *w, int phase, bt_vel *v)
+{
+    (void)v;
+    elsewhere.wrong += elsewhere.received++ != phase || elsewhere.sent != phase + 1 || later(w, phase) > 0;
 }
 
 /// One pass; a thread may be held up (visitor).
@@ -61,9 +110,16 @@ static void assert_sound(bt_world *w, int held_up)
     const size_t bodies = (size_t)w->bodies.n, cells = (size_t)w->cells->n;
     log_of_pass log = {.holder = bt_alloc(bodies, sizeof *log.holder),
                        .stamp = bt_alloc(bodies, sizeof *log.stamp),
-                       .visits = bt_alloc(cells, sizeof *log.visits)};
+                       .visits = bt_alloc(cells, sizeof *log.visits),
+                       .done = bt_alloc(cells, sizeof *log.done)};
     bt_totals t = {.n_sums = 1};
-    bt_phases_run(w, visit, &(visitor){&log, held_up}, NULL, &t);
+    elsewhere.log = &log;
+    elsewhere.sent = elsewhere.received = elsewhere.wrong = 0;
+    for (int p = 0; p < BT_PHASES; p++) elsewhere.at_work[p] = 0;
+    bt_phases_run(w, visit, &(visitor){&log, held_up}, w->exchange ? w->bodies.vel : NULL, &t);
+    assert_int_equal(elsewhere.sent, w->exchange ? BT_PHASES : 0);
+    assert_int_equal(elsewhere.received, elsewhere.sent);
+    assert_int_equal(elsewhere.wrong, 0);
     assert_int_equal(log.shared, 0);
     assert_int_equal(log.early, 0);
     CHECK_CLOSE(bt_sum_value(&t.sum[0]), w->cells->n_contacts, 0);
@@ -72,6 +128,7 @@ static void assert_sound(bt_world *w, int held_up)
     free(log.holder);
     free(log.stamp);
     free(log.visits);
+    free(log.done);
 }
 
 typedef struct {
@@ -128,6 +185,33 @@ static void every_body_meets_its_cells_in_order(void **state)
             assert_sound(w, f % threads);
             bt_world_free(w);
         }
+}
+
+/// The cells at the border of a rank come first in each phase, and what they do is sent when they are all done, however
+/// long one of them takes.
+static void the_border_is_done_before_it_is_sent(void **state)
+{
+    (void)state;
+    static const bt_exchange fake = {.send = send_phase, .receive = receive_phase};
+    uint64_t rng = 5;
+    for (int threads = 1; threads <= 4; threads++) {
+        omp_set_num_threads(threads);
+        bt_world *w = fill(&scenes[5], &rng);
+        bt_cells *t = w->cells;
+        for (bt_idx k = 0; k < t->n; k++) t->cell[k].border = k % 3 == 0 || k == t->n - 1;
+        w->exchange = &fake;
+        bt_phases_order(w);
+        for (int p = 0; p < BT_PHASES; p++) {
+            assert_true(t->n_border[p] > 0);
+            for (bt_idx i = t->start[p]; i < t->start[p + 1]; i++)
+                assert_int_equal(t->cell[t->order[i]].border, i < t->start[p] + t->n_border[p]);
+        }
+        assert_sound(w, -1);
+        assert_sound(w, -2);
+        if (threads > 1) assert_sound(w, -3);
+        w->exchange = NULL;
+        bt_world_free(w);
+    }
 }
 
 /// Lists of all lengths: the shares are of listed contacts, and hold every cell once.
@@ -190,6 +274,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_body_meets_its_cells_in_order),
+        cmocka_unit_test(the_border_is_done_before_it_is_sent),
         cmocka_unit_test(shares_follow_the_lists),
         cmocka_unit_test(a_small_team_does_all),
     };

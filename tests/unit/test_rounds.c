@@ -126,6 +126,81 @@ static void a_solution_is_kept_whatever_came_before(void **state)
     assert_int_equal(made_up.puts, 0);
 }
 
+enum { LENGTH = 3, SEEN = 3 * LENGTH };
+
+/// Two cells far apart, each with a pair of floes that gains 1 m/s in every sweep over it. The second is listed from
+/// the residual pass after the first round on.
+static struct {
+    int passes[2], sweeps[2];
+    double speed[2][SEEN]; ///< as each sweep over it finds it
+} apart;
+
+static int which(const bt_world *w, bt_idx k) { return w->cells->cell[k].x > 2; }
+
+static void list_in_turn(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context;
+    bt_cell *cell = &w->cells->cell[k];
+    bt_rounds_list(cell);
+    if (apart.passes[which(w, k)]++ >= which(w, k)) cell->work.list[cell->work.n_list++] = 0;
+    t->most = 9;
+}
+
+static void speed_up(bt_world *w, bt_idx k, const void *context, bt_totals *t)
+{
+    (void)context;
+    const bt_cell *cell = &w->cells->cell[k];
+    const int c = which(w, k), n = apart.sweeps[c];
+    t->most = 1e3;
+    if (cell->work.n_list == 0) return;
+    if (n < SEEN) apart.speed[c][n] = w->bodies.vel[cell->first].x, apart.sweeps[c]++;
+    for (bt_idx i = cell->first; i < cell->end; i++) w->bodies.vel[i].x += 1;
+}
+
+/// Momentum is that of Nesterov, by what the last sweep has changed, and goes on from one round to the next; of a cell
+/// that comes into the lists with the second there is no such change, and it has none before its first sweep.
+static void what_is_new_in_the_lists_has_no_momentum(void **state)
+{
+    (void)state;
+    memset(&apart, 0, sizeof apart);
+    bt_world *w = bt_world_create(&(bt_params){.dt = 1, .size = 1, .max_sweeps = 1});
+    double v[8];
+    scene_square(1, v);
+    for (int i = 0; i < 4; i++) {
+        bt_body_def d = scene_prism(4, v, 900);
+        d.x = i / 2 * 30 + i % 2 + 1, d.y = 2;
+        bt_world_add(w, &d);
+    }
+    detect_all(w, 0.1);
+    assert_int_equal(w->cells->n_order, 2);
+    for (bt_idx i = 0; i < 4; i++) w->bodies.vel[i].x = 7;
+    const bt_problem p = {.residual = list_in_turn, .sweep = speed_up, .vel = w->bodies.vel, .tolerance = 1, .cap = 0.9,
+                          .length = LENGTH, .limit = SEEN};
+    bt_work work = {0};
+    bt_rounds_residual(w, &p, true, &work);
+    bt_rounds_run(w, &p, &work);
+    double theta = 1, now[2] = {7, 7}, before[2] = {7, 7};
+    for (int n = 0; n < 2 * LENGTH; n++) {
+        if (n > 0) {
+            const double next = 0.5 * (1 + sqrt(1 + 4 * theta * theta)), beta = (theta - 1) / next;
+            theta = next;
+            for (int c = 0; c < 2; c++) {
+                const double moved = now[c] + beta * (now[c] - before[c]);
+                before[c] = now[c];
+                now[c] = moved;
+            }
+        }
+        for (int c = 0; c < 2; c++) {
+            const int at = c ? n - LENGTH : n; // of the sweeps over it
+            if (at < 0) continue;
+            CHECK_CLOSE(apart.speed[c][at], now[c], 1e-12);
+            now[c] += 1;
+        }
+    }
+    assert_true(now[1] > 7 + LENGTH + 0.5); // it has momentum later
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -133,6 +208,7 @@ int main(void)
         cmocka_unit_test(a_better_end_stays),
         cmocka_unit_test(a_result_far_off_has_further_attempts),
         cmocka_unit_test(a_solution_is_kept_whatever_came_before),
+        cmocka_unit_test(what_is_new_in_the_lists_has_no_momentum),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

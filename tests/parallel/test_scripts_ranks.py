@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: MIT
+"""Commands that are scripts and start runs of their own, under mpirun: on one rank as without it, on more refused."""
+import subprocess
+
+import pytest
+
+from harness import BERGTOW, DONE, TOW, USAGE, changed, differing, environment, write_case
+from test_ranks_output import mpirun, ours
+
+CASE = changed(TOW, run__duration=40, output__window_start=8, domain__length=14, ice__concentration=0.3, ice__size=0.9)
+
+
+@pytest.mark.parametrize("command", ["budget", "capability", "converge", "design", "outlines"])
+def test_two_ranks_are_refused(tmp_path, command):
+    """Each would make the same study, in the same folder."""
+    write_case(tmp_path, CASE)
+    result = mpirun(2, command, "case.yml", "-o", "out", cwd=tmp_path)
+    assert result.returncode == USAGE and not result.stdout
+    assert ours(result) == [f"bergtow: {command}: is no program of ranks; call it without mpirun or srun: what runs it "
+                            "needs it starts itself, as many at a time as --jobs says"]
+    assert [p.name for p in tmp_path.iterdir()] == ["case.yml"]
+
+
+def test_a_study_on_one_rank_is_that_without_mpirun(tmp_path):
+    """What the script starts does not take itself for the rank that it was started by."""
+    write_case(tmp_path, CASE)
+    result = mpirun(1, "design", "case.yml", "-o", "out", "--concentrations", "0.2,0.3", "--fields", 5, cwd=tmp_path,
+                    timeout=150)
+    assert result.returncode == DONE and not ours(result), result.stderr
+    assert {"report.html", "report.pdf", "replay.html"} <= {p.name for p in (tmp_path / "out").iterdir()}
+    again = subprocess.run([BERGTOW, "ensemble", "out/design.yml", "-o", "again"], cwd=tmp_path, capture_output=True,
+                           text=True, timeout=150, env=environment())
+    assert again.returncode == DONE, again.stderr
+    assert differing(tmp_path / "out/ensemble.h5", tmp_path / "again/ensemble.h5") == []
