@@ -47,28 +47,28 @@ enum { BT_VALIDATE_STEPS = 20 };
 /// Does this rank answer for body i?
 bool bt_domain_owns(const bt_world *w, bt_idx i);
 
-/// Maxima over the ranks. Collective.
+/// Collective. Maxima over the ranks.
 void bt_domain_maxima(const bt_world *w, double *x, int n);
-/// Totals of a pass over the ranks. Collective.
+/// Collective. Totals of a pass over the ranks.
 void bt_domain_reduce(const bt_world *w, bt_totals *t);
-/// Sum modulo 2⁶⁴ over the ranks. Collective.
+/// Collective. Sum modulo 2⁶⁴ over the ranks.
 uint64_t bt_domain_sum_words(const bt_world *w, uint64_t x);
 
-/// Rows of doubles [n][width] of all ranks to rank 0, see bt_comm_gather; only with a division. Collective.
+/// Collective. Rows of doubles [n][width] of all ranks to rank 0, see bt_comm_gather; only with a division.
 double *bt_domain_gather(const bt_world *w, int64_t n, int width, const double *rows, int64_t *total);
 
-/// After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong now. Takes
-/// and returns the memory. Collective.
+/// Collective. After labelling: choose owners, move bodies (owned and ghosts) and contact memory to where they belong
+/// now. Takes and returns the memory.
 bt_memory *bt_domain_migrate(bt_world *w, bt_memory *memory, int64_t *n);
-/// After the cells have been made: what is exchanged with whom. Collective.
+/// Collective. After the cells have been made: what is exchanged with whom.
 void bt_domain_connect(bt_world *w);
 
 /// What is to be done with the value, above 0, of a cell of another rank.
 typedef void bt_take_cell(bt_cells *t, int32_t x, int32_t y, double value);
-/// Send a value [n cells] of the cells of this rank to the ranks that hold cells beside them, and take theirs.
-/// Collective.
+/// Collective. Send a value [n cells] of the cells of this rank to the ranks that hold cells beside them, and take
+/// theirs.
 void bt_domain_tell_cells(bt_world *w, const double *value, bt_take_cell *take);
-/// After the detection: which bodies the contacts of this step touch. Collective.
+/// Collective. After the detection: which bodies the contacts of this step touch.
 void bt_domain_select(bt_world *w);
 /// Floes here that have a contact with a large movable body of another rank.
 void bt_domain_beside_large(bt_world *w, void (*mark)(bt_world *w, bt_idx body));
@@ -77,20 +77,20 @@ void bt_domain_moved_elsewhere(bt_world *w, void (*mark)(bt_world *w, bt_idx bod
 /// After a phase: send what its border cells changed in v (an array over the bodies), and receive what others did.
 void bt_domain_send(bt_world *w, int phase, bt_vel *v);
 void bt_domain_receive(bt_world *w, int phase, bt_vel *v);
-/// After the solve: velocities of large bodies, the tow line's impulse, and displacements (an array over the bodies, or
-/// NULL) to all ranks. Collective.
+/// Collective. After the solve: velocities of large bodies, the tow line's impulse, and displacements (an array over
+/// the bodies, or NULL) to all ranks.
 void bt_domain_settle(bt_world *w, bt_vel *shift);
 
-/// Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without others; the
-/// caller frees. Collective.
+/// Collective. Records of `size` bytes from all ranks, in the order of the ranks: a copy of this rank's n without
+/// others; the caller frees.
 void *bt_domain_gather_all(const bt_world *w, const void *mine, size_t n, size_t size, size_t *n_all);
 
-/// Largest value of every body over the ranks that hold it: x [n bodies]. Collective.
+/// Collective. Largest value of every body over the ranks that hold it: x [n bodies].
 void bt_domain_largest(const bt_world *w, double *x);
 
-/// Join the names of islands that meet in a body held by several ranks: name [n bodies] in and out. Collective.
+/// Collective. Join the names of islands that meet in a body held by several ranks: name [n bodies] in and out.
 void bt_domain_join_names(const bt_world *w, bt_gid *name);
-/// Add sums of islands with the same name over the ranks. Collective.
+/// Collective. Add sums of islands with the same name over the ranks.
 void bt_domain_add_by_name(const bt_world *w, const bt_idx *root, const bt_gid *name, bt_sum *sum);
 
 #endif

@@ -5,7 +5,8 @@ Time of one step on P ranks with N floes, in the terms of README.md:
 
     T(P) = N/P (S c t_c + t_f) (1 + imbalance)  +  N/P halo_max t_g          sweeps and the rest of the step; ghosts
          + S (5 alpha neighbours_max + 24 B beta sent_max)                   4 colours and the berg, each sweep
-         + (S + 3) log2 P (alpha + 150 B beta)                               exact sums: one a sweep, three a step
+         + (S + R + 9) log2 P (alpha + 150 B beta)                           exact sums: a sweep, a residual pass (R a
+                                                                             step, rounds of 50 sweeps); nine a step
 
     strong efficiency = T(1) / (P T(P)) at fixed N,  weak efficiency = T(1) / T(P) at fixed N/P
 """
@@ -16,6 +17,7 @@ import pathlib
 import sys
 
 BODY, SUM = 24, 150  # bytes: three velocities of a body; one exact sum with its header
+ROUND, OTHER_SUMS = 50, 9  # sweeps between residual passes; reductions of a step beside those and the sweeps'
 
 
 def options():
@@ -50,7 +52,7 @@ def step(row, o, wait):
         "ghosts": own * float(row["halo_max"]) * o.ghost * 1e-9,
         "latency": o.sweeps * 5 * alpha * float(row["neighbours_max"]) if ranks > 1 else 0.0,
         "bandwidth": o.sweeps * BODY * beta * float(row["sent_max"]),
-        "sums": (o.sweeps + 3) * math.log2(ranks) * (alpha + SUM * beta),
+        "sums": (o.sweeps + 1 + o.sweeps / ROUND + OTHER_SUMS) * math.log2(ranks) * (alpha + SUM * beta),
     }
 
 

@@ -146,8 +146,9 @@ def main(argv=None):
                                 "fields, of each parameter, and of the computation.")
     p.add_argument("study", metavar="STUDY.yml", type=Path)
     p.add_argument("-o", "--output", metavar="DIR", type=Path, help="folder of the ensemble (default: out/STUDY)")
-    p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a quantile "
-                   f"of a load in %%, as the moving mean over its time scale; may be repeated (default: {', '.join(OF)})")
+    p.add_argument("--of", action="append", metavar="NUMBER", help="number of the summary, or LOAD:SHARE for a "
+                   "quantile of a load in %%, as the moving mean over its time scale; may be repeated (default: "
+                   f"{', '.join(OF)})")
     p.add_argument("--converge", metavar="FILE", type=Path, help="converge.json of the base case, for what the "
                    "computation adds")
     findings.add_options(p, BUDGET)

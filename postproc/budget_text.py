@@ -59,7 +59,8 @@ def notes(found):
         shares = (f"Shares of {s['scale']}: polynomial expansion of degree {s['degree']}, {s['terms']} terms; it "
                 f"predicts {100 * s['q2']:.0f} % of the variance of conditions that it has not seen (Q²).{trust}")
     n = found["numerics"]
-    rest = "" if n or ":" in found["of"] else " Numerics: run `bergtow converge` on the base case and name its file with --converge."
+    rest = "" if n or ":" in found["of"] else \
+        " Numerics: run `bergtow converge` on the base case and name its file with --converge."
     left = found["wanted"] - found["members"]
     missing = f" {left} of {found['wanted']} members are missing." if left else ""
     return (f"{found['meaning']}; standard deviations, 95 % in brackets. {found['conditions']} conditions, "

@@ -277,7 +277,8 @@ def report(s, markdown=False):
         lines += ["", heading("Convergence"), "", converge_text.text(s["convergence"], markdown)]
     for title, part in (("Loads", loads_text.signals), ("Quantiles of loads", loads_text.quantiles),
                         ("Return levels of loads", loads_text.returns),
-                        ("Mean ice resistance", means), ("Comparison with published estimates", estimates), ("Distributions", fits),
-                        ("Peaks of collisions", extremes), ("Sensitivity of the mean ice resistance", sensitivity)):
+                        ("Mean ice resistance", means), ("Comparison with published estimates", estimates),
+                        ("Distributions", fits), ("Peaks of collisions", extremes),
+                        ("Sensitivity of the mean ice resistance", sensitivity)):
         lines += ["", heading(title), "", part(s, markdown)]
     return "\n".join(lines)

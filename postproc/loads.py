@@ -166,8 +166,8 @@ def _inertia(e, rows, end, scale):
 
 def panels(e, rows):
     """Means over the window and largest step means of every panel of the hull, over fields: {"mean", "mean_95",
-    "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their middles from the body's x axis towards
-    y, "units", "fields"}; None where members have none, or unlike numbers of them."""
+    "mean_of_largest", "mean_of_largest_95", "largest" [P], "bearing_deg" [P] of their middles from the body's x axis
+    towards y, "units", "fields"}; None where members have none, or unlike numbers of them."""
     mean, largest, units, middle = [], [], "", None
     for m in rows:
         try:

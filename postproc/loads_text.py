@@ -127,9 +127,9 @@ def signals(s, markdown):
         rows += _rows_of(s, name, cells)
     if not rows:
         return "No loads: no member has a window with a towed body."
-    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so that "
-            "means differ a little from those of the whole window. In the start: the largest before the window, which "
-            "is in no other number. 95 %: interval over fields.")
+    note = ("Of the signal in the window, from its first time scale on, as the moving mean over the time given, so "
+            "that means differ a little from those of the whole window. In the start: the largest before the window, "
+            "which is in no other number. 95 %: interval over fields.")
     return table(head, rows, markdown) + "\n\n" + "\n".join([note, *conversions(s), *panel_lines(s)])
 
 
@@ -203,10 +203,11 @@ def returns(s, markdown):
                              number(f["p_value"], 2), *(level(at.get(T), factor) for T in hours), unit,
                              number(x["hours"])])
     note = ("Levels of the whole signal, quasi-static loads and collisions together, that are exceeded once in so many "
-            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): below "
-            "0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, "
-            "profile likelihood, widened by the scatter between fields. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels are little more "
-            f"than the largest value seen. No bound: the upper end is more than {text_table.FAR:g} times the level.")
+            "hours of tow on the average. GPD: clusters over a threshold; GEV: block maxima. p (Anderson–Darling): "
+            "below 0.05 the tail does not fit. A shape below 0 has an end. Brackets: 95 %, profile likelihood, widened "
+            "by the scatter between fields. * beyond the hours simulated: extrapolated. ! shape below -0.5: the levels "
+            "are little more than the largest value seen. No bound: the upper end is more than "
+            f"{text_table.FAR:g} times the level.")
     # what to do about it is for a terminal
     said = (f"No fit for {load}, {tail}, {several([x.split(';')[0] if markdown else x for x in some])}."
             for (load, tail), some in refused.items())

@@ -65,7 +65,8 @@ def draw(conditions, numeric, axis_label, times):
     if starts:
         axes.plot(x[[k for k, _ in starts]], [v / factor for _, v in starts], "^", color=style.INK, markersize=6,
                   markerfacecolor="none", zorder=3, label="in the start, in no other number")
-    ends = [v for _, v in starts] + [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ()) if np.isfinite(v)]
+    ends = [v for _, v in starts] + [v for d in [*tows, *tensions] if d for v in d.get("interval_95", ())
+                                     if np.isfinite(v)]
     axes.set_ylim(0, 1.08 * min(top, max([largest, *(d["largest"] for d in tows if d), *ends])) / factor)
     axes.set_ylabel(f"force ({unit})")
     axes.set_xticks(x, [f"{times(key) * v:.4g}" for v in x] if key else [c["label"] for c in conditions],

@@ -240,10 +240,11 @@ def provenance(e):
     said = []
     if len(builds) > 1:
         of = "; ".join(f"revision {build[1] or 'unknown'}: {n}" for build, n in builds.items())
-        said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits ({of}).")
+        said.append(f"The members come from {len(builds)} builds of the program, which need not give the same bits "
+                    f"({of}).")
     if any(str(build[1]).endswith("-dirty") for build in builds):
-        said.append("The program was built from sources with changes that no revision holds: its results cannot be made "
-                    "again from the revision alone.")
+        said.append("The program was built from sources with changes that no revision holds: its results cannot be "
+                    "made again from the revision alone.")
     return rows, " ".join(said) or None
 
 
@@ -351,8 +352,8 @@ def varied(e, values):
 
 
 def ranges(results):
-    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what the
-    program admits."""
+    """{key: (range, whose it is)}: that of the uncertainty budget, with its source, where it varies the key; or what
+    the program admits."""
     out = {key: (text, "admitted") for key, text in report_case.ranges().items() if text}
     for key, given in (results["budget"][1]["assumed"] if "budget" in results else {}).items():
         out[key] = given["distribution"], given["source"] or "assumed"
@@ -393,7 +394,8 @@ def context(folder, place=None, given=None, also=()):
                     and not v.key.startswith(PERSONAL) and report_run.applies(v.key, texts)],
         "ranges": ranges(results), "values": values, "kinds": report_case.KINDS,
         "beside": beside(results), "chapters": parts(found, pictures(e, options, s)),
-        "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts, "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
+        "members": rows_of, "kinds_of_warnings": kinds_of_warnings(rows_of), "counts": counts,
+        "waiting": waiting, "lead": intro[0], "doubts": DOUBTS,
         "replays": replays(e, place or e.path / "report.html"),
         "study": scrubbed(study_text(e)), "provenance": [(name, scrubbed(value)) for name, value in rows]
     }

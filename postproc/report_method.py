@@ -120,7 +120,7 @@ def holds(case, s):
             f" ({number(v['interval_95'][0])} to {number(v['interval_95'][1])})"
             if np.isfinite(v["interval_95"]).all() else "") for label, v in made)))
     rows.append(("breaking load of the line", quantity(case.breaking_load, "N")
-                 if np.isfinite(case.breaking_load) else "none in the case; the tension above is without a safety factor"
+                 if np.isfinite(case.breaking_load) else "none in the case: the tension above has no safety factor"
                  if case.mode != "speed" else "no line in the case: the tow force above is without dynamics of a line "
                  "and without a safety factor"))
     rows.append(("bollard pull of the vessel", quantity(case.bollard_pull, "N")
@@ -145,7 +145,8 @@ def _capability(found):
 
 def _convergence(found):
     """What converge.json says in one line: what matters, what does not, what stayed open."""
-    by = {judged: list(dict.fromkeys(r["name"] for r in found["rows"] if r["judged"] == judged and r["name"] != "fields"))
+    rows = [r for r in found["rows"] if r["name"] != "fields"]
+    by = {judged: list(dict.fromkeys(r["name"] for r in rows if r["judged"] == judged))
           for judged in ("matters", "open", "none")}
     words = (("matters", "it depends on"), ("open", "open is"), ("none", "no effect that matters of"))
     return "; ".join(f"{said} {', '.join(by[judged])}" for judged, said in words if by[judged]) or "nothing compared"
@@ -154,8 +155,8 @@ def _convergence(found):
 def beyond(results):
     """Rows (what, value) of what other commands found, for the answer: {name: found} of findings.py."""
     budget, converge = results.get("budget"), results.get("converge")
-    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and draft "
-             "were not varied beyond the conditions above" if budget is None else "; ".join(
+    rows = [("values that are assumed, standard deviation", "not studied: friction, thickness, size, κ, drag and "
+             "draft were not varied beyond the conditions above" if budget is None else "; ".join(
         f"{100 * b['parameters']['sd'] / abs(b['mean']):.0f} % of the {b['meaning'].split(':')[-1].strip()}"
         for b in (budget, *budget.get("more", [])) if b["parameters"]["sd"] is not None) or "not found")]
     rows.append(("width, length, time step, tolerance, start", "not studied" if converge is None

@@ -230,8 +230,8 @@ def quality(run):
     if run.towed is not None:
         rows += [(f"balance of the body: ice − ({run.balance})",
                   share(n("budget.closure_relative")), "relative to the largest of them"),
-                 ("balance of the ice", share(n("budget.ice_momentum_closure_relative")),
-                  "mean resistance from the momentum of all other bodies, relative")]
+                 ("ice resistance by momentum", share(n("budget.ice_momentum_closure_relative")),
+                  "without the contacts of the body, relative to the largest of them")]
     rows += [("momentum residual", share(n("momentum_residual")),
               "largest of all steps, relative to what a step exchanges"),
              ("steps not converged", f"{n('unconverged_steps'):.0f} of {n('n_steps'):.0f}",

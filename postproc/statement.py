@@ -96,9 +96,10 @@ def _of_the_case(e, rows, case, tow):
     narrow = [text for m in rows for text in e.texts(m) if text.startswith("domain.width:")]
     if narrow:
         widths = re.findall(r"([\d.]+) body widths", narrow[0])
-        out.append(("the domain is narrow for this ice, and floes can arch to walls or to the periodic image: the value "
-                    "can be too large", f"{widths[0]} body widths; {widths[1]} are asked for" if len(widths) == 2 else
-                    f"{len(narrow)} of {len(rows)} members"))
+        how = f"{widths[0]} body widths; {widths[1]} are asked for" if len(widths) == 2 else \
+            f"{len(narrow)} of {len(rows)} members"
+        out.append(("the domain is narrow for this ice, and floes can arch to walls or to the periodic image: the "
+                    "value can be too large", how))
     left = e.summary.get("floes_outside", np.zeros(e.n))[rows]
     if np.nanmax(left, initial=0.0) > 0:
         out.append(("floes left through the open ends of the domain and resist no more: the value can be too small",
@@ -130,8 +131,8 @@ def _of_the_sample(e, rows, c, load):
         out.append((f"extrapolated to more than {FAR:g} times the hours simulated",
                     f"{short(d['times_the_hours_simulated'], 2)} times; with {more} fields {FAR:g} times"))
     if d["irregular"]:
-        out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, and "
-                    "the value can be too small", f"shape {d['shape']:.2g}"))
+        out.append(("the fitted tail ends just above the largest value simulated: the interval cannot be relied on, "
+                    "and the value can be too small", f"shape {d['shape']:.2g}"))
     if d["value"] > 0 and d["interval_95"][1] > WIDE * d["value"]:
         out.append((f"the interval reaches above {WIDE:g} times the value: an order of magnitude at best", ""))
     return out + _of_the_models(load)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The ranks of the program: everything collective that is not part of the time step goes through here.
 //
-// Without MPI (a plain start, a unit test) there is one rank, and every call is a copy or nothing. "Collective." as the
+// Without MPI (a plain start, a unit test) there is one rank, and every call is a copy or nothing. "Collective" as the
 // first word of a comment: all ranks make the call, in the same order.
 #ifndef BERGTOW_COMM_H
 #define BERGTOW_COMM_H

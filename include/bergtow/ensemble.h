@@ -6,8 +6,8 @@
 // that its other files fit, failed when it holds failed.txt (first line: exit code; then the reasons; beside the
 // folder, cCCC-rRRR.failed.txt, where that takes no file), and else waits. DIR/journal.jsonl has a line for each start
 // and end, with wall times (null where the process died before it wrote the line; the next call adds that).
-// DIR/ensemble.h5 (ensemble_file.h) is made anew from the members' files: nothing in it depends on order, ranks, or how
-// often the ensemble was stopped.
+// DIR/ensemble.h5 (src/run/ensemble_file.c) is made anew from the members' files: nothing in it depends on order,
+// ranks, or how often the ensemble was stopped.
 //
 // Soundness. `finished` is a record of the member's summary.json, result.h5 and case.resolved.yml, by length and digest
 // (src/run/ensemble_record.h). Each call reads them all and compares them, shared among its ranks, before it begins (as

@@ -237,7 +237,8 @@ void bt_forces_load(const bt_world *w, bt_idx i, const bt_vel *u, bt_load *l);
 /// b: par, time and towed_at are set here.
 bt_vel bt_forces_drift(const bt_world *w, bt_force_body *b);
 
-/// Drag of one body from its outline, draft and coefficients: multiplied out.
+/// Drag of one body from the moments of its outline, multiplied out: the products of bt_drag (world.h). draft, sail: m;
+/// densities: kg/m³; coefficients of form and skin drag: 1 (bt_drag_coefs).
 bt_drag bt_forces_drag(const bt_moments *m, double draft, double sail, double water_density, double air_density,
                        double water_form, double water_skin, double air_form, double air_skin);
 

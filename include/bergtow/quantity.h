@@ -21,7 +21,7 @@ extern "C" {
 
 enum { BT_MAX_ADDED = 32 }; ///< quantities beside the program's own
 
-/// How the steps of one sample merge, and the steps of the window for the summary.
+/// How steps merge into an entry of the series, and those of the window into the summary.
 typedef enum { BT_KEEP_LAST, BT_KEEP_MEAN, BT_KEEP_MAX, BT_KEEP_SUM } bt_keep;
 enum { BT_KEEP_KINDS = BT_KEEP_SUM + 1 };
 

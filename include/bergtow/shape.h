@@ -54,12 +54,12 @@ int bt_shape_hull(int n, double *v);
 /// (0 when nothing is left).
 int bt_shape_clip(int n, const double *v, double nx, double ny, double d, double *out);
 
-/// Named waterlines of length l (x) and width w (y), centred, bow on +x. v holds BT_MAX_VERTICES vertices.
 /// Names of shapes, in the order of bt_body_shape (bergtow/case.h).
 #define BT_SHAPE_NAMES "disc", "square", "rectangle", "ship"
 
-/// "disc" (64-gon of the area of the ellipse l×w), "square" (side l), "rectangle", "ship" (raked bow over a quarter
-/// of the length, transom of 0.7 w). Returns the number of vertices, 0 when the name is unknown.
+/// A named waterline of length l (x) and width w (y), m, centred, bow on +x, into v: [2*BT_MAX_VERTICES]. "disc"
+/// (64-gon of the area of the ellipse l×w), "square" (side l), "rectangle", "ship" (raked bow over a quarter of the
+/// length, transom of 0.7 w). Returns the number of vertices, 0 when the name is unknown.
 int bt_shape_named(const char *name, double l, double w, double *v);
 
 /// A waterline of length l (x) and width w (y), m, bow on +x, convex and anticlockwise, about any origin: it is moved

@@ -116,8 +116,9 @@ extern const int bt_body_widths[BT_BODY_KINDS];
 /// One kind of numbers of all bodies, out: [bodies][bt_body_widths[kind]]. Errors: BT_ERR_USAGE.
 bt_status bt_simulation_read(const bt_simulation *s, bt_body_numbers kind, double *out);
 
-/// Outline of a body where it is, anticlockwise, about its place: up to `room` points into xy, [room][2] m. Returns how
-/// many there are; 0 where another rank holds the body, or there is none of this id.
+/// Vertices of a body's outline at its present pose, in the frame of the domain, anticlockwise; not wrapped, so they
+/// may lie beyond a periodic end. Up to `room` points into xy, [room][2] m. Returns how many there are; 0 where another
+/// rank holds the body, or there is none of this id.
 int64_t bt_simulation_outline(const bt_simulation *s, int64_t id, double *xy, int64_t room);
 
 /// Give a body another velocity, m/s, rad/s. Errors: BT_ERR_USAGE for no such body, one whose velocity is prescribed or

@@ -5,7 +5,7 @@
 // same terms give the same bits on any number of threads and ranks. A double-precision reduction does not, and a
 // superaccumulator (Collange et al. 2015) keeps bits that no quantity here needs. Terms must stay below
 // 2⁶² ≈ 4.6e18 in magnitude; a larger one, or a NaN, makes the sum NaN instead of wrong. The total must stay below 2⁶³,
-// which is not checked: a caller with many large terms scales them (solver.c).
+// which is not checked: a caller with many large terms scales them (src/solve/rounds.c).
 #ifndef BERGTOW_SUM_H
 #define BERGTOW_SUM_H
 

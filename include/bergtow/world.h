@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 // The bodies and everything one time step works on.
 //
-// Data layout. A body has a hot part that the solver's sweeps touch (velocity, inverse inertia: two arrays of
-// 32 and 16 bytes a body and nothing else), a warm part used once a step (pose, rotated outline, travelled
-// path), and a cold part (mass, drag, polygon in its own frame). Each part is an array of its own over the
-// bodies in storage order, which is the order of the cells (cells.h): neighbours in space are neighbours in memory.
+// Data layout. A body has a hot part, all that sweeps touch (velocity, 32 bytes, in every sweep; inverse inertia, 16
+// bytes, where contacts are not in batches, and when batches are packed), a warm part used once a step (pose, rotated
+// outline, travelled path), and a cold part (mass, drag, polygon in its own frame), read a few times a step at most.
+// Each member is an array of its own over the bodies in storage order, which is the order of the cells (cells.h):
+// neighbours in space are neighbours in memory.
 // Every reference between bodies is a bt_idx into that order and changes when bodies change their cell; the name of a
 // body that stays is its global id (gid), and every order that the result depends on follows from gids and cells, never
-// from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large or
-// fixed bodies.
+// from storage or rank. A rank holds the bodies of its cells, those of cells beside them (ghosts), and all large
+// bodies (walls and the towed body among them).
 //
 // Floes have gids 0..n_floes−1, bodies given by hand, the towed body and walls follow: a pair (a, b) is kept with
 // gid[a] < gid[b], and takes friction and restitution from b, the body with the higher gid (so the towed body's and a
@@ -82,7 +83,7 @@ typedef struct bt_body_def {
 typedef struct bt_bodies {
     bt_idx n, cap;
     // hot
-    bt_vel *vel;          ///< [n] U1 before the solve, U2 after
+    bt_vel *vel;          ///< [n] U1 at the start of the step, U* after bt_forces_predict, U2 after the solve
     bt_inv *inv;          ///< [n]
     // warm
     bt_pose *pose;        ///< [n] X1 before advance, X2 after
@@ -242,7 +243,7 @@ static inline bt_idx bt_world_index(const bt_world *w, bt_gid gid) { return w->b
 /// Index of the towed body, −1 = none. Every rank holds it.
 static inline bt_idx bt_world_towed(const bt_world *w) { return w->towed < 0 ? -1 : w->bodies.index_of[w->towed]; }
 
-/// One step Δt: forces, contacts, solve, advance; see src/step/step.c.
+/// Collective. One step Δt: forces, detection, solve, projection, advance; the order stands in src/step/step.c.
 void bt_world_step(bt_world *w);
 
 /// Bodies in each other at the present poses.
@@ -252,13 +253,15 @@ typedef struct bt_overlaps {
     bt_gid a, b;          ///< the pair with it
 } bt_overlaps;
 
-/// Overlaps of the bodies of this rank.
+/// Collective. Overlaps that this rank finds at the present poses; pairs deeper than allowed, m, are counted. Labels
+/// and storage may be renewed: indices of bodies change then.
 bt_overlaps bt_world_overlaps(bt_world *w, double allowed);
 
-/// Deepest overlap over all pairs at the present poses, m (0 = none). Collective.
+/// Collective. Deepest overlap over all pairs at the present poses, m (0 = none). Indices of bodies may change.
 double bt_world_overlap(bt_world *w);
 
-/// 64-bit hash of all poses and velocities by gid: equal for equal states, however stored or distributed.
+/// Collective. 64-bit hash of the state: poses and velocities by gid, memory of contact laws, step, window, drift of
+/// the water, tow. Equal for equal states, however stored or distributed.
 uint64_t bt_world_hash(const bt_world *w);
 
 #ifdef __cplusplus

@@ -31,20 +31,21 @@ typedef struct bt_manifold {
     bt_point p[2];
 } bt_manifold;
 
-/// Largest of the speeds at velocities v and v2 in each cell and around it into cells->bound, at least what it was with
-/// `keep`; returns the largest of all, m/s. Collective.
+/// Collective. Largest of the speeds at velocities v and v2 in each cell and around it into cells->bound, at least what
+/// it was with `keep`; returns the largest of all, m/s.
 double bt_contacts_bound(bt_world *w, const bt_vel *v, const bt_vel *v2, bool keep);
 
-/// Has the bound grown beyond what the last detection was made for? Collective.
+/// Collective. Has the bound grown beyond what the last detection was made for?
 bool bt_contacts_outrun(const bt_world *w);
 
-/// Find this step's contacts at the present poses in the cells that are active under cells->bound. Impulses are those
-/// of the same feature in the step before, or 0. `again`: only where the margin has grown since the last call.
+/// Collective. Find this step's contacts at the present poses in the cells that are active under cells->bound. Impulses
+/// are those of the same feature in the step before, or 0. `again`: only where the margin has grown since the last
+/// call.
 void bt_contacts_detect(bt_world *w, bool again);
 
-/// Deepest overlap of the state after a step, m: what the next step would find before it solves anything, in the cells
-/// that have moved, crushed ice left out. Poses and velocities stay; contacts, labels, storage and marks of crushing
-/// that have come apart do not, so the state must have been saved. Collective.
+/// Collective. Deepest overlap of the state after a step, m: what the next step would find before it solves anything,
+/// in the cells that have moved, crushed ice left out. Poses and velocities stay; contacts, labels, storage and marks
+/// of crushing that have come apart do not, so the state must have been saved.
 double bt_contacts_overlap(bt_world *w);
 
 /// Manifold of one pair at the present poses; false when the gap exceeds margin. reference_before (0: edge of a, 1: of

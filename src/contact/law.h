@@ -109,7 +109,7 @@ void bt_laws_bound(const bt_world *w, bt_cell *t, bt_idx j, const bt_pair *p, co
 /// Deepest overlap in a cell of what is left of the outlines, m.
 double bt_laws_overlap(const bt_cell *t);
 
-/// After the solve: what gives way, into the records; work, numbers and depths into stats. Collective.
+/// Collective. After the solve: what gives way, into the records; work, numbers and depths into stats.
 void bt_laws_grow(bt_world *w);
 
 /// Record of the pair of names.a, b, part, law in cell t, −1 = none.

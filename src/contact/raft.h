@@ -36,8 +36,8 @@
 // without contact points (bt_contact.n = 0), which has the components along x and y in ln[0] and lt, and R in flat[0]
 // of its bounds. Its update is one step of
 //     λ <- proj_R(λ − ρ w),   1/ρ = largest eigenvalue of the 2 × 2 block of W
-// which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, whose
-// three cache lines all sweeps over rigid ice read.
+// which is exact for floes without arms and never overshoots. Rejected: more unknowns in the contact of the edge, for
+// which the records and batches of all rigid ice would grow.
 //
 // The conservative part of the edge load pushes sheets apart; friction holds them from an overlap of (ρ_i/ρ_w) h/μ on,
 // some 2.5 h. So that an edge bears nothing when it retreats is a fair simplification.

@@ -63,7 +63,7 @@ bt_tessellation bt_tessellation_saw(const bt_region *y, bt_idx n, const double *
 /// Take an obstacle out of a cell by the obstacle's edge that leaves most of the cell; returns the new vertex count.
 /// v holds room for n+1 vertices. boxed: the obstacle's bounding box stands in for it (rectangles stay rectangles).
 int bt_tessellation_clear(const bt_region *y, int n, double *v, bool boxed);
-/// Remove short edges and vertices beyond BT_CELL_VERTICES inwards; returns the new count.
+/// Remove short edges and vertices beyond BT_TESSELLATION_VERTICES inwards; returns the new count.
 int bt_tessellation_clean(int n, double *v, double shortest);
 
 /// Outlines of all floes turned by their yaw, relative to the centroid; [offsets[n]][2]. Caller frees.

@@ -5,8 +5,8 @@
 
 #include "loads/impact.h"
 
-/// All manifolds on the towed body with an impulse, in the order of gids, on rank 0: [*n], the caller frees; nothing on
-/// other ranks. After the solve and before poses move. Collective.
+/// Collective. All manifolds on the towed body with an impulse, in the order of gids, on rank 0: [*n], the caller
+/// frees; nothing on other ranks. After the solve and before poses move.
 bt_body_contact *bt_body_contacts_collect(const bt_world *w, const bt_impacts *m, int64_t *n);
 
 #endif

@@ -110,7 +110,7 @@ typedef struct bt_impacts {
 bt_impacts *bt_impacts_create(const bt_case *c, const bt_world *w);
 void bt_impacts_free(bt_impacts *m);
 
-/// Take the step just solved: after the solve and before poses move. Collective.
+/// Collective. Take the step just solved: after the solve and before poses move.
 void bt_impacts_take(bt_world *w);
 
 /// The run is over: what is still open is closed as it is, into `closed`.

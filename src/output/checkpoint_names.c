@@ -158,7 +158,7 @@ static const row rows[] = {
     {"history/coriolis", "N", "Coriolis force of each step"},
     {"history/tilt", "N", "force by the tilt of the sea surface of each step"},
     {"history/inertia", "N", "inertia of the body in each step"},
-    {"history/budget", "N", "ice resistance by the momentum of the ice of each step"},
+    {"history/budget", "N", "ice resistance by momentum of each step"},
     {"history/tension_1", "N", "tension of the first branch in each step"},
     {"history/tension_2", "N", "tension of the second branch in each step"},
     {"history/thrust", "N", "thrust of the vessel in each step"},

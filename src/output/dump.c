@@ -6,13 +6,15 @@
 // (it is no contact) is held at its solved value. With a contact law the bounds of the normal impulses are those at the
 // solution. Sheets that lie on each other (contact/raft.h) are contacts, too, whose two components are bounded by a
 // disc.
+#include "output/dump.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "bergtow/fclib.h"
 #include "contact/law.h"
-#include "solve/solver.h"
+#include "space/cells.h"
 #include "solve/limit.h"
 
 typedef struct {

@@ -186,7 +186,7 @@ unsigned bt_observe_applies(const bt_world *w)
            (unsigned)(w->window != NULL) << BT_APPLIES_WINDOW;
 }
 
-/// Sum of a quantity over the floes of all ranks. Collective.
+/// Collective. Sum of a quantity over the floes of all ranks.
 static double sum_of_floes(const bt_world *w, const bt_quantity *q)
 {
     bt_totals all = {.n_sums = 1};

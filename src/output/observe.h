@@ -6,7 +6,7 @@
 #include "output/record.h"
 #include "bergtow/world.h"
 
-/// Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.
+/// Collective. Fill the sample of the step just done. reference_speed: m/s, for the count of moving floes.
 void bt_observe(const bt_world *w, double reference_speed, bt_sample *s);
 
 /// What the numbers of this world's samples apply to: bit 1 << k for each bt_applies k.
@@ -15,7 +15,7 @@ unsigned bt_observe_applies(const bt_world *w);
 /// Collective. Area of all floes, m².
 double bt_observe_ice_area(const bt_world *w);
 
-/// Largest normal contact force on each body of this rank in the step just done, N. force: [n bodies]. Collective.
+/// Collective. Largest normal contact force on each body of this rank in the step just done, N. force: [n bodies].
 void bt_observe_contact_force(const bt_world *w, double *force);
 
 #endif

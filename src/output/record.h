@@ -29,7 +29,7 @@ typedef struct bt_sample {
     double drag_force;      ///< N, drag of water and air against the tow direction
     double coriolis_force, tilt_force; ///< N, Coriolis force and that of the sea-surface tilt against the tow direction
     double inertia_force;   ///< N, (M + added mass) × acceleration along the tow direction
-    double ice_resistance_budget; ///< N, the same resistance from the momentum of everything but the body
+    double ice_resistance_budget; ///< N, the same resistance by momentum, without the contacts of the body (observe.c)
     double body_x, body_y, body_yaw;   ///< m, m, rad; x, y not wrapped in periodic domains
     double body_vx, body_vy, body_yaw_rate; ///< m/s, rad/s
     /// N (the larger of two branches), m (the first), m, m (NaN without a line)
@@ -164,7 +164,7 @@ typedef struct bt_run_totals {
     int64_t divisions, moved_floes;
     double imbalance, worst_imbalance, dealt_imbalance, worst_dealt_imbalance, edge_cut, halo_share;
     double memory;               ///< peak resident memory of all ranks, B
-    /// what a sweep reads of units and velocities for a contact point, in the last step, B; NaN without contacts
+    /// what a sweep goes through for a contact point of the last step: batches and velocities, B; NaN without contacts
     double sweep_bytes_per_contact;
     const bt_events *events;     ///< what happened, or NULL
     const char *stopped;         ///< why the run ended early, or NULL

@@ -32,8 +32,9 @@ const bt_quantity bt_own_series[] = {
         "(mass + added mass) x acceleration of the towed body along the tow direction",
         BALANCE, "inertia", "mean_inertia_force_n"),
     SHOWN(ice_resistance_budget, BODY, MEAN, "N",
-        "ice resistance from the momentum of everything but the towed body",
-        NONE, "ice resistance by the momentum of the ice", "mean_ice_resistance_budget_n"),
+        "ice resistance without the contacts of the body: on a prescribed course from the momentum of ice and walls, "
+        "otherwise from the body's own change of momentum less the line",
+        NONE, "ice resistance by momentum", "mean_ice_resistance_budget_n"),
     ROW(body_x, BODY, LAST, "m", "centroid of the towed body, x, not wrapped"),
     ROW(body_y, BODY, LAST, "m", "centroid of the towed body, y, not wrapped"),
     ROW(body_yaw, BODY, LAST, "rad", "yaw of the towed body from +x towards +y"),

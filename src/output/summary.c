@@ -4,7 +4,8 @@
 // Forces are means over a step, F = impulse / Δt. Over the steady window:
 //     mean ice resistance with its 95 % interval (bergtow/stats.h); sd, 95th and 99th percentile, peak of step means
 //     closure = <ice> − (<tow> − <drag> − <Coriolis> − <tilt> − … − <inertia>)      the body's own momentum balance
-// and the same mean from the momentum of everything else. The peak of step means depends on Δt: the mean does not.
+// and the same mean by momentum, without the contacts of the body (observe.c). The peak of step means depends on Δt:
+// the mean does not.
 #include "output/summary.h"
 #include "case/arch.h"
 #include "case/case_check.h"
@@ -102,8 +103,8 @@ static void reduce_window(bt_summary *s, const bt_history *h)
                       bt_balance_words(), fabs(s->closure_relative));
     if (fabs(s->budget_closure_relative) > CLOSURE_LIMIT)
         bt_errors_add(&s->warnings,
-                      "the mean ice resistance differs by %.2g from the one by the momentum of the ice and the "
-                      "walls; the momentum balance of the ice does not close",
+                      "the mean ice resistance differs by %.2g from the one by momentum, without the contacts of the "
+                      "body; that balance does not close",
                       fabs(s->budget_closure_relative));
 }
 

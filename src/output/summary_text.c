@@ -83,7 +83,7 @@ static void print_forces(const bt_summary *s, const bt_case *c)
     printf(" %s, %s, %s\n", bt_force_text(a, quarter[1]), bt_force_text(b, quarter[2]), bt_force_text(d, quarter[3]));
     printf("    step means        95 %% below %s, 99 %% below %s, peak %s (impulse / dt)\n", bt_force_text(a, s->p95),
            bt_force_text(b, s->p99), bt_force_text(d, s->peak));
-    printf("    from balances     %s by %s, %s by the momentum of the ice\n", bt_force_text(a, s->balance),
+    printf("    from balances     %s by %s, %s by momentum\n", bt_force_text(a, s->balance),
            bt_balance_words(), bt_force_text(b, s->budget.mean));
     print_mean("  tow force", &s->tow);
     printf("    drag              %s\n", bt_force_text(a, s->drag.mean));

@@ -17,8 +17,9 @@
 #include "contact/contacts.h"
 #include "bergtow/estimate.h"
 #include "loads/impact.h"
+#include "output/dump.h"
 #include "output/observe.h"
-#include "solve/solver.h"
+#include "solve/batch.h"
 #include "output/stall.h"
 #include "space/cells.h"
 #include "case/case_check.h"
@@ -325,20 +326,20 @@ static void note_division(run *r)
     bt_comm_before(r->comm, s.moved, &r->totals.moved_floes);
 }
 
-/// Collective. Peak memory of all ranks, and the bytes of contacts and velocities that belong to a contact point.
+/// Collective. Peak memory of all ranks, and the bytes that a sweep goes through for a contact point.
 static void measure_memory(run *r)
 {
     const bt_cells *t = r->w->cells;
     struct rusage u;
     getrusage(RUSAGE_SELF, &u);
-    double contacts = 0, points = 0;
+    double bytes = 0, points = 0;
     for (bt_idx k = 0; k < t->n; k++) {
-        contacts += t->cell[k].n_contacts;
+        bytes += (double)t->cell[k].n_contacts * (double)bt_batch_bytes(&t->cell[k]);
         points += (double)t->cell[k].n_points;
     }
     bt_sum sums[3] = {{0}, {0}, {0}};
     bt_sum_add(&sums[0], 1024.0 * (double)u.ru_maxrss);
-    bt_sum_add(&sums[1], contacts * (double)(sizeof(bt_contact) + 2 * (sizeof(bt_vel) + sizeof(bt_inv))));
+    bt_sum_add(&sums[1], bytes);
     bt_sum_add(&sums[2], points);
     bt_comm_reduce(r->comm, sums, 3, NULL, 0, NULL, 0);
     r->totals.memory = bt_sum_value(&sums[0]);

@@ -37,6 +37,12 @@ bool bt_batch_is_for(const bt_cell *cell)
 
 bool bt_batch_projects(const bt_cell *cell) { return cell->phase != BT_COLOURS; }
 
+size_t bt_batch_bytes(const bt_cell *cell)
+{
+    return bt_batch_is_for(cell) ? sizeof(bt_batch) / LANES + 2 * sizeof(bt_vel)
+                                 : sizeof(bt_contact) + 2 * (sizeof(bt_vel) + sizeof(bt_inv));
+}
+
 // --- packing ---------------------------------------------------------------------------------------------------------
 
 static kind_of_batch kind_of(const bt_cell *cell, const bt_contact *u, bool projection)

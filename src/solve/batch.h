@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Listed contacts of a cell in batches of four that share no body, swept with vector instructions (private to the
-// solver).
+// Listed contacts of a cell in batches of four that share no body, swept with vector instructions.
 //
 //     contacts   [0] [1] [2] [3] [4] [5] ...      a contact a row; half of them bear no load and are not listed
 //     list     0       2   3       5  ...
@@ -29,6 +28,10 @@
 bool bt_batch_is_for(const bt_cell *cell);
 /// And in the position projection?
 bool bt_batch_projects(const bt_cell *cell);
+
+/// Bytes that a sweep goes through for a contact of the cell: its part of a full batch and the velocities of both
+/// bodies, or its record and all that is hot of them.
+size_t bt_batch_bytes(const bt_cell *cell);
 
 /// One visit of a sweep to the cell: its move, and passes: at least one, at most `times`, and none after one that
 /// changes no more than `enough`, m/s. Updates so many times the list are counted in *done; the largest update of the

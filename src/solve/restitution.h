@@ -12,11 +12,11 @@
 struct bt_islands *bt_islands_create(void);
 void bt_islands_free(struct bt_islands *s);
 
-/// Full restitution for every island; false (and nothing to do) when no contact of this step has any. Collective.
+/// Collective. Full restitution for every island; false (and nothing to do) when no contact of this step has any.
 bool bt_restitution_begin(bt_world *w);
 
-/// Lower the restitution, and the biases, of every island whose contacts did positive work, beyond what rows solved to
-/// the residual may do (λ times the residual, and rounding). True when there was one. Collective.
+/// Collective. Lower the restitution, and the biases, of every island whose contacts did positive work, beyond what
+/// rows solved to the residual may do (λ times the residual, and rounding). True when there was one.
 bool bt_restitution_lower(bt_world *w);
 
 #endif

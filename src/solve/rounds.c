@@ -93,9 +93,9 @@ static void spread(bt_world *w, double (*value_of)(const bt_cell *cell), bt_take
 static double has_list(const bt_cell *cell) { return cell->work.n_list > 0; }
 static double is_bad(const bt_cell *cell) { return cell->work.bad; }
 
-/// Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside a large body
-/// always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last change, and the
-/// marks must not depend on ranks. Collective.
+/// Collective. Mark the cells whose bodies sweeps over the present lists may move, of all ranks; those of floes beside
+/// a large body always. Exactly these are moved on: a floe elsewhere would follow what rounding has left of its last
+/// change, and the marks must not depend on ranks.
 static void mark_swept(bt_world *w)
 {
     bt_cells *t = w->cells;
@@ -151,8 +151,8 @@ static void keep_beside(bt_cells *t, int32_t x, int32_t y, double bad)
         }
 }
 
-/// Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach anywhere
-/// and stay. Collective.
+/// Collective. Empty the lists of cells that are neither bad nor beside one that is; the contacts of large bodies reach
+/// anywhere and stay.
 static void keep_near_bad(bt_world *w)
 {
     bt_cells *t = w->cells;

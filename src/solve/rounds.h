@@ -113,14 +113,14 @@ void bt_rounds_scale(bt_problem *p, double heaviest);
 /// Room for the list of a cell: what a residual pass calls before it lists.
 void bt_rounds_list(bt_cell *cell);
 
-/// A residual pass over all contacts, after a settling if so, and what it found, into *work. Collective.
+/// Collective. A residual pass over all contacts, after a settling if so, and what it found, into *work.
 void bt_rounds_residual(bt_world *w, const bt_problem *p, bool settle, bt_work *work);
 
-/// One sweep over the lists, without momentum; returns the largest update. Collective.
+/// Collective. One sweep over the lists, without momentum; returns the largest update.
 double bt_rounds_sweep(bt_world *w, const bt_problem *p, bt_work *work);
 
-/// Rounds until the residual is within the tolerance, or the limit of work is reached; after a residual pass that
-/// found it not to be. Collective.
+/// Collective. Rounds until the residual is within the tolerance, or the limit of work is reached; after a residual
+/// pass that found it not to be.
 void bt_rounds_run(bt_world *w, const bt_problem *p, bt_work *work);
 
 /// What a residual pass has found in a cell: squares of the residual and rows, contacts far from the tolerance.

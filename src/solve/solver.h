@@ -9,12 +9,12 @@
 //
 // Data flow of a step. contacts (bt_cell.contacts, with the impulses of the last step) and vel_free -> vel ->
 //   residual pass -> lists -> sweeps -> vel, contacts:
-//   residual reads all contacts and vel; writes bt_cell.list (contacts that bear load or close), the residual, and what
-//   is bad;
+//   residual reads all contacts and vel; writes bt_cell.work.list (contacts that bear load or close), the residual, and
+//   what is bad;
 //   sweep    goes over the lists only, inner_sweeps times a cell before the next has its turn: its data are then in the
 //            first-level cache, and between ranks nothing need be exchanged. The listed contacts are packed for it,
 //            four a batch, and their impulses put back before the next residual pass (src/solve/batch.h); those of
-//            large bodies and with bounds are swept where they are;
+//            movable large bodies and with rising bounds are swept where they are;
 //   move     between two sweeps: impulses and velocities go on along their last change, vel with bt_solver.before;
 //   settle   at the end: vel anew from vel_free and the impulses, then a residual pass: the residual that is reported.
 // Rounds of sweeps, momentum, what ends them and what they may cost: src/solve/rounds.h. The position projection is the
@@ -58,18 +58,15 @@ typedef struct bt_solver {
 bt_solver *bt_solver_create(void);
 void bt_solver_free(bt_solver *s);
 
-/// Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes
-/// U2, contacts and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
+/// Collective. Sweep until the natural-map residual is at most par.tolerance or the limit is reached: vel becomes U2,
+/// contacts and pairs get their impulses, stats the counts. Newton's law of restitution can add energy when several
 /// contacts of a body rebound at once, or slip (Kane & Levinson 1985). Where the contacts of an island (bodies that
 /// touch each other) come out with positive work, the step is solved again with the restitution of that island
 /// halved, and again, at last with none, where the work is never positive.
 void bt_solver_solve(bt_world *w);
 
-/// Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the same
-/// rows without friction; they move poses and never touch velocities.
+/// Collective. Split-impulse position projection: displacements that bring overlap beyond the slop back to it, by the
+/// same rows without friction; they move poses and never touch velocities.
 void bt_solver_project(bt_world *w);
-
-/// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
-bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);
 
 #endif

@@ -11,8 +11,7 @@
 #include "space/exchange.h"
 #include "space/margin.h"
 
-#define CELL_DIAMETERS                                                                                                 \
-    5.0 // least side of a cell by default, in mean floe diameters: 20 floes at 80 %; measured in README.md
+#define CELL_DIAMETERS 5.0 // least side of a cell by default, in mean floe diameters: 25 floes at 80 %; assumed
 
 bt_cells *bt_cells_create(void) { return bt_alloc(1, sizeof(bt_cells)); }
 

@@ -56,8 +56,9 @@ typedef struct bt_pair {
     double reach;
 } bt_pair;
 
-/// One manifold as the sweep sees it: three cache lines, of which a sweep writes the last. Its two points are on a line
-/// along the tangent, so both have the same tangential row.
+/// One manifold, in three cache lines: what batches are packed from (solve/batch.h); in the last cell and under rising
+/// bounds a sweep reads it itself, and writes the last line. Its two points are on a line along the tangent, so both
+/// have the same tangential row.
 typedef struct bt_contact {
     bt_idx a, b;
     double nx, ny;         ///< normal from a to b; the tangent is (−ny, nx)
@@ -135,7 +136,7 @@ typedef struct bt_cell {
     int32_t x, y;                   ///< coordinates
     bt_idx first, end;              ///< its bodies in storage
     bt_idx right, above, diagonal;  ///< cells +x, +y, +xy: index, −1 = none
-    bool own;                       ///< this rank solves its contacts and answers for its bodies
+    bool own;                       ///< this rank solves its contacts and answers for its bodies (large ones: rank 0)
     bool border;                    ///< some body of its block is held by other ranks too
     int8_t phase;                   ///< colour, or BT_COLOURS for the large bodies
     bool active;                    ///< its contacts are looked at in this step
@@ -185,7 +186,8 @@ typedef struct bt_cells {
     double *bound;                  ///< [n] speed that the margin of cell T is made for, m/s
     double *moved;                  ///< [n] path length that no body of the cell exceeds, m; grows only
     double moved_any;               ///< the same for any body in a cell
-    /// [n] all bodies drift with the water and nothing moved them in the last step: BT_REST_...
+    /// [n] all bodies drift with the water and nothing moved them in the last step: BT_AWAKE, BT_ASLEEP_NEW or
+    /// BT_ASLEEP
     uint8_t *asleep;
     uint8_t *awake;                 ///< [n] contacts of this step may move the cell's bodies
     bt_idx *busy;                   ///< [n_busy] cells that a step looks at, ascending; the last cell is always one
@@ -208,11 +210,11 @@ typedef struct bt_cells {
 bt_cells *bt_cells_create(void);
 void bt_cells_free(bt_cells *t);
 
-/// At the start of a step: renew labels, storage and cells if some floe has left its cell too far. Collective.
+/// Collective. At the start of a step: renew labels, storage and cells if some floe has left its cell too far.
 void bt_cells_begin(bt_world *w);
 
-/// The same if the cells are too small for this margin, m. True when renewed: every index of a body has changed.
-/// Collective.
+/// Collective. The same if the cells are too small for this margin, m. True when renewed: every index of a body has
+/// changed.
 bool bt_cells_update(bt_world *w, double margin);
 
 /// Cell k, or every cell, is looked at from now on.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The pair list of one cell (private to the detection).
+// The pair list of one cell (for the folders above src/space).
 #ifndef BERGTOW_PAIRS_H
 #define BERGTOW_PAIRS_H
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-// One pass over the active cells in the order of their phases (private to the solver).
+// One pass over the active cells in the order of their phases (for the folders above src/space).
 //
 // What the result depends on is only this: of two cells that share a body, the one of lower phase comes first
 // (cells.h), and a pass ends before the next begins. So: all cells of phase 0 at once, then all of phase 1, ..., with a
-// barrier of the threads after each. Each thread has a share of every phase, a stretch of neighbouring cells with its
-// part of the work, the same in every pass, so that it finds in its caches what it left there; a thread that is done
-// takes cells from the others' shares. Among ranks the cells of a phase for which others wait come first, and their
-// velocities travel while the rest is worked on.
+// barrier of the threads after each. Border cells and inner cells of a phase are a stretch each. Each thread has a
+// share of every stretch: neighbouring cells with its part of the work, the same from one residual pass to the next, so
+// that it finds in its caches what it left there; a thread that is done takes cells from the others' shares. Among
+// ranks the cells of a phase for which others wait come first, and their velocities travel while the rest is worked on.
 //
 //     phase 0 (colour 0)       phase 1            ...   phase 4 (large bodies)
 //     border cells | inner     border | inner           one rank
@@ -53,9 +53,9 @@ void bt_phases_order(bt_world *w);
 /// Assign the cells to threads by the contacts that are listed in them. No result depends on it.
 void bt_phases_distribute(bt_world *w);
 
-/// Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are done at
-/// once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up to date
-/// on all ranks, while the other cells are still worked on. Collective.
+/// Collective. Visit the cells of phase 0, then those of phase 1, ...: those of one phase share no movable body and are
+/// done at once by threads and ranks. After each phase, `exchanged` (an array over the bodies, or NULL) is brought up
+/// to date on all ranks, while the other cells are still worked on.
 void bt_phases_run(bt_world *w, bt_visit *visit, const void *context, bt_vel *exchanged, bt_totals *t);
 
 /// Visit the cells with work in any order, all at once.

@@ -195,8 +195,8 @@ static void clock_phase(bt_world *w, double *phase, double *t0)
 }
 
 /// Detect and solve. The margin of the detection holds for the velocities before the solve; contacts can make a floe
-/// faster (squeezed out of a wedge, spun, rebounding). When the solution outruns the margin, the step is
-/// detected and solved again with the margin that it needs, from the impulses found so far.
+/// faster (squeezed out of a wedge, spun, rebounding). When a solution that converged outruns the margin, cells whose
+/// margin has grown are detected again and the step is solved again, from the impulses found so far.
 static void solve_contacts(bt_world *w)
 {
     enum { MAX_REPEATS = 4 };

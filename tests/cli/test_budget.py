@@ -175,7 +175,8 @@ def test_a_study_end_to_end(small):
     assert found["fields"]["sd"] ** 2 == pytest.approx(np.mean(np.var(pairs, axis=1, ddof=1)))
     assert (folder / "out/budget.png").stat().st_size > 15_000
     tail = found["more"][0]
-    assert tail["of"] == "tow_force:99" and "tow force that 1 % of the time exceeds, as the moving mean over 1 s" in text
+    assert tail["of"] == "tow_force:99"
+    assert "tow force that 1 % of the time exceeds, as the moving mean over 1 s" in text
     levels = []
     for member in sorted((folder / "out/members").iterdir()):
         with h5py.File(member / "result.h5") as f:

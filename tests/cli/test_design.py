@@ -112,7 +112,8 @@ def test_angles_are_in_degrees():
 
 @pytest.mark.parametrize("title, left", [
     ("Berg in 80 % broken ice", "Berg in broken ice: ice concentration 60 to 90 %"),
-    ("Tow at 80 % of its speed", "Tow at 80 % of its speed: ice concentration 60 to 90 %"), (None, "berg: ice concentration 60 to 90 %")
+    ("Tow at 80 % of its speed", "Tow at 80 % of its speed: ice concentration 60 to 90 %"),
+    (None, "berg: ice concentration 60 to 90 %")
 ])
 def test_the_title_names_no_other_concentration(title, left):
     assert design.title_of({"run": {"title": title}}, "berg", [0.6, 0.9]) == left
@@ -183,8 +184,8 @@ def test_the_title_block_of_a_study(tmp_path):
 
 # ---- the page
 
-HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Uncertainty budget", "Loads", "Mean ice resistance",
-            "Members", "Replay", "Every key", "Study", "Provenance"]
+HEADINGS = ["Answer", "Method", "Model and its limits", "Assumptions", "Convergence", "Uncertainty budget", "Loads",
+            "Mean ice resistance", "Members", "Replay", "Every key", "Study", "Provenance"]
 
 
 def test_the_answer_comes_first_and_all_else_in_order(page, made):
@@ -265,7 +266,8 @@ def test_pages_of_the_pdf(made):
     for k, text in enumerate(pages):
         lines = [line for line in text.splitlines() if line.strip()]
         assert lines[-1].split() == ["bergtow", str(k + 1), "of", str(n)]
-        assert lines[0].strip().startswith(f"{TITLE}: ice concentration 20 to 40 %") and lines[0].endswith("revision B3")
+        assert lines[0].strip().startswith(f"{TITLE}: ice concentration 20 to 40 %")
+        assert lines[0].endswith("revision B3")
 
 
 def test_the_ink_on_the_pages(made, tmp_path):

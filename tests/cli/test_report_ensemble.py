@@ -98,7 +98,8 @@ def test_numbers_are_those_of_the_statistics(page, study):
     assert estimates["Lichey-Hellmer"].startswith("80") and "*" in estimates["compaction"]
     assert {"Distributions", "Peaks of collisions", "Members"} <= set(found)
     answer = found["Answer"]
-    assert [row[0] for row in answer[1:]] == ["concentration 20\u00a0%", "concentration 50\u00a0%"] and answer[1][-2] == "4"
+    assert [row[0] for row in answer[1:]] == ["concentration 20\u00a0%", "concentration 50\u00a0%"]
+    assert answer[1][-2] == "4"
 
 
 def test_the_answer_is_the_design_statement(tmp_path):
@@ -229,11 +230,12 @@ def test_convergence_budget_and_capability_are_chapters(study, tmp_path, monkeyp
     answered = text[:text.index("<h2>Method")]
     sd = f"{100 * budget['parameters']['sd'] / budget['mean']:.0f} % of the mean"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0", "run.title": ""})
+        patch.setattr(report_case, "ranges", lambda: {"ice.friction": "0 to 10", "ice.size": "above 0",
+                                                      "run.title": ""})
         assert report_ensemble.ranges({"budget": (folder, found["budget"])}) == {
             "ice.friction": ("uniform from 0 to 1", "a book"), "ice.size": ("above 0", "admitted")}
-    for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on width",
-                  sd):
+    for words in ("every value of the range makes it", "half of the tows no longer keep 0.300 m/s", "it depends on "
+                  "width", sd):
         assert words in answered, words
 
 

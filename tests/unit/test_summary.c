@@ -138,7 +138,7 @@ static void every_doubt_is_reported(void **state)
                                        "momentum is conserved only to 0.001",
                                        "2 floes left",
                                        "differs from tow - drag - Coriolis - tilt - inertia",
-                                       "by the momentum of the ice",
+                                       "from the one by momentum",
                                        "crushed to a depth of 0.9 m, 45 % of the mean floe size",
                                        "stood still for 12 s of 60 s"};
     for (size_t k = 0; k < sizeof reported / sizeof *reported; k++)

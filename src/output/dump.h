@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: MIT
+// The contact problem of the step just solved, in a file.
+#ifndef BERGTOW_DUMP_H
+#define BERGTOW_DUMP_H
+
+#include "bergtow/world.h"
+
+/// Write this step's contact problem (after the solve) in FCLIB's local form. Errors: BT_ERR_IO.
+bt_status bt_solver_dump(const bt_world *w, const char *path, bt_errors *err);
+
+#endif
