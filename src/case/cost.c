@@ -27,7 +27,7 @@ static const double RESULT_BASE = 350e3, FRAME_BASE = 3800, INDEX = 2600, LEAST_
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
 static const double OTHERS_FRAME = 860; // towed body and walls: 80 corners, poses, speeds
 static const double IMPACT_ROWS = 256, IMPACT_COLUMNS = 13, SERIES_CHUNK = 256;
-static const double CHECKPOINT_BASE = 95e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
+static const double CHECKPOINT_BASE = 135e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
 static const double TEXTS = 38e3, XDMF_FRAME = 3970, XDMF_LINE = 880;
 static const double VORONOI_CORNERS = 5.6;
 
