@@ -76,7 +76,7 @@ def test_values_do_not_depend_on_ranks(one, ranks):
     assert sorted(p.name for p in many.dir.iterdir()) == sorted(p.name for p in alone.dir.iterdir())
     with h5py.File(alone.dir / "result.h5") as a, h5py.File(many.dir / "result.h5") as b:
         assert b.attrs["ranks"] == ranks and b.attrs["complete"] == 1
-        for name in "pose", "contact_force", "speed", "body_pose", "time":
+        for name in "pose", "contact_force", "net_force", "velocity", "speed", "body_pose", "time":
             assert described(a["frames"][name]) == described(b["frames"][name])
     # The table once, and the same but for times.
     assert result.stdout.count("state hash") == 1 and result.stdout.count("mean floe size") == 1
