@@ -304,7 +304,8 @@ bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, con
     bt_h5_group(h, path);
     paraview floes = create_paraview(f, "floe", f->n_floes, f->floe_vertices, true);
     paraview others = create_paraview(f, "body", f->n_others, f->other_vertices, false);
-    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity, &f->net_force, // these stay open
+    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity,
+                         &f->net_force, // these stay open
                          &floes.points, &floes.speed, &floes.velocity, &floes.net_force, &floes.force,
                          &others.points, &others.speed, &others.velocity, &others.net_force};
     enum { N = sizeof shared / sizeof *shared, STAY = 6 };
