@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, ROOT, TOW, changed, differing, environment, write_case
+from harness import BERGTOW, ROOT, TOW, changed, differing, environment, launcher, write_case
 
 PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test_record"
 
@@ -182,7 +182,7 @@ TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_line_of_a_run_that_goes_on(tmp_path, ranks):
     write_case(tmp_path, TWO_LINES)
-    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mpi = launcher(ranks) if ranks > 1 else []
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     for words in (["run", "case.yml", "-o", "parts", "--steps", "33"], ["resume", "parts"],
                   ["run", "case.yml", "-o", "whole"]):
