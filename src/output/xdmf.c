@@ -8,10 +8,10 @@
 //     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN
 // Thickness and height are those of /floes and /bodies; what belongs to a few bodies (ids, which one is towed) and the
 // ends of the tow line stand in the XML itself. Vectors have a third component, 0, as ParaView's vectors have.
-// Floes and other bodies are two blocks, because only floes have the largest force of a contact. Each frame has datasets of its own:
-// as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps
-// a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be
-// moved.
+// Floes and other bodies are two blocks, because only floes have the largest force of a contact. Each frame has
+// datasets of its own: as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its
+// Xdmf2 reader, which keeps a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf,
+// so that the folder can be moved.
 #include "output/xdmf.h"
 
 #include <inttypes.h>

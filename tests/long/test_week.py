@@ -3,8 +3,8 @@
 again, beside a twin that nobody touches: the same bits at the end, and memory, time a step, balances and the ice about
 the body stay what they were.
 
-STEPS in the environment divides the week into more steps: 120,960 of 5 s by default (make test-long), 1,000,000 of 0.6 s
-for the soak. week.csv in the folder that SOAK names keeps the curves.
+STEPS in the environment divides the week into more steps: 120,960 of 5 s by default (make test-long), 1,000,000 of
+0.6 s for the soak. week.csv in the folder that SOAK names keeps the curves.
 """
 import os
 import random
