@@ -16,7 +16,7 @@ import subprocess
 
 import h5py
 
-from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, SIGNAL, changed, environment, write_case
+from harness import BERGTOW, DONE, FAULT, IO, NUMERIC, RANK, SIGNAL, changed, environment, launcher, write_case
 
 CALLS = FAULT.with_name("calls.so")  # tests/fault/calls.c
 MEMORY = FAULT.with_name("memory.so")  # tests/fault/memory.c
@@ -436,10 +436,10 @@ class Ranks(FreshRun):
     name, struck = "2 ranks", 0
 
     def launch(self, env):
-        rank = f'[ "$OMPI_COMM_WORLD_RANK" = {self.struck} ] || unset LD_PRELOAD; exec "$0" "$@"'
+        rank = f'[ "{RANK}" = {self.struck} ] || unset LD_PRELOAD; exec "$0" "$@"'
         preload = f"export LD_PRELOAD={CALLS}; "
         env = {k: v for k, v in env.items() if k != "LD_PRELOAD"}
-        words = ["mpirun", "--oversubscribe", "-n", 2, "sh", "-c", preload + rank, BERGTOW, *self.command()]
+        words = [*launcher(2), "sh", "-c", preload + rank, BERGTOW, *self.command()]
         return started(words, env)
 
 

@@ -5,6 +5,7 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 
 import h5py
@@ -15,6 +16,9 @@ BERGTOW = os.path.abspath(os.environ.get("BERGTOW", ROOT / "build/release/bergto
 # Assertions, checks of the division among ranks, and threads in every parallel loop: make validate.
 VALIDATE = os.path.abspath(os.environ.get("BERGTOW_VALIDATE", ROOT / "build/validate/bergtow"))
 FAULT = pathlib.Path(BERGTOW).parent / "tests/fault/fault.so"  # tests/fault/fault.c
+# How ranks are started; for a build with MPICH: MPIRUN=mpirun.mpich.
+MPIRUN = shlex.split(os.environ.get("MPIRUN", "mpirun --oversubscribe"))
+RANK = "${OMPI_COMM_WORLD_RANK:-$PMI_RANK}"  # in a shell that the launcher starts
 DONE, USAGE, CASE, IO, NUMERIC, SIGNAL = 0, 2, 3, 4, 5, 6
 
 # A tow through loose ice, some 140 floes, done in a fraction of a second.
@@ -77,6 +81,17 @@ def environment(**extra):
     theirs = "OMPI_", "PMIX_", "PMI_", "SLURM_", "BERGTOW_MPI", "OMP_"
     kept = {k: v for k, v in os.environ.items() if not k.startswith(theirs)}
     return kept | {"OMP_WAIT_POLICY": "passive"} | {k: str(v) for k, v in extra.items()}
+
+
+def launcher(ranks, *options):
+    """What stands before a program that is started on ranks."""
+    return [*MPIRUN, "-n", str(ranks), *options]
+
+
+def rank_of(variables):
+    """The rank of a process by its environment, None without a launcher."""
+    rank = variables.get("OMPI_COMM_WORLD_RANK", variables.get("PMI_RANK"))
+    return None if rank is None else int(rank)
 
 
 def call(*arguments, cwd=None, env=None, timeout=120, **more):

@@ -81,7 +81,7 @@ def judge_result(case, folder, whole=True):
             good = np.isfinite(x) if applies[series.attrs["applies"]] else np.isnan(x)
             if not good.all():
                 wrong.append(f"series {name}, {series.attrs['applies']}: {x[~good][:3]}")
-        for name in ("pose", "contact_force", "body_pose", "speed"):
+        for name in ("pose", "contact_force", "net_force", "body_pose", "speed"):
             if not np.isfinite(f["frames"][name][()]).all():
                 wrong.append(f"frames {name}: not finite")
         pose, floes = f["frames/pose"][()], f["floes/offsets"].shape[0] - 1

@@ -27,7 +27,7 @@ from hypothesis import strategies as st
 import faults
 import random_cases
 import scenes
-from harness import BERGTOW, environment, overlap, placed, write_case
+from harness import BERGTOW, environment, launcher, overlap, placed, write_case
 from random_cases import text, value_of
 
 #: parts of a case that it can do without
@@ -48,7 +48,7 @@ class Refused(Exception):
 
 
 def called(folder, *words, ranks=1, env=None):
-    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mpi = launcher(ranks) if ranks > 1 else []
     p = subprocess.run([*mpi, BERGTOW, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=120,
                        env=env or environment(OMP_NUM_THREADS=1, **faults.ROOT))
     return p.returncode, p.stderr

@@ -9,7 +9,7 @@ import time
 import h5py
 import numpy as np
 
-from harness import BERGTOW, DONE, Run, changed, differing, environment, write_case
+from harness import BERGTOW, DONE, Run, changed, differing, environment, launcher, write_case
 
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
 # A bridle whose second branch breaks, way-points, collisions, panel loads, samples of three steps, floes that go from
@@ -39,8 +39,7 @@ TIMES = {
 
 
 def command(ranks, *arguments):
-    launcher = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
-    return [*launcher, BERGTOW, *map(str, arguments)]
+    return [*(launcher(ranks) if ranks > 1 else []), BERGTOW, *map(str, arguments)]
 
 
 def started(ranks, *arguments, cwd=None, stderr=subprocess.PIPE):

@@ -26,7 +26,7 @@ import tempfile
 import h5py
 import numpy as np
 
-from harness import BERGTOW, CLOSING, PRESS, ROOT, TOW, changed, environment, write_case
+from harness import BERGTOW, CLOSING, PRESS, ROOT, TOW, changed, environment, launcher, write_case
 
 STORED = ROOT / "tests/parallel/scenes.json"
 
@@ -201,7 +201,7 @@ class Failed(Exception):
 
 
 def started(binary, ranks, folder, *arguments):
-    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mpi = launcher(ranks) if ranks > 1 else []
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     done = subprocess.run([*mpi, str(binary), *map(str, arguments)], cwd=folder, env=env, capture_output=True,
                           text=True, timeout=PATIENCE)

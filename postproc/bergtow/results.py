@@ -182,10 +182,12 @@ def open_result(folder: str | os.PathLike[str]) -> xarray.Dataset:
             for k, (axis, units, words) in enumerate(_POSE):
                 put(f"{of}_{axis}", ("frame", of), frames[data], k, None, units, words)
         put("floe_contact_force", ("frame", "floe"), frames["contact_force"])
-        for name in {"speed", "velocity"} & set(frames):
+        meanings = {"speed": "speed of the centroid", "velocity": "velocity of the centroid",
+                    "net_force": "sum of all contact forces in the step"}
+        for name in meanings.keys() & set(frames):
             for of, part in (("floe", slice(0, n)), ("other_body", slice(n, frames[name].shape[1]))):
                 dims = ("frame", of, "xy")[:frames[name].ndim]
-                put(f"{of}_{name}", dims, frames[name], None, part, long_name=f"{name} of the centroid")
+                put(f"{of}_{name}", dims, frames[name], None, part, long_name=meanings[name])
         if "line_points" in frames:
             put("line_points", ("frame", "line_point", "xy"), frames["line_points"])
             put("branch_tension", ("frame", "branch"), frames["line_tension"])

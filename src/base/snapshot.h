@@ -81,8 +81,8 @@ bool bt_snapshot_differ(const bt_snapshot *a, const bt_snapshot *b, char out[400
 
 void bt_snapshot_free(bt_snapshot *s);
 
-/// What an array is, and its units (NULL: it is text); NULL where that is not known.
-typedef const char *bt_item_meaning(const char *name, const char **units);
+/// What an array is, its units (NULL: it is text) and its axes, as in h5axes.h; NULL where that is not known.
+typedef const char *bt_item_meaning(const char *name, const char **units, const char **axes);
 
 /// Into an HDF5 file protected by a checksum, with what each array is unless meaning is NULL, and back; errors as
 /// bt_checksum_check, and BT_ERR_IO.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A snapshot as an HDF5 file: a dataset for each array, /group/name.
+// A snapshot as an HDF5 file: a dataset for each array, /group/name. What lies in the root group are dimensions: they
+// hold no number, and are passed over when the file is read.
 //
 // Written to the name it is given, not to a temporary one: that is the caller's part (bergtow/checkpoint.h).
 #include <stdio.h>
@@ -48,10 +49,17 @@ bt_status bt_snapshot_write(const bt_snapshot *s, const char *path, bt_item_mean
         snprintf(name, sizeof name, "/%s", i->name);
         if (i->type == BT_ITEM_TEXT) bt_h5_write_text(&h, name, i->data);
         else bt_h5_write(&h, name, memory_type(i->type), (hsize_t)i->n, i->width > 1 ? (hsize_t)i->width : 0, i->data);
-        const char *units, *text = meaning ? meaning(i->name, &units) : NULL;
+        const char *units, *axes, *text = meaning ? meaning(i->name, &units, &axes) : NULL;
         if (!text) continue;
         if (units) bt_h5_attr_text(&h, name, "units", units);
         bt_h5_attr_text(&h, name, "long_name", text);
+    }
+    // The axes last: a coordinate such as /history/time may follow what it belongs to.
+    for (int k = 0; meaning && k < s->n; k++) {
+        const char *units, *axes;
+        if (s->item[k].type == BT_ITEM_TEXT || !meaning(s->item[k].name, &units, &axes)) continue;
+        snprintf(name, sizeof name, "/%s", s->item[k].name);
+        bt_h5_axes(&h, name, axes);
     }
     status = bt_h5_close(&h);
     return status == BT_OK ? bt_checksum_write(path, BT_CHECKSUM_CHECKPOINT, err) : status;
@@ -129,9 +137,18 @@ static herr_t take(hid_t group, const char *name, const H5L_info_t *info, void *
     return result;
 }
 
+static bool is_dimension(hid_t file, const char *name)
+{
+    const hid_t o = H5Oopen(file, name, H5P_DEFAULT);
+    const bool found = o >= 0 && H5Iget_type(o) == H5I_DATASET && H5Dget_storage_size(o) == 0;
+    if (o >= 0) H5Oclose(o);
+    return found;
+}
+
 static herr_t take_group(hid_t file, const char *name, const H5L_info_t *info, void *data)
 {
     (void)info;
+    if (is_dimension(file, name)) return 0;
     return H5Literate_by_name(file, name, H5_INDEX_NAME, H5_ITER_INC, NULL, take, data, H5P_DEFAULT);
 }
 

@@ -20,15 +20,15 @@ static const double CHECKPOINT_BYTES_PER_FLOE = 1000;
 
 // --- disk ------------------------------------------------------------------------------------------------------------
 
-// Of result.h5 without data; of a frame: its group and seven datasets (xdmf.h); of a dataset that is deflated, its
+// Of result.h5 without data; of a frame: its group and nine datasets (xdmf.h); of a dataset that is deflated, its
 // index.
-static const double RESULT_BASE = 350e3, FRAME_BASE = 3800, INDEX = 2600, LEAST_PACKED = 8192;
+static const double RESULT_BASE = 350e3, FRAME_BASE = 4880, INDEX = 2600, LEAST_PACKED = 8192;
 // Shares that shuffle and deflate leave: of poses, of corners, and of speeds and forces, which are 0 of most floes.
 static const double POSE_LEFT = 0.9, CORNER_LEFT = 0.79, STILL_LEFT = 0.25;
-static const double OTHERS_FRAME = 860; // towed body and walls: 80 corners, poses, speeds
+static const double OTHERS_FRAME = 960; // towed body and walls: 80 corners, poses, speeds
 static const double IMPACT_ROWS = 256, IMPACT_COLUMNS = 13, SERIES_CHUNK = 256;
-static const double CHECKPOINT_BASE = 95e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
-static const double TEXTS = 38e3, XDMF_FRAME = 3970, XDMF_LINE = 880;
+static const double CHECKPOINT_BASE = 135e3, CHECKPOINT_FLOE = 180, CHECKPOINT_CORNER = 13;
+static const double TEXTS = 38e3, XDMF_FRAME = 4440, XDMF_LINE = 880;
 static const double VORONOI_CORNERS = 5.6;
 
 double bt_cost_floe_step(double concentration)
@@ -94,8 +94,8 @@ bt_cost_disk bt_cost_disk_of(const bt_case *c, double n, double corners, int ran
     const bool packed = ranks == 1, line = c->tow.mode == BT_TOW_LINE || c->tow.mode == BT_TOW_THRUST;
     const double frames = bt_cost_frames(c);
     const double pose = packed ? POSE_LEFT : 1, still = packed ? STILL_LEFT : 1;
-    const double frame = n * (24 * pose + 24 * still) + of_frame(8 * corners, CORNER_LEFT, packed) +
-                         2 * of_frame(4 * n, STILL_LEFT, packed) + of_frame(12 * n, STILL_LEFT, packed) +
+    const double frame = n * (24 * pose + 32 * still) + of_frame(8 * corners, CORNER_LEFT, packed) +
+                         2 * of_frame(4 * n, STILL_LEFT, packed) + 2 * of_frame(12 * n, STILL_LEFT, packed) +
                          FRAME_BASE + OTHERS_FRAME;
     const double outlines = 28 * n + 16 * corners + 4 * (corners + 2 * n);
     const double entries = ceil(entries_of(c) / SERIES_CHUNK) * SERIES_CHUNK,

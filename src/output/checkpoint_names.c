@@ -10,6 +10,63 @@ typedef struct {
     const char *name, *units, *meaning; ///< units: NULL = text
 } row;
 
+/// Axes (h5axes.h) of what is more than one number.
+static const struct {
+    const char *name, *axes;
+} arrays[] = {
+    {"clock/phases", "phase"},
+    {"case/current", "current_row time_x_y"},
+    {"case/wind", "wind_row time_x_y"},
+    {"bodies/pose", "body component"},
+    {"bodies/velocity", "body component"},
+    {"bodies/path", "body"},
+    {"bodies/tile", "body xy"},
+    {"bodies/stirred", "body"},
+    {"bodies/lap", "body"},
+    {"bodies/copy", "body"},
+    {"contacts/a", "contact"},
+    {"contacts/b", "contact"},
+    {"contacts/part", "contact body_of_pair"},
+    {"contacts/law", "contact"},
+    {"contacts/points", "contact"},
+    {"contacts/feature", "contact contact_point"},
+    {"contacts/value", "contact memory"},
+    {"contacts/impulse", "contact contact_point"},
+    {"contacts/friction", "contact"},
+    {"contacts/crushed", "contact"},
+    {"window/vel", "one motion"},
+    {"window/dropped", "one momentum_energy"},
+    {"window/brought", "one momentum_energy"},
+    {"impacts/open", "impact column"},
+    {"collisions/sum", "panel panel_force"},
+    {"collisions/panel_blocks", "panel_block panel_load"},
+    {"events/time", "time"},
+    {"events/kind", "time"},
+    {"events/subject", "time"},
+    {"events/value", "time"},
+    {"record/merged", "series"},
+    {"field/offsets", "floe_end"},
+    {"field/vertices", "floe_vertex xy"},
+    {"field/pose", "floe component"},
+    {"field/thickness", "floe"},
+    {"field/area", "floe"},
+    {"history/time", "time"},
+    {"history/ice", "time"},
+    {"history/tow", "time"},
+    {"history/drag", "time"},
+    {"history/coriolis", "time"},
+    {"history/tilt", "time"},
+    {"history/inertia", "time"},
+    {"history/budget", "time"},
+    {"history/tension_1", "time"},
+    {"history/tension_2", "time"},
+    {"history/thrust", "time"},
+    {"history/residual", "time"},
+    {"history/unconverged_step", "time"},
+    {"history/collision", "time"},
+    {"history/push", "time"},
+};
+
 static const row rows[] = {
     // where it comes from, and how long it took: no part of the state
     {"about/program", NULL, "program that wrote it"},
@@ -218,15 +275,24 @@ static const row rows[] = {
     {"map/unnamed", "1", "features without a thickness that have a property of nearly this name"},
 };
 
-const char *bt_checkpoint_meaning(const char *name, const char **units)
+static const char *axes_of(const char *name)
+{
+    for (size_t k = 0; k < sizeof arrays / sizeof *arrays; k++)
+        if (!strcmp(arrays[k].name, name)) return arrays[k].axes;
+    return "one";
+}
+
+const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes)
 {
     static const char added[] = "history/added_";
     for (size_t k = 0; k < sizeof rows / sizeof *rows; k++)
         if (!strcmp(rows[k].name, name)) {
             *units = rows[k].units;
+            *axes = axes_of(name);
             return rows[k].meaning;
         }
     const bt_quantity *q = strncmp(name, added, sizeof added - 1) ? NULL : bt_series_find(name + sizeof added - 1);
     *units = q ? q->units : NULL;
+    *axes = "time";
     return q ? q->description : NULL;
 }

@@ -3,7 +3,7 @@
 #ifndef BT_CHECKPOINT_NAMES_H
 #define BT_CHECKPOINT_NAMES_H
 
-/// Meaning of an array "group/name", and its units (NULL: it is text); NULL where it has none.
-const char *bt_checkpoint_meaning(const char *name, const char **units);
+/// Meaning of an array "group/name", its units (NULL: it is text) and axes; NULL where it has none.
+const char *bt_checkpoint_meaning(const char *name, const char **units, const char **axes);
 
 #endif

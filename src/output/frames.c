@@ -145,6 +145,7 @@ static void create_datasets(bt_frames *f)
     f->contact_force = bt_slab_growing(h, "/frames/contact_force", H5T_NATIVE_DOUBLE, f->n_floes, 0);
     f->speed = bt_slab_growing(h, "/frames/speed", H5T_NATIVE_DOUBLE, f->n_floes + f->n_others, 0);
     f->velocity = bt_slab_growing(h, "/frames/velocity", H5T_NATIVE_FLOAT, f->n_floes + f->n_others, 2);
+    f->net_force = bt_slab_growing(h, "/frames/net_force", H5T_NATIVE_FLOAT, f->n_floes + f->n_others, 2);
     bt_h5_describe(h, "/frames/time", "time", "s", "time of each frame, since the start of the run");
     bt_h5_describe(h, "/frames/pose", "time floe component", "m, m, rad", "x, y, yaw of each floe");
     bt_h5_describe(h, "/frames/body_pose", "time body component", "m, m, rad", "x, y, yaw of each of /bodies");
@@ -153,6 +154,8 @@ static void create_datasets(bt_frames *f)
     bt_h5_describe(h, "/frames/speed", "time floe_or_body", "m/s", "speed of the centroid: floes, then /bodies");
     bt_h5_describe(h, "/frames/velocity", "time floe_or_body xy", "m/s",
                    "velocity of the centroid: floes, then /bodies");
+    bt_h5_describe(h, "/frames/net_force", "time floe_or_body xy", "N",
+                   "sum of all contact forces in the step: floes, then /bodies");
     if (!f->branches) return;
     const hsize_t k = (hsize_t)f->branches;
     f->line_points = bt_h5_growing(h, "/frames/line_points", H5T_NATIVE_DOUBLE, 3, (hsize_t[]){2 * k, 2},
@@ -186,7 +189,7 @@ void bt_frames_create(bt_frames *f, bt_h5 *h, const bt_comm *c, const bt_record_
 }
 
 /// Quantities of a frame that are written row by row.
-enum quantity { POSE, FORCE, SPEED, VELOCITY, FORCE_4, SPEED_4, VECTOR_4 };
+enum quantity { POSE, FORCE, SPEED, VELOCITY, NET, FORCE_4, SPEED_4, VELOCITY_4, NET_4 };
 
 /// Bodies from .. from + n of the block to rows first .. first + n.
 static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_frame_row *row, int64_t n, char *buffer)
@@ -199,9 +202,11 @@ static void write_rows(bt_slab *s, enum quantity q, int64_t first, const bt_fram
         case FORCE: *(double *)to = row[i].contact_force; break;
         case SPEED: *(double *)to = row[i].speed; break;
         case VELOCITY: memcpy(to, (const float[2]){(float)row[i].vx, (float)row[i].vy}, 2 * sizeof(float)); break;
+        case NET: memcpy(to, (const float[2]){(float)row[i].fx, (float)row[i].fy}, 2 * sizeof(float)); break;
         case FORCE_4: *(float *)to = (float)row[i].contact_force; break;
         case SPEED_4: *(float *)to = (float)row[i].speed; break;
-        case VECTOR_4: memcpy(to, (const float[3]){(float)row[i].vx, (float)row[i].vy, 0}, 3 * sizeof(float)); break;
+        case VELOCITY_4: memcpy(to, (const float[3]){(float)row[i].vx, (float)row[i].vy, 0}, 3 * sizeof(float)); break;
+        case NET_4: memcpy(to, (const float[3]){(float)row[i].fx, (float)row[i].fy, 0}, 3 * sizeof(float)); break;
         }
     }
     bt_rows_end(&r);
@@ -225,7 +230,7 @@ static void write_points(const bt_frames *f, bt_slab *s, int64_t first, const bt
 }
 
 /// Datasets of the frame in single precision, see xdmf.c.
-typedef struct paraview { bt_slab points, speed, velocity, force; } paraview;
+typedef struct paraview { bt_slab points, speed, velocity, net_force, force; } paraview;
 
 static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, int64_t points, bool force)
 {
@@ -235,16 +240,18 @@ static paraview create_paraview(bt_frames *f, const char *kind, int64_t cells, i
         .points = bt_slab_fixed(f->h, NAMED("points"), H5T_NATIVE_FLOAT, points, 2, true),
         .speed = bt_slab_fixed(f->h, NAMED("speed"), H5T_NATIVE_FLOAT, cells, 0, true),
         .velocity = bt_slab_fixed(f->h, NAMED("velocity"), H5T_NATIVE_FLOAT, cells, 3, true),
+        .net_force = bt_slab_fixed(f->h, NAMED("net_force"), H5T_NATIVE_FLOAT, cells, 3, true),
         .force = {.h = f->h, .dataset = -1, .piece = 1, .row_bytes = 4},
     };
     if (force) p.force = bt_slab_fixed(f->h, NAMED("force"), H5T_NATIVE_FLOAT, cells, 0, true);
     // Without axes: each scale lists all that it belongs to, in one attribute of 64 kB at most.
-    const char *const names[] = {"points", "speed", "velocity", "force"},
-                      *const units[] = {"m", "m/s", "m/s", "N"},
+    const char *const names[] = {"points", "speed", "velocity", "net_force", "force"},
+                      *const units[] = {"m", "m/s", "m/s", "N", "N"},
                       *const texts[] = {"x, y of every vertex", "speed of the centroid",
                                         "velocity of the centroid, x, y, 0",
+                                        "sum of all contact forces in the step, x, y, 0",
                                         "largest normal contact force in the step"};
-    for (int k = 0; k < (force ? 4 : 3); k++) {
+    for (int k = 0; k < (force ? 5 : 4); k++) {
         bt_h5_attr_text(f->h, NAMED(names[k]), "units", units[k]);
         bt_h5_attr_text(f->h, path, "long_name", texts[k]);
     }
@@ -260,14 +267,17 @@ static void write_frame(bt_frames *f, paraview *floes, paraview *others, const b
     write_rows(&f->contact_force, FORCE, f->first, rows, nf, buffer);
     write_rows(&f->speed, SPEED, f->first, rows, nf + nb, buffer);
     write_rows(&f->velocity, VELOCITY, f->first, rows, nf + nb, buffer);
+    write_rows(&f->net_force, NET, f->first, rows, nf + nb, buffer);
     write_rows(&f->body_pose, POSE, 0, rows + nf, nb, buffer);
     write_points(f, &floes->points, f->vertices_before, rows, 0, nf, 0, buffer);
     write_rows(&floes->speed, SPEED_4, f->first, rows, nf, buffer);
-    write_rows(&floes->velocity, VECTOR_4, f->first, rows, nf, buffer);
+    write_rows(&floes->velocity, VELOCITY_4, f->first, rows, nf, buffer);
+    write_rows(&floes->net_force, NET_4, f->first, rows, nf, buffer);
     write_rows(&floes->force, FORCE_4, f->first, rows, nf, buffer);
     write_points(f, &others->points, 0, rows, nf, nb, f->floe_vertices - f->vertices_before, buffer);
     write_rows(&others->speed, SPEED_4, 0, rows + nf, nb, buffer);
-    write_rows(&others->velocity, VECTOR_4, 0, rows + nf, nb, buffer);
+    write_rows(&others->velocity, VELOCITY_4, 0, rows + nf, nb, buffer);
+    write_rows(&others->net_force, NET_4, 0, rows + nf, nb, buffer);
     free(buffer);
 }
 
@@ -288,18 +298,20 @@ bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, con
     bt_slab_grow(&f->contact_force, f->n);
     bt_slab_grow(&f->speed, f->n);
     bt_slab_grow(&f->velocity, f->n);
+    bt_slab_grow(&f->net_force, f->n);
     char path[64];
     snprintf(path, sizeof path, "/xdmf/%06lld", (long long)f->n);
     bt_h5_group(h, path);
     paraview floes = create_paraview(f, "floe", f->n_floes, f->floe_vertices, true);
     paraview others = create_paraview(f, "body", f->n_others, f->other_vertices, false);
-    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity, // these stay open
-                         &floes.points, &floes.speed, &floes.velocity, &floes.force,
-                         &others.points, &others.speed, &others.velocity};
-    enum { N = sizeof shared / sizeof *shared };
+    bt_slab *shared[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity,
+                         &f->net_force, // these stay open
+                         &floes.points, &floes.speed, &floes.velocity, &floes.net_force, &floes.force,
+                         &others.points, &others.speed, &others.velocity, &others.net_force};
+    enum { N = sizeof shared / sizeof *shared, STAY = 6 };
     status = bt_slab_share(f->comm, shared, N);
     if (status == BT_OK) write_frame(f, &floes, &others, rows);
-    for (int k = 5; k < N; k++) bt_slab_close(shared[k]);
+    for (int k = STAY; k < N; k++) bt_slab_close(shared[k]);
     // The time comes last: a reader that counts frames by it finds them whole.
     status = bt_comm_agree(f->comm, h->status);
     if (status != BT_OK) {
@@ -320,8 +332,8 @@ bt_status bt_frames_add(bt_frames *f, double time, const bt_frame_row *rows, con
 
 void bt_frames_close(bt_frames *f)
 {
-    bt_slab *all[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity};
-    for (int k = 0; k < 5; k++)
+    bt_slab *all[] = {&f->pose, &f->body_pose, &f->contact_force, &f->speed, &f->velocity, &f->net_force};
+    for (int k = 0; k < 6; k++)
         if (all[k]->h) bt_slab_close(all[k]);
     const hid_t datasets[] = {f->time, f->line_points, f->line_tension};
     for (int k = 0; k < 3; k++)

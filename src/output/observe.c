@@ -11,6 +11,7 @@
 #include "output/force_quantities.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "bergtow/forces.h"
 #include "loads/impact.h"
@@ -23,6 +24,14 @@
 #include "space/phases.h"
 
 enum { ICE_X, ICE_Y, ICE_TURN, BUDGET, TOUCHING, MOVING, N_SEEN };
+
+/// Impulse of a contact on its body b; on a the opposite.
+static inline void impulse_on_b(const bt_contact *u, double *x, double *y)
+{
+    const double normal = u->ln[0] + u->ln[1];
+    *x = normal * u->nx - u->lt * u->ny;
+    *y = normal * u->ny + u->lt * u->nx;
+}
 
 /// One cell's share of the sums over contacts and floes.
 static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t)
@@ -44,7 +53,8 @@ static void observe_cell(const bt_world *w, bt_idx k, double slow2, bt_totals *t
         const bt_contact *u = &cell->contacts[j];
         const double normal = u->ln[0] + u->ln[1];
         if (normal == 0 && u->lt == 0) continue;
-        const double jx = normal * u->nx - u->lt * u->ny, jy = normal * u->ny + u->lt * u->nx;
+        double jx, jy;
+        impulse_on_b(u, &jx, &jy);
         if (u->a == towed || u->b == towed) {
             const bool is_b = u->b == towed;
             const double sign = is_b ? 1 : -1;
@@ -284,4 +294,38 @@ void bt_observe_contact_force(const bt_world *w, double *force)
             force[u->b] = bt_max(force[u->b], f);
         }
     bt_domain_largest(w, force);
+}
+
+void bt_observe_net_force(const bt_comm *c, const bt_world *w, bt_gid n_floes, double (*force)[2])
+{
+    const bt_bodies *b = &w->bodies;
+    const int others = (int)(b->n_global - n_floes);
+    bt_sum *sum = bt_alloc(2 * (size_t)others, sizeof *sum);
+    for (bt_idx k = 0; k < w->cells->n; k++) {
+        const bt_cell *cell = &w->cells->cell[k];
+        for (bt_idx j = 0; cell->own && j < cell->n_contacts; j++) {
+            const bt_contact *u = &cell->contacts[j];
+            double jx, jy;
+            impulse_on_b(u, &jx, &jy);
+            const bt_idx side[] = {u->a, u->b};
+            for (int s = 0; s < 2; s++) {
+                const bt_gid other = b->gid[side[s]] - n_floes;
+                if (other < 0) continue;
+                bt_sum_add(&sum[2 * other], s ? jx : -jx);
+                bt_sum_add(&sum[2 * other + 1], s ? jy : -jy);
+            }
+        }
+    }
+    bt_comm_reduce(c, sum, 2 * others, NULL, 0, NULL, 0);
+    for (bt_idx i = 0; i < b->n; i++) {
+        const bt_gid other = b->gid[i] - n_floes;
+        const double m = b->inv[i].m;
+        if (other >= 0) {
+            for (int k = 0; k < 2; k++) force[i][k] = bt_sum_value(&sum[2 * other + k]) / w->par.dt;
+        } else { // 0: no step has been taken
+            force[i][0] = m > 0 ? (b->vel[i].x - b->vel_free[i].x) / m / w->par.dt : 0;
+            force[i][1] = m > 0 ? (b->vel[i].y - b->vel_free[i].y) / m / w->par.dt : 0;
+        }
+    }
+    free(sum);
 }

@@ -132,6 +132,7 @@ typedef struct bt_frame_row {
     double contact_force;    ///< largest normal force on the floe in this step, N; of other bodies not recorded
     double speed;            ///< of the centroid, m/s
     double vx, vy;           ///< its velocity, m/s; kept in single precision
+    double fx, fy;           ///< sum of all contact forces on the body in this step, N; in single precision, too
 } bt_frame_row;
 enum { BT_FRAME_ROW = sizeof(bt_frame_row) / sizeof(double) };
 
@@ -221,8 +222,9 @@ bt_status bt_record_events(bt_record *r, const bt_events *e, bt_errors *err);
 
 /// Collective. Take one frame: rows of this rank's block. Stored as /frames/time [T], /frames/pose [T][n_floes][3],
 /// /frames/contact_force [T][n_floes], /frames/body_pose [T][n_bodies − n_floes][3], /frames/speed [T][n_bodies],
-/// /frames/velocity [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2], /frames/line_tension
-/// [T][k]; and for ParaView in single precision with all vertices in the world frame (/xdmf, see src/output/xdmf.c).
+/// /frames/velocity and /frames/net_force [T][n_bodies][2]; of a line with k branches /frames/line_points [T][2 k][2],
+/// /frames/line_tension [T][k]; and for ParaView in single precision with all vertices in the world frame (/xdmf, see
+/// src/output/xdmf.c).
 /// line: the same on all ranks, read where there are branches. The status is the same on all ranks.
 bt_status bt_record_frame(bt_record *r, double time, const bt_frame_row *rows, const bt_frame_line *line,
                           bt_errors *err);

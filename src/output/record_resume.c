@@ -142,14 +142,20 @@ static void load_series(bt_record *r, bt_h5_reader *old, int64_t n, bool before)
     r->written = n;
 }
 
-/// The velocities of frame k; of a file of an earlier version, which has none, NaN.
-static void read_velocities(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
+/// Vectors of frame k to v [n][2]; of a file of an earlier version, which has none, NaN.
+static void read_vectors(bt_h5_reader *old, const char *name, int64_t k, bt_idx n, float *v)
+{
+    for (bt_idx i = 0; i < 2 * n; i++) v[i] = NAN;
+    if (bt_h5_there(old, name)) bt_h5_read(old, name, H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
+}
+
+static void read_velocities_and_forces(bt_h5_reader *old, int64_t k, bt_idx n, bt_frame_row *rows)
 {
     float *v = bt_alloc((size_t)n, 2 * sizeof *v);
-    for (bt_idx i = 0; i < 2 * n; i++) v[i] = NAN;
-    if (bt_h5_there(old, "/frames/velocity"))
-        bt_h5_read(old, "/frames/velocity", H5T_NATIVE_FLOAT, k, 1, 2 * (int64_t)n, v);
+    read_vectors(old, "/frames/velocity", k, n, v);
     for (bt_idx i = 0; i < n; i++) rows[i].vx = (double)v[2 * i], rows[i].vy = (double)v[2 * i + 1];
+    read_vectors(old, "/frames/net_force", k, n, v);
+    for (bt_idx i = 0; i < n; i++) rows[i].fx = (double)v[2 * i], rows[i].fy = (double)v[2 * i + 1];
     free(v);
 }
 
@@ -178,7 +184,7 @@ static void read_frame(bt_h5_reader *old, int64_t k, bt_idx n_floes, bt_idx n_bo
     bt_h5_read(old, "/frames/speed", H5T_NATIVE_DOUBLE, k, 1, n_bodies, x);
     for (bt_idx i = 0; i < n_bodies; i++) rows[i].speed = x[i];
     free(x);
-    read_velocities(old, k, n_bodies, rows);
+    read_velocities_and_forces(old, k, n_bodies, rows);
 }
 
 /// Collective. The first n frames, through the function that takes any frame.

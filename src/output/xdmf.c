@@ -5,13 +5,13 @@
 // precision; the polygons never change, and their connectivity is stored once:
 //     /xdmf/floes, /xdmf/bodies     mixed topology
 //     /xdmf/floe_id                 ids: a filter of ParaView numbers the cells that it leaves anew
-//     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity}, floe_force     frame NNNNNN
+//     /xdmf/NNNNNN/{floe,body}_{points,speed,velocity,net_force}, floe_force     frame NNNNNN
 // Thickness and height are those of /floes and /bodies; what belongs to a few bodies (ids, which one is towed) and the
-// ends of the tow line stand in the XML itself. Velocities have a third component, 0, as ParaView's vectors have.
-// Floes and other bodies are two blocks, because only floes have a contact force. Each frame has datasets of its own:
-// as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its Xdmf2 reader, which keeps
-// a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf, so that the folder can be
-// moved.
+// ends of the tow line stand in the XML itself. Vectors have a third component, 0, as ParaView's vectors have.
+// Floes and other bodies are two blocks, because only floes have the largest force of a contact. Each frame has
+// datasets of its own: as hyperslabs of one large dataset ParaView 5.11's Xdmf3 reader does not read them, and its
+// Xdmf2 reader, which keeps a geometry whose path it has seen, complains. result.h5 is named relative to frames.xdmf,
+// so that the folder can be moved.
 #include "output/xdmf.h"
 
 #include <inttypes.h>
@@ -76,6 +76,7 @@ static void begin_block(FILE *f, const char *name, const char *kind, int64_t cel
     fputs("\n          </Geometry>\n", f);
     of_frame(f, cells, "speed", 1, frame, kind, "speed");
     of_frame(f, cells, "velocity", 3, frame, kind, "velocity");
+    of_frame(f, cells, "net_force", 3, frame, kind, "net_force");
 }
 
 static void floes(FILE *f, const bt_xdmf *x, int64_t frame)

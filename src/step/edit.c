@@ -42,7 +42,13 @@ bt_status bt_edit_velocity(bt_world *w, bt_gid gid, const double v[3], bt_errors
 {
     if (!may_change(w, gid, v, err)) return BT_ERR_USAGE;
     const bt_idx i = bt_world_index(w, gid);
-    if (i >= 0) w->bodies.vel[i] = (bt_vel){.x = v[0], .y = v[1], .w = v[2]};
+    if (i >= 0) {
+        // what contacts did to it stays in the difference
+        bt_vel *u = &w->bodies.vel[i], *free = &w->bodies.vel_free[i];
+        free->x = v[0] - (u->x - free->x);
+        free->y = v[1] - (u->y - free->y);
+        *u = (bt_vel){.x = v[0], .y = v[1], .w = v[2]};
+    }
     stir(w, i);
     return BT_OK;
 }

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, TOW, USAGE, call, changed, environment, write_case
+from harness import BERGTOW, CASE, DONE, IO, TOW, USAGE, call, changed, environment, launcher, write_case
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {
@@ -190,7 +190,7 @@ def test_under_mpirun_it_is_said_once(tmp_path):
     env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     for study, code in (STUDY, DONE), (STUDY | {"base": "none.yml"}, IO):
         checked(tmp_path, study, code)
-        result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "check", "study.yml"],
+        result = subprocess.run([*launcher(2), BERGTOW, "check", "study.yml"],
                                 cwd=tmp_path,
                                 env=env,
                                 capture_output=True,
@@ -205,7 +205,7 @@ def test_under_mpirun_it_is_said_once(tmp_path):
 
 def under(ranks, *arguments, cwd):
     env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
-    return subprocess.run(["mpirun", "--oversubscribe", "-n", str(ranks), BERGTOW, *arguments],
+    return subprocess.run([*launcher(ranks), BERGTOW, *arguments],
                           cwd=cwd, env=env, capture_output=True, text=True, timeout=60)
 
 

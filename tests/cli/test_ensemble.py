@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, write_case
+from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, launcher, write_case
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"title": "small", "base": "base.yml", "repeats": 3, "seed": 4,
@@ -159,7 +159,7 @@ def test_several_processes_and_ranks_share_the_members(quiet, tmp_path):
     groups = changed(STUDY, ranks=2, repeats=2)
     prepare(tmp_path / "mpi", groups)
     result = subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", "3", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+        [*launcher(3), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
         cwd=tmp_path / "mpi",
         env=environment(OMP_NUM_THREADS=1, **ROOT),
         capture_output=True,

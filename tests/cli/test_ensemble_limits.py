@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, SIGNAL, TOW, USAGE, call, changed, differing, environment, write_case
+from harness import BERGTOW, CASE, DONE, SIGNAL, TOW, USAGE, call, changed, differing, environment, launcher, write_case
 from test_ensemble import BASE, ROOT, STUDY, ensemble, journal, prepare
 
 LONG = changed(TOW, run__duration=3000, output__window_start=5, domain__length=500)
@@ -71,7 +71,7 @@ def test_the_disk_of_members_without_frames(tmp_path):
 def test_so_many_steps_of_each_member_in_a_call(quiet, tmp_path, ranks):
     """200 steps a member, in calls of 80: two leave all of them, the third ends them, with the same file."""
     prepare(tmp_path)
-    command = ["mpirun", "--oversubscribe", "-n", "2"] if ranks > 1 else []
+    command = launcher(2) if ranks > 1 else []
     for k in range(3):
         result = subprocess.run([*command, BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1", "--steps",
                                  "80"], cwd=tmp_path, env=environment(OMP_NUM_THREADS=1, **ROOT), capture_output=True,

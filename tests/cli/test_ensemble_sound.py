@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, write_case
+from harness import BERGTOW, CASE, DONE, IO, SIGNAL, TOW, call, changed, differing, environment, launcher, write_case
 
 BASE = changed(TOW, run__duration=20, output__window_start=5)
 STUDY = {"base": "base.yml", "repeats": 2, "parameters": {"tow.speed": [0.1, 0.15]}}
@@ -25,7 +25,7 @@ def ensemble(folder, *more, **how):
 
 def on_two_ranks(folder):
     return subprocess.run(
-        ["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
+        [*launcher(2), BERGTOW, "ensemble", "study.yml", "-o", "all", "--threads", "1"],
         cwd=folder,
         env=environment(OMP_NUM_THREADS=1, **ROOT),
         capture_output=True,

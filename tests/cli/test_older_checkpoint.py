@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A checkpoint from before contact laws had a table goes on to the same bits: its contacts, history and series are laid
-out as they were then.
+"""A checkpoint from before contact laws had a table, and arrays their axes, goes on to the same bits: its contacts,
+history and series are laid out as they were then.
 
 Red when depths are taken for impulses, or friction is lost.
 """
@@ -21,8 +21,12 @@ NEW = ("rafting", "rafted_area", "rafted_largest", "rafted_energy", "raft_edge_w
 
 
 def as_it_was(folder, damage=None):
-    """Checkpoint and result without what came with the table of laws."""
+    """Checkpoint and result without what came with the table of laws, and without dimensions."""
     with h5py.File(folder / "checkpoint.h5", "r+") as f:
+        dimensions = [n for n in f if isinstance(f[n], h5py.Dataset)]
+        assert "body" in dimensions
+        for name in dimensions:
+            del f[name]
         value, law = f["contacts/value"][:], f["contacts/law"][:]
         assert set(law.ravel()) == {0, 1}
         f["contacts/impulse"], f["contacts/friction"], f["contacts/crushed"] = value[:, :2], value[:, 2], law.astype(
@@ -48,6 +52,16 @@ def test_it_goes_on_to_the_same_bits(tmp_path):
     assert result.returncode == DONE, result.stderr
     assert Run(tmp_path / "cut", result).hash == whole.hash
     assert differing(whole.dir / "result.h5", tmp_path / "cut/result.h5") == []
+
+
+def test_numbers_where_only_dimensions_are_written(tmp_path):
+    run(tmp_path, changed(CRUSHING, run__duration=6), "--steps", 30, name="cut")
+    (tmp_path / "cut/checkpoint.previous.h5").unlink(missing_ok=True)
+    with h5py.File(tmp_path / "cut/checkpoint.h5", "r+") as f:
+        f["numbers"] = [1.0, 2.0]
+    seal(tmp_path / "cut/checkpoint.h5", "checkpoint 2")
+    result = call("resume", "cut", "--quiet", cwd=tmp_path)
+    assert result.returncode == CASE and "holds what this program does not write" in result.stderr, result.stderr
 
 
 def test_what_is_missing_in_it_is_reported(tmp_path):

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import BERGTOW, CASE, DONE, IO, TOW, call, changed, environment, run, write_case
+from harness import BERGTOW, CASE, DONE, IO, TOW, call, changed, environment, launcher, run, write_case
 
 FLOE = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
 TANK = {"run": {"dt": 0.1, "duration": 1}, "domain": {"length": 20, "width": 10}, "ice": {"concentration": 0},
@@ -345,7 +345,7 @@ def test_nobody_hangs_under_mpirun(tmp_path):
     os.mkfifo(tmp_path / "field.h5")
     path = write_case(tmp_path, READ)
     env = environment(OMP_NUM_THREADS=1, OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
-    result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", BERGTOW, "run", path, "-o", tmp_path / "out"],
+    result = subprocess.run([*launcher(2), BERGTOW, "run", path, "-o", tmp_path / "out"],
                             env=env, capture_output=True, text=True, timeout=60)
     assert result.returncode == IO and result.stderr.count("is a pipe (FIFO)") == 1
 

@@ -70,7 +70,7 @@ def test_every_dataset_has_units_a_name_and_axes(made, name):
         if kind.kind not in "SO":
             assert str(attributes.get("units", "")).strip(), key
         own = "CLASS" in attributes
-        if "checkpoint" not in name and not key.startswith("xdmf/0") and not own:
+        if not key.startswith("xdmf/0") and not own:
             assert scales == [1] * len(shape), (key, scales)
     with h5py.File(made / name) as f:
         assert f.attrs["Conventions"] == "CF-1.8" and "bergtow" in f.attrs["source"]
@@ -79,7 +79,7 @@ def test_every_dataset_has_units_a_name_and_axes(made, name):
 @pytest.mark.parametrize("engine", ENGINES)
 def test_xarray_opens_every_group(made, engine):
     """The values of h5py, with named dimensions; time, and the member, as coordinates."""
-    for name in ("full/result.h5", "line/result.h5", "field.h5", "all/ensemble.h5", "contacts.h5"):
+    for name in FILES:
         with h5py.File(made / name) as f:
             groups = [g for g in f if isinstance(f[g], h5py.Group) and g not in ("xdmf", "fclib_local")]
             for group in groups + [g for g in ("fclib_local/W", "fclib_local/vectors") if g in f]:
@@ -94,6 +94,10 @@ def test_xarray_opens_every_group(made, engine):
         assert ds["contact_force"].dims == ("time", "floe") and ds["contact_force"].attrs["units"] == "N"
     with xarray.open_dataset(made / "full/result.h5", group="panels", engine=engine) as ds:
         assert ds["force"].dims == ("sample", "panel", "xy") and ds["ends"].dims == ("panel_end", "xy")
+    with xarray.open_dataset(made / "line/checkpoint.h5", group="bodies", engine=engine) as ds:
+        assert ds["pose"].dims == ("body", "component") and ds["path"].dims == ("body",)
+    with xarray.open_dataset(made / "line/checkpoint.h5", group="history", engine=engine) as ds:
+        assert ds["tow"].dims == ("time",) and "time" in ds.coords and ds.sizes["time"] == 30
     with xarray.open_dataset(made / "all/ensemble.h5", group="series", engine=engine) as ds:
         assert all(v.dims == ("member", "sample") for v in ds.values()) and ds.sizes["member"] == 8
 

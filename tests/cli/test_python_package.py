@@ -100,7 +100,8 @@ def test_a_large_result_opens_without_being_read(tmp_path):
         for name, shape in (("floes/thickness", (n,)), ("floes/area", (n,)), ("frames/pose", (t, n, 3)),
                             ("frames/contact_force", (t, n)),
                             ("frames/speed", (t, n + len(f["bodies/area"]))),
-                            ("frames/velocity", (t, n + len(f["bodies/area"]), 2))):
+                            ("frames/velocity", (t, n + len(f["bodies/area"]), 2)),
+                            ("frames/net_force", (t, n + len(f["bodies/area"]), 2))):
             del f[name]
             f.create_dataset(name, shape, "f8", chunks=True)
     __import__("xarray")  # which is not timed

@@ -9,7 +9,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from harness import CASE, CLOSING, NUMERIC, ROOT, call, changed, differing, environment, run, write_case
+from harness import CASE, CLOSING, NUMERIC, ROOT, call, changed, differing, environment, launcher, run, write_case
 from python_package import LINE, SHORT, WINDOW, bergtow, datasets_of, stepped
 
 pytestmark = pytest.mark.usefixtures("library")
@@ -189,9 +189,10 @@ def nothing(bodies): bodies.force[:] = 0 * bodies.place[:, :2]
 with bergtow.Simulation({str(case)!r}, forces={{"nothing": nothing}}, threads=1) as sim:
     while sim.steps_left: sim.step(10)
     said = np.isfinite(sim.positions[:, 0]).sum(), sim.n_bodies, sim.state_hash
-    (pathlib.Path(__file__).parent / ("rank" + os.environ["OMPI_COMM_WORLD_RANK"])).write_text("%d %d %s" % said)
+    rank = os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK"))
+    (pathlib.Path(__file__).parent / ("rank" + rank)).write_text("%d %d %s" % said)
 """)
-    result = subprocess.run(["mpirun", "--oversubscribe", "-n", "2", sys.executable, script], capture_output=True,
+    result = subprocess.run([*launcher(2), sys.executable, script], capture_output=True,
                             text=True, timeout=120,
                             env=environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1))
     assert result.returncode == 0, result.stdout + result.stderr

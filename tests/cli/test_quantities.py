@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 import resuming
-from harness import BERGTOW, DONE, ROOT, TOW, call, changed, differing, environment, write_case
+from harness import BERGTOW, DONE, ROOT, TOW, call, changed, differing, environment, launcher, write_case
 
 sys.path.insert(0, str(ROOT / "postproc"))
 
@@ -65,7 +65,7 @@ CASES = {
 
 
 def started(program, *arguments, ranks=1, cwd=None, timeout=200):
-    line = [*(["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []), program, *map(str, arguments)]
+    line = [*(launcher(ranks) if ranks > 1 else []), program, *map(str, arguments)]
     done = subprocess.run(line,
                           cwd=cwd,
                           env=environment(OMP_NUM_THREADS=1, **MPI),

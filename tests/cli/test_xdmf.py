@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from harness import BERGTOW, ROOT, TOW, changed, differing, environment, write_case
+from harness import BERGTOW, ROOT, TOW, changed, differing, environment, launcher, write_case
 
 PROGRAM = Path("build") / os.environ.get("CONFIG", "release") / "tests/unit/test_record"
 
@@ -95,6 +95,9 @@ def test_xdmf_describes_the_frames(run):
             velocity = values[name, "velocity"]
             np.testing.assert_array_equal(velocity[:, :2], frames["velocity"][k, part])
             assert velocity.shape[1] == 3 and not velocity[:, 2].any() and velocity[-1, :2].all()
+            force = values[name, "net_force"]
+            np.testing.assert_array_equal(force[:, :2], frames["net_force"][k, part])
+            assert force.shape[1] == 3 and not force[:, 2].any() and force[:, :2].all()
             total = len(frames["speed"][k])
             np.testing.assert_array_equal(values[name, "id"], np.arange(total)[part])
         np.testing.assert_array_equal(values["floes", "thickness"], thickness)
@@ -155,6 +158,23 @@ def test_the_printed_table_says_the_same(run):
     assert "warning" not in table
 
 
+def test_forces_of_a_frame_balance(tmp_path):
+    """Red: an impulse that is counted for one of two bodies, or of a line for one of a contact."""
+    write_case(tmp_path, changed(TWO_LINES, domain__length=10, ice__concentration=0.75))
+    done = subprocess.run([BERGTOW, "run", "case.yml", "-o", "out", "--quiet", "--threads", "1"], cwd=tmp_path,
+                          env=environment(), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "out/result.h5") as f:
+        force, towed = f["frames/net_force"][1:].astype(float), len(f["floes/area"]) + f["bodies/towed"][0]
+        at = np.searchsorted(f["series/time"][()], f["frames/time"][1:] * (1 - 1e-9))
+        resistance = f["series/ice_resistance"][()][at]
+        np.testing.assert_array_equal(force[f["frames/contact_force"][1:].sum(axis=1) == 0], 0)
+    scale = np.abs(force).sum(axis=(1, 2))
+    assert (resistance > 0).sum() > 5 and (force[:, towed + 1:] != 0).any()
+    np.testing.assert_allclose(-force[:, towed, 0], resistance, atol=1e-6 * scale.max())
+    np.testing.assert_array_less(np.abs(force.sum(axis=1)).max(axis=1), 1e-5 * scale + 1e-9)
+
+
 TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, tow__line_stiffness=2000,
                     tow__speed=0.6, body__x=4, tow__line={"branches": 2}, output__frame_interval=0.5)
 
@@ -162,7 +182,7 @@ TWO_LINES = changed(TOW, run__duration=8, tow__mode="line", tow__line_length=3, 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_the_line_of_a_run_that_goes_on(tmp_path, ranks):
     write_case(tmp_path, TWO_LINES)
-    mpi = ["mpirun", "--oversubscribe", "-n", str(ranks)] if ranks > 1 else []
+    mpi = launcher(ranks) if ranks > 1 else []
     env = environment(OMPI_ALLOW_RUN_AS_ROOT=1, OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1)
     for words in (["run", "case.yml", "-o", "parts", "--steps", "33"], ["resume", "parts"],
                   ["run", "case.yml", "-o", "whole"]):

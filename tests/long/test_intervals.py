@@ -34,7 +34,7 @@ def members(tmp_path_factory):
         folder = tmp_path_factory.mktemp("intervals")
         (folder / "study.yml").write_text(json.dumps(dict(STUDY, seed=seed)))
         command = [
-            "mpirun", "--allow-run-as-root", "-n", "2",
+            *harness.launcher(2),
             str(harness.BERGTOW), "ensemble", "study.yml", "-o", "out", "--threads", "1"
         ]
         subprocess.run(command,

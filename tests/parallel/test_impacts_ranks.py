@@ -6,7 +6,7 @@ import h5py
 import pytest
 
 from counted import assert_counted_over_the_window
-from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, run
+from harness import DONE, TOW, VALIDATE, Run, changed, differing, environment, launcher, run
 from resuming import assert_same_result, done
 
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": 1, "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 1}
@@ -33,8 +33,7 @@ def one(request, tmp_path_factory):
 def test_rows_do_not_depend_on_ranks_and_threads(one, ranks, threads):
     folder, alone = one
     result = subprocess.run([
-        "mpirun", "--oversubscribe", "-n",
-        str(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}", "--threads",
+        *launcher(ranks), VALIDATE, "run", "case.yml", "-o", f"out{ranks}", "--threads",
         str(threads)
     ],
                             cwd=folder,

@@ -10,8 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
-from harness import (BERGTOW, CASE, DONE, IO, SIGNAL, TOW, USAGE, Run, call, changed, differing, environment, run,
-                     write_case)
+from harness import (BERGTOW, CASE, DONE, IO, RANK, SIGNAL, TOW, USAGE, Run, call, changed, differing, environment,
+                     launcher, rank_of, run, write_case)
+from resuming import children
 
 # More frames than a chunk of the series, more floes than a rank's share, a body and walls; hand-made floes have the ids
 # after the others.
@@ -32,11 +33,11 @@ def described(dataset):
 
 
 def command(ranks, *arguments):
-    return ["mpirun", "--oversubscribe", "-n", str(ranks), *map(str, arguments)]
+    return [*launcher(ranks), *map(str, arguments)]
 
 
 def mpirun(ranks, *arguments, program=(BERGTOW,), options=(), timeout=60, **more):
-    return subprocess.run(command(ranks)[:4] + [*options, *program, *map(str, arguments)],
+    return subprocess.run([*launcher(ranks, *options), *program, *map(str, arguments)],
                           env=environment(OMP_NUM_THREADS=1, **ROOT),
                           capture_output=True,
                           text=True,
@@ -76,7 +77,7 @@ def test_values_do_not_depend_on_ranks(one, ranks):
     assert sorted(p.name for p in many.dir.iterdir()) == sorted(p.name for p in alone.dir.iterdir())
     with h5py.File(alone.dir / "result.h5") as a, h5py.File(many.dir / "result.h5") as b:
         assert b.attrs["ranks"] == ranks and b.attrs["complete"] == 1
-        for name in "pose", "contact_force", "speed", "body_pose", "time":
+        for name in "pose", "contact_force", "net_force", "velocity", "speed", "body_pose", "time":
             assert described(a["frames"][name]) == described(b["frames"][name])
     # The table once, and the same but for times.
     assert result.stdout.count("state hash") == 1 and result.stdout.count("mean floe size") == 1
@@ -165,7 +166,7 @@ def test_what_needs_one_rank_is_done_by_one(tmp_path, arguments):
 def test_a_disk_that_fills_up_in_the_run(tmp_path, rank):
     """For one rank only: the others must hear of it. Without shared memory, whose files would be too large too."""
     write_case(tmp_path, changed(SHORT, output__frame_interval=0.1))
-    limited = f'[ "$OMPI_COMM_WORLD_RANK" != {rank} ] || ulimit -f 900; exec "$@"'
+    limited = f'[ "{RANK}" != {rank} ] || ulimit -f 900; exec "$@"'
     result = mpirun(3,
                     "run",
                     "case.yml",
@@ -226,16 +227,14 @@ def start(tmp_path):
 
         assert wait_for(has_frames, 30)
         ranks = {}
-        for name in os.listdir("/proc"):
+        for name in children(p.pid):
             try:
                 with open(f"/proc/{name}/environ") as e:
                     variables = dict(v.split("=", 1) for v in e.read().split("\0") if "=" in v)
-                with open(f"/proc/{name}/stat") as s:
-                    parent = int(s.read().rsplit(")", 1)[1].split()[1])
             except (OSError, ValueError):
                 continue
-            if parent == p.pid and "OMPI_COMM_WORLD_RANK" in variables:
-                ranks[int(variables["OMPI_COMM_WORLD_RANK"])] = int(name)
+            if rank_of(variables) is not None:
+                ranks[rank_of(variables)] = name
         assert sorted(ranks) == [0, 1, 2]
         return p, ranks
 

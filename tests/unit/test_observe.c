@@ -4,6 +4,7 @@
 #include "scene.h"
 
 #include "output/observe.h"
+#include "step/edit.h"
 
 /// A square that stands on its corner slides along the flat side of the towed body, with friction. What the towed body
 /// feels is what the square loses, at the point of its corner; the bodies are added in either order.
@@ -97,12 +98,45 @@ static void sheets_are_no_contact(void **state)
     bt_world_free(w);
 }
 
+/// Two squares that meet: what each has from the other is opposite, and the momentum it gained; the same where the
+/// second is a body that forces are taken of by its contacts. A velocity that is set afterwards is no force.
+static void net_forces_of_two(void **state)
+{
+    (void)state;
+    bt_params p = scene_params(0.1, 10);
+    bt_world *w = bt_world_create(&p);
+    double v[8], force[2][2], by_contacts[2][2];
+    for (int k = 0; k < 2; k++) {
+        scene_square(10, v);
+        bt_body_def d = scene_prism(4, v, 900);
+        d.x = -10.02 * k, d.vx = k ? 1 : -1;
+        bt_world_add(w, &d);
+    }
+    bt_observe_net_force(&bt_comm_alone, w, 2, force);
+    assert_true(force[0][0] == 0 && force[1][0] == 0);
+    bt_world_step(w);
+    const bt_bodies *b = &w->bodies;
+    const int i = b->gid[0] == 0 ? 0 : 1;
+    bt_observe_net_force(&bt_comm_alone, w, 2, force);
+    assert_true(force[i][0] > 1e4 && fabs(force[0][0] + force[1][0]) < 1e-9 * force[i][0]);
+    assert_true(fabs(force[i][1]) < 1e-9 * force[i][0]);
+    assert_float_equal(force[i][0], b->mass[i] * (b->vel[i].x - b->vel_start[i].x) / 0.1, 0.1 * force[i][0]); // drag
+    bt_observe_net_force(&bt_comm_alone, w, 1, by_contacts);
+    assert_float_equal(by_contacts[1 - i][0], force[1 - i][0], 1e-9 * force[i][0]);
+    bt_errors err = {0};
+    assert_int_equal(bt_edit_velocity(w, 0, (const double[3]){7, 8, 9}, &err), BT_OK);
+    bt_observe_net_force(&bt_comm_alone, w, 2, by_contacts);
+    assert_float_equal(by_contacts[i][0], force[i][0], 1e-9 * force[i][0]);
+    bt_world_free(w);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(force_and_moment_on_the_towed_body),
         cmocka_unit_test(vessel_in_a_current),
         cmocka_unit_test(sheets_are_no_contact),
+        cmocka_unit_test(net_forces_of_two),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
