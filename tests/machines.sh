@@ -1,20 +1,34 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, by hashes.
+# The same bits from another compiler (clang) and on another architecture (ARM, under qemu): runs of cases, by hashes;
+# and from another C library (musl, static): steps of a world without files, as Debian's other libraries are for glibc.
 #
 #     tests/machines.sh [FOLDER]      FOLDER takes 600 MB: Debian's libraries for arm64, and what is built with them
 #
-# Needs gcc-aarch64-linux-gnu, qemu-user-static, clang-14, and the network for Debian's packages of the other
-# architecture, which are unpacked into FOLDER and never installed. Ends with `N passed, N failed`.
+# Needs gcc-aarch64-linux-gnu, qemu-user-static, clang-14, musl-tools, and the network for Debian's packages of the
+# other architecture, which are unpacked into FOLDER and never installed. Ends with `N passed, N failed`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(mkdir -p "${1:-/tmp/bergtow-machines}" && cd "${1:-/tmp/bergtow-machines}" && pwd)
 root=$folder/root lib=$folder/root/usr/lib/aarch64-linux-gnu
 
-for tool in aarch64-linux-gnu-gcc qemu-aarch64-static clang-14; do
+for tool in aarch64-linux-gnu-gcc qemu-aarch64-static clang-14 musl-gcc; do
   command -v $tool >/dev/null ||
-    { echo "$tool is missing: apt-get install gcc-aarch64-linux-gnu qemu-user-static clang-14"; exit 1; }
+    { echo "$tool is missing: apt-get install gcc-aarch64-linux-gnu qemu-user-static clang-14 musl-tools"; exit 1; }
 done
+
+# Whatever the steps call, in one static program without MPI and OpenMP; what they do not call falls away.
+steps() { # COMPILER OPTION...
+  local of=()
+  mapfile -t of < <(ls src/{geometry,body,tow,space,contact,force,loads,solve,step,base}/*.c partition/*.c |
+    grep -v 'base/\(h5\|snapshot\|json\|provenance\|syntax\|tree\)')
+  "$@" -std=c17 -D_GNU_SOURCE -DXXH_INLINE_ALL -Iinstall/alone -Iinclude -Isrc -I. -Itests -ffp-contract=off \
+    -fno-math-errno -O3 -ffunction-sections -Wl,--gc-sections -static -w -Wno-psabi -o "$folder/steps" tests/steps.c \
+    "${of[@]}" src/case/{speed_law,arch,law_keys,schema,value,body_shapes}.c -lm
+  "$folder/steps"
+}
+here=$(steps gcc) there=$(steps musl-gcc -idirafter /usr/include -idirafter "/usr/include/$(gcc -dumpmachine)")
+echo "steps: glibc $here, musl $there"
 make -s all
 make -s CC=clang-14 BUILD="$folder/clang" all >"$folder/clang.log"
 
@@ -47,6 +61,7 @@ arm() {
 state() { sed -n 's/.*"state_hash": "\(.*\)".*/\1/p' "$folder/$1/summary.json"; }
 
 passed=0 failed=0
+if [ "${#here}" = 16 ] && [ "$here" = "$there" ]; then passed=1; else failed=1; fi
 compare() { # NAME CASE OPTION...
   local name=$1
   shift

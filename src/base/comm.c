@@ -96,6 +96,7 @@ static void on_mpi_error(MPI_Comm *mpi, int *code, ...)
     bt_comm_abort(BT_ERR_NUMERIC);
 }
 
+#ifdef __GLIBC__
 static void on_leaving(int code, void *unused)
 {
     (void)unused;
@@ -103,6 +104,14 @@ static void on_leaving(int code, void *unused)
     if (code == BT_OK || code == BT_ERR_USAGE) bt_comm_end(code);
     else bt_comm_abort(code);
 }
+static void watch_exits(void) { on_exit(on_leaving, NULL); }
+#else // no other C library tells the code: a rank that leaves without bt_comm_end counts as one that has failed
+static void on_leaving(void)
+{
+    if (running) bt_comm_abort(BT_ERR_NUMERIC);
+}
+static void watch_exits(void) { atexit(on_leaving); }
+#endif
 
 static void count_here(bt_comm *c)
 {
@@ -196,7 +205,7 @@ bt_status bt_comm_start(int *argc, char ***argv)
     MPI_Type_contiguous(4, MPI_UINT64_T, &item_type);
     MPI_Type_commit(&item_type);
     MPI_Op_create(combine, 1, &item_op);
-    if (!foreign) on_exit(on_leaving, NULL);
+    if (!foreign) watch_exits();
     bt_leave_by(bt_comm_abort);
     return BT_OK;
 }

@@ -257,11 +257,11 @@ def test_diff_names_the_first_difference(stopped):
 
 @pytest.fixture
 def small_disk(tmp_path):
-    """A file system of 6 MB, or, where none can be mounted, None: then a limit on the size of files stands in for
+    """A file system of 7 MB, or, where none can be mounted, None: then a limit on the size of files stands in for
     it."""
     disk = tmp_path / "disk"
     disk.mkdir()
-    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=6m", "tmpfs", disk],
+    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=7m", "tmpfs", disk],
                                                    capture_output=True).returncode == 0
     yield disk, mounted
     if mounted:
